@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::CertificateLine;
 use bench_dragon::certify::plan::{
-    GreatestSpeed, LeastPitch, Overlap, PlanError, certify_greatest_speed, greatest_speed, least_pitch,
+    GreatestSpeed, LeastPitch, Overlap, PlanError, certify_greatest_speed, certify_least_pitch, greatest_speed,
+    least_pitch,
 };
+use bench_dragon::certify::speed::MOST_HANDLES;
 use bench_dragon::show::scene::Accepted;
 use serde::Serialize;
 
@@ -27,6 +29,9 @@ enum Question {
         /// Metres from the centre that the front handle of the head must reach
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
         reach_radius: f64,
+        /// Write the certificate of the proof to this file, for `verify`
+        #[arg(long, value_name = "FILE")]
+        certify: Option<PathBuf>,
     },
     /// The greatest constant speed of the head at which no handle of the show exceeds a limit
     Speed {
@@ -70,18 +75,28 @@ struct SpeedLine {
 /// Plans the pitch or the speed.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     match &arguments.question {
-        Question::Pitch { reach_radius } => plan_pitch(common, *reach_radius),
+        Question::Pitch { reach_radius, certify } => plan_pitch(common, *reach_radius, certify.as_deref()),
         Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
     }
 }
 
-fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
+fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), CommandError> {
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
-    let scene = common.load_scene()?;
+    let text = common.scene_text()?;
+    let scene = text.parse()?;
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
-    let found = least_pitch(scene.team(), radius, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let found = if let Some(file) = file {
+        let mut certificate = CertificateFile::create(file)?;
+        let mut write = |line: &CertificateLine| certificate.write(line);
+        let found = certify_least_pitch(scene.team(), radius, &text.text, &mut write, &mut progress)??;
+        certificate.finish()?;
+        found
+    } else {
+        least_pitch(scene.team(), radius, &mut progress)?
+    };
     bar.finish_and_clear();
-    let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found?;
+    let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;
     let mut output = Output::standard();
     if common.json {
         let status = if proved { "proved" } else { "given_up" };
@@ -144,7 +159,8 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
     let found = if let Some(file) = file {
         let mut certificate = CertificateFile::create(file)?;
         let mut write = |line: &CertificateLine| certificate.write(line);
-        let found = certify_greatest_speed(&scene, &timeline, limit, &text.text, &mut write, &mut progress)??;
+        let (text, most) = (&text.text, MOST_HANDLES);
+        let found = certify_greatest_speed(&scene, &timeline, limit, text, most, &mut write, &mut progress)??;
         certificate.finish()?;
         found
     } else {

@@ -9,7 +9,7 @@ use std::io;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bench_dragon::certify::plan::certify_greatest_speed;
+use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
 use bench_dragon::certify::{CertificateLine, certify, certify_least_clearance};
 use bench_dragon::proof::{Proved, Status, Until, verify};
 use bench_dragon::show::scene::Scene;
@@ -145,7 +145,7 @@ fn speed_certified(text: &str) -> bool {
         lines.push(b'\n');
         Ok(())
     };
-    if let Ok(Ok(speed)) = certify_greatest_speed(&scene, &timeline, 2.0, text, &mut write, &mut |_| ()) {
+    if let Ok(Ok(speed)) = certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, &mut write, &mut |_| ()) {
         found = Some(speed);
     }
     let Some(speed) = found else { return false };
@@ -154,6 +154,28 @@ fn speed_certified(text: &str) -> bool {
     assert_eq!((claim.value_lo, claim.value_hi), (speed.value_lo, speed.value_hi), "{text}");
     assert!(claim.value_hi - claim.value_lo <= 1e-9, "{claim:?}\n{text}");
     true
+}
+
+/// Certificates of the least pitch: of a team like the paper's, and of one whose head locks.
+#[test]
+fn certificates_of_the_least_pitch_are_accepted() {
+    for (head, body, width, inset, radius) in
+        [(3.41, 2.2, 0.3, 0.275, 4.5), (2.0, 2.0, 0.2, 0.1, 3.0), (3.0, 1.2, 0.4, 0.1, 1.6), (5.0, 1.0, 0.1, 0.1, 1.5)]
+    {
+        let text = format!(
+            "[team]\nbenches = 40\nhead_length = {head}\nbody_length = {body}\nwidth = {width}\nhole_inset = {inset}\n\
+             [path]\nkind = \"spiral\"\npitch = 0.6\nstart_turn = 12.0\n[motion]\nhead_speed = 1.0\n"
+        );
+        let scene = Scene::parse(&text, "pitch", "pitch").unwrap();
+        let mut found = None;
+        let proved = accepted(&text, |write| {
+            found = Some(certify_least_pitch(scene.team(), radius, &text, write, &mut |_| ()).unwrap().unwrap());
+        });
+        let (claim, found) = (proved.least_pitch.unwrap(), found.unwrap());
+        println!("{claim:?} {found:?} {} steps", proved.steps);
+        assert_eq!((claim.radius, claim.from, claim.value_hi), (radius, found.from, found.value_hi), "{text}");
+        assert_eq!(claim.value_lo, (found.intervals > 0).then_some(found.value_lo), "{text}");
+    }
 }
 
 #[test]
@@ -173,8 +195,7 @@ fn every_certificate_of_a_tight_route_is_accepted() {
                     let text = scene(index, &mut Rng::with_seed(0x7163 + index as u64));
                     let results = certified(&text).unwrap_or_default();
                     let until = clearance_certified(&text);
-                    // The search of a greatest speed takes seconds.
-                    let has_speed = index.is_multiple_of(10) && speed_certified(&text);
+                    let has_speed = speed_certified(&text);
                     let mut statuses = statuses.lock().unwrap();
                     *statuses.entry("speeds".to_owned()).or_default() += usize::from(has_speed);
                     if let Some(until) = until {
@@ -193,7 +214,7 @@ fn every_certificate_of_a_tight_route_is_accepted() {
         ["Proved", "None", "Undecided"].map(|status| statuses.get(status).copied().unwrap_or(0));
     // Most scenes are legal, and most of those are decided.
     let to_end = statuses.get("clearance to PathEnd").copied().unwrap_or(0);
-    assert!(to_end * 10 > count && statuses["speeds"] * 100 > count, "{statuses:?}");
+    assert!(to_end * 10 > count && statuses["speeds"] * 10 > count, "{statuses:?}");
     assert!(proved > count && none > count / 2 && undecided * 10 < proved + none, "{statuses:?}");
 }
 

@@ -31,8 +31,8 @@ pub use clearance::{
     ClearanceEnclosure, MOST_CLEARANCE_STEPS, Write, certify_least_clearance, enclose_least_clearance,
 };
 pub use lines::{
-    About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedSpeed, FORMAT, Links, Status, Step, Until,
-    WIDE,
+    About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedPitch, CertifiedSpeed, FORMAT, Links, Status,
+    Step, Until, WIDE,
 };
 pub use path::Place;
 

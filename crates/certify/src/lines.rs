@@ -126,6 +126,57 @@ pub enum CertificateLine<'a> {
     },
     /// The result for the greatest speed.
     GreatestSpeed(CertifiedSpeed),
+    /// The question about the least pitch.
+    Reach {
+        /// Metres from the centre that the head is to reach.
+        radius: f64,
+        /// The least pitch that is tested, metres per turn.
+        from: f64,
+    },
+    /// Two boards overlap with all pitches of an interval. Coordinates are in units of pitch / 2 pi.
+    Overlap {
+        /// The least pitch, metres per turn.
+        from: f64,
+        /// The greatest pitch, metres per turn.
+        to: f64,
+        /// The polar angle of the head, radians.
+        theta: f64,
+        /// The two benches, counted from 0.
+        benches: [usize; 2],
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// The point.
+        point: [f64; 2],
+    },
+    /// The head's link locks with all pitches of an interval.
+    HeadLocks {
+        /// The least pitch, metres per turn.
+        from: f64,
+        /// The greatest pitch, metres per turn.
+        to: f64,
+    },
+    /// No boards touch further out than a radius. Steps on the spiral of this pitch follow.
+    Far {
+        /// Metres per turn.
+        pitch: f64,
+        /// Metres from the centre.
+        radius: f64,
+    },
+    /// The result for the least pitch.
+    LeastPitch(CertifiedPitch),
+}
+
+/// The certified least pitch with which a team reaches a radius.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertifiedPitch {
+    /// Metres from the centre that the head is to reach.
+    pub radius: f64,
+    /// The least pitch that is tested, metres per turn.
+    pub from: f64,
+    /// Metres per turn: with every pitch from `from` to this, two boards overlap or a link locks before.
+    pub value_lo: Option<f64>,
+    /// Metres per turn: with this pitch the head reaches the radius.
+    pub value_hi: Option<f64>,
 }
 
 /// The question of a certificate that is not about events.
@@ -136,6 +187,8 @@ pub enum About {
     LeastClearance,
     /// The greatest speed.
     GreatestSpeed,
+    /// The least pitch.
+    LeastPitch,
 }
 
 /// The certified greatest speed of the head at which no handle exceeds a limit.

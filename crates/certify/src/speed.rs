@@ -21,8 +21,8 @@ use bench_dragon_motion::Motion;
 /// Distance that doubles can resolve, as a share of the path length in metres.
 const LEAST: f64 = 1e-14;
 
-/// Limit of handles to enclose: half a minute to a minute.
-const MOST_HANDLES: u64 = 8_000_000;
+/// Default limit of handles to enclose: half a minute to a minute.
+pub const MOST_HANDLES: u64 = 8_000_000;
 
 /// The greatest ratio of a handle's speed to the head's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,21 +87,22 @@ impl Ord for OpenStep {
 /// Encloses the greatest ratio of a handle's speed to the head's over the first `travelled` metres of the head, to a
 /// share of `tolerance`. `progress` receives the share of the work that is done, from 0 to 1.
 pub fn greatest_ratio(motion: &Motion, travelled: f64, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
-    RatioSearch::new(motion, travelled).run(tolerance, None, progress)
+    RatioSearch::new(motion, travelled, MOST_HANDLES).run(tolerance, None, progress)
 }
 
 struct RatioSearch<'a> {
     speeds: Speeds<'a>,
     end: f64,
+    most_handles: u64,
     /// Distance that doubles can resolve, metres.
     least: f64,
 }
 
 impl<'a> RatioSearch<'a> {
-    fn new(motion: &'a Motion, travelled: f64) -> Self {
+    fn new(motion: &'a Motion, travelled: f64, most_handles: u64) -> Self {
         let exact = ExactPath::new(motion.description());
         let speeds = Speeds { chain: Chain::new(motion.path(), exact, motion.team()) };
-        Self { speeds, end: travelled, least: LEAST * (1.0 + motion.path().length()) }
+        Self { speeds, end: travelled, most_handles, least: LEAST * (1.0 + motion.path().length()) }
     }
 
     /// Encloses the greatest ratio. `steps` receives the steps that show the upper bound, in any order.
@@ -124,7 +125,7 @@ impl<'a> RatioSearch<'a> {
         while let Some(OpenStep { upper, from, to }) = open.pop() {
             let middle = 0.5 * from + 0.5 * to;
             let done = enough(&best, upper);
-            if done || handles > MOST_HANDLES || to - from < self.least {
+            if done || handles > self.most_handles || to - from < self.least {
                 if let Some(steps) = steps.take() {
                     steps.push((from, to));
                     steps.extend(open.drain().map(|step| (step.from, step.to)));

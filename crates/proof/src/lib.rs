@@ -10,6 +10,7 @@ mod capsule;
 mod chain;
 mod elementary;
 mod events;
+mod far;
 mod first_order;
 mod greatest;
 mod interval;
@@ -17,6 +18,7 @@ mod lines;
 mod link;
 mod number;
 mod path;
+mod pitch;
 mod results;
 mod scene;
 mod sides;
@@ -33,8 +35,9 @@ use serde::Serialize;
 use self::events::{Events, LockShown};
 use self::greatest::Greatest;
 use self::lines::{About, ParsedLine};
-pub use self::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedSpeed, Status, Until};
+pub use self::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedPitch, ProvedSpeed, Status, Until};
 use self::path::Span;
+use self::pitch::Pitch;
 use self::scene::Scene;
 use self::steps::{Step, Steps};
 
@@ -58,6 +61,9 @@ pub struct Proved {
     /// The greatest speed, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub greatest_speed: Option<ProvedSpeed>,
+    /// The least pitch, in a certificate of that question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_pitch: Option<ProvedPitch>,
     /// Number of steps checked.
     pub steps: u64,
     /// Number of links checked, in all steps.
@@ -146,6 +152,7 @@ struct Checker {
     steps: Steps,
     events: Events,
     greatest: Greatest,
+    pitch: Option<Pitch>,
     proved: Proved,
 }
 
@@ -159,10 +166,19 @@ impl Checker {
         }
         let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
         let (results, steps, links, pairs) = (Vec::new(), 0, 0, 0);
-        let (least_clearance, greatest_speed) = (None, None);
-        let proved = Proved { scene: text, version, results, least_clearance, greatest_speed, steps, links, pairs };
+        let proved = Proved {
+            scene: text,
+            version,
+            results,
+            least_clearance: None,
+            greatest_speed: None,
+            least_pitch: None,
+            steps,
+            links,
+            pairs,
+        };
         let (steps, events, greatest) = (Steps::new(), Events::default(), Greatest::default());
-        Ok(Self { about, scene, steps, events, greatest, proved })
+        Ok(Self { about, scene, steps, events, greatest, pitch: None, proved })
     }
 
     /// Returns true if all results of the question are there.
@@ -171,22 +187,24 @@ impl Checker {
             About::Events => self.proved.results.len() == 4,
             About::LeastClearance => self.proved.least_clearance.is_some(),
             About::GreatestSpeed => self.proved.greatest_speed.is_some(),
+            About::LeastPitch => self.proved.least_pitch.is_some(),
         }
     }
 
     fn add(&mut self, line: ParsedLine) -> Result<(), String> {
-        let Self { about, scene, steps, events, greatest, proved } = self;
+        if self.about != About::Events && self.is_complete() {
+            return Err("nothing can follow the result".to_owned());
+        }
+        let Self { about, scene, steps, events, greatest, pitch, proved } = self;
         let question = match line {
             ParsedLine::Result(_) => Some(About::Events),
             ParsedLine::LeastClearance(_) => Some(About::LeastClearance),
             ParsedLine::GreatestSpeed(_) => Some(About::GreatestSpeed),
+            ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
             _ => None,
         };
         if question.is_some_and(|question| question != *about) {
             return Err("it is a result of another question".to_owned());
-        }
-        if proved.least_clearance.is_some() || proved.greatest_speed.is_some() {
-            return Err("nothing can follow the result".to_owned());
         }
         if question.is_none() && (events.finish.is_some() || !proved.results.is_empty()) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
@@ -194,7 +212,11 @@ impl Checker {
         match line {
             ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
             ParsedLine::Step { links, from, to, moving, clear, spans, apart, at } => {
-                steps.add(scene, Step { links, head: Span(from, to), moving, clear, spans, apart, at })
+                let step = Step { links, head: Span(from, to), moving, clear, spans, apart, at };
+                match pitch {
+                    Some(pitch) => pitch.add_step(step),
+                    None => steps.add(scene, step),
+                }
             }
             ParsedLine::Near { benches, from, to, spans, at, most } => {
                 events.add_near(scene, steps, benches, Span(from, to), (&spans, &at), most)
@@ -229,12 +251,34 @@ impl Checker {
                 proved.greatest_speed = Some(outcome);
                 Ok(())
             }
+            ParsedLine::Reach { radius, from } if *about == About::LeastPitch && pitch.is_none() => {
+                *pitch = Some(Pitch::new(radius, from)?);
+                Ok(())
+            }
+            ParsedLine::Reach { .. } => Err("a line `reach` of another question, or a second one".to_owned()),
+            ParsedLine::Overlap { from, to, theta, benches, spans, point } => {
+                begun(pitch)?.add_overlap(scene, [from, to], theta, benches, &spans, point)
+            }
+            ParsedLine::HeadLocks { from, to } => begun(pitch)?.add_lock(scene, from, to),
+            ParsedLine::Far { pitch: free, radius } => begun(pitch)?.add_far(scene, free, radius),
+            ParsedLine::LeastPitch(outcome) => {
+                begun(pitch)?.check(&outcome)?;
+                proved.least_pitch = Some(outcome);
+                Ok(())
+            }
         }
     }
 
     fn finished(self) -> Proved {
         let Steps { steps, links, pairs, .. } = self.steps;
-        let (steps, links) = (steps + self.greatest.steps, links + self.greatest.links);
+        let of_pitch = self.pitch.as_ref().map_or((0, 0, 0), Pitch::counts);
+        let (steps, links) = (steps + self.greatest.steps + of_pitch.0, links + self.greatest.links + of_pitch.1);
+        let pairs = pairs + of_pitch.2;
         Proved { steps, links, pairs, ..self.proved }
     }
+}
+
+/// Returns the pitch that a line is about.
+fn begun(pitch: &mut Option<Pitch>) -> Result<&mut Pitch, String> {
+    pitch.as_mut().ok_or_else(|| "no line `reach` precedes it".to_owned())
 }

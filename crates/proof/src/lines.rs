@@ -73,6 +73,27 @@ pub(super) enum ParsedLine {
         at: Vec<Place>,
     },
     GreatestSpeed(ProvedSpeed),
+    Reach {
+        radius: f64,
+        from: f64,
+    },
+    Overlap {
+        from: f64,
+        to: f64,
+        theta: f64,
+        benches: [usize; 2],
+        spans: Vec<Span>,
+        point: [f64; 2],
+    },
+    HeadLocks {
+        from: f64,
+        to: f64,
+    },
+    Far {
+        pitch: f64,
+        radius: f64,
+    },
+    LeastPitch(ProvedPitch),
 }
 
 /// The question that a certificate answers.
@@ -83,6 +104,7 @@ pub(super) enum About {
     Events,
     LeastClearance,
     GreatestSpeed,
+    LeastPitch,
 }
 
 /// The links that a step shows.
@@ -197,4 +219,20 @@ pub struct ProvedSpeed {
     pub handle: usize,
     /// Seconds at the scene's own speed up to which this holds, from its start on.
     pub time_until: f64,
+}
+
+/// The proved least pitch with which a team reaches a radius on an inward spiral, from any distance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvedPitch {
+    /// Metres from the centre that the head is to reach.
+    pub radius: f64,
+    /// The least pitch that is looked at, metres per turn.
+    pub from: f64,
+    /// Metres per turn: with every pitch from `from` to this, two boards overlap or a link locks before.
+    #[serde(default)]
+    pub value_lo: Option<f64>,
+    /// Metres per turn: with this pitch the head reaches the radius.
+    #[serde(default)]
+    pub value_hi: Option<f64>,
 }

@@ -74,6 +74,11 @@ impl Steps {
         }
     }
 
+    /// Begins where handle 1 has come from far out, and everything further out is shown: in Lemma 4, S is out there.
+    pub fn far_out() -> Self {
+        Self { start_of_second: Some(Place(0, f64::INFINITY, 0.0)), has_come: true, ..Self::new() }
+    }
+
     /// Checks a step and adds its consequences.
     ///
     /// # Errors

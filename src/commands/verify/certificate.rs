@@ -4,7 +4,7 @@ use std::io::BufRead;
 
 use bench_dragon::messages::hexadecimal;
 use bench_dragon::proof::{
-    EventKind, Proved, ProvedClearance, ProvedEvent, ProvedSpeed, Refused, Status, Until, scene_hash,
+    EventKind, Proved, ProvedClearance, ProvedEvent, ProvedPitch, ProvedSpeed, Refused, Status, Until, scene_hash,
 };
 use bench_dragon::show::scene::printable;
 use serde::Serialize;
@@ -65,8 +65,12 @@ pub fn proved_of(
 
 /// Returns a sentence for each result.
 fn sentences(proved: &Proved) -> Vec<String> {
-    let Proved { results, least_clearance, greatest_speed, .. } = proved;
-    let others = [least_clearance.as_ref().map(clearance_sentence), greatest_speed.as_ref().map(speed_sentence)];
+    let Proved { results, least_clearance, greatest_speed, least_pitch, .. } = proved;
+    let others = [
+        least_clearance.as_ref().map(clearance_sentence),
+        greatest_speed.as_ref().map(speed_sentence),
+        least_pitch.as_ref().map(pitch_sentence),
+    ];
     results.iter().map(sentence).chain(others.into_iter().flatten()).collect()
 }
 
@@ -149,4 +153,20 @@ fn speed_sentence(outcome: &ProvedSpeed) -> String {
          head at {value_lo} m/s, and that handle {handle} (counting from 1) does with the head faster than {value_hi} \
          m/s; the greatest ratio is between {ratio_lo} and {ratio_hi}"
     )
+}
+
+/// Returns a sentence on a proved least pitch.
+fn pitch_sentence(outcome: &ProvedPitch) -> String {
+    let ProvedPitch { radius, from, value_lo, value_hi } = *outcome;
+    let blocked = value_lo.map(|value_lo| {
+        format!("with every pitch from {from} m to {value_lo} m two boards overlap, or a link locks, before {radius} m")
+    });
+    let free = value_hi.map(|value_hi| {
+        format!("with {value_hi} m the head reaches {radius} m, and no two boards that share no handle touch before")
+    });
+    let claims: Vec<String> = blocked.into_iter().chain(free).collect();
+    match claims.is_empty() {
+        true => "least pitch: undecided".to_owned(),
+        false => format!("least pitch: proved that {}", claims.join(", and that ")),
+    }
 }

@@ -57,7 +57,8 @@ pub fn greatest_speed(
     Ok(answer(scene, limit, greatest_ratio(&scene.motion, end, tolerance, progress)))
 }
 
-/// Encloses the greatest speed as [`greatest_speed`] does, and writes a certificate. `text` is the scene's text.
+/// Encloses the greatest speed as [`greatest_speed`] does, and writes a certificate. `text` is the scene's text. The
+/// search gives up after `most_handles`.
 ///
 /// # Errors
 /// As [`greatest_speed`]; a line cannot be written, or the speed is not decided.
@@ -66,11 +67,12 @@ pub fn certify_greatest_speed(
     timeline: &Timeline,
     limit: f64,
     text: &str,
+    most_handles: u64,
     write: Write<'_>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<io::Result<GreatestSpeed>, PlanError> {
     let (end, tolerance) = asked(scene, timeline, limit)?;
-    let found = certify_greatest_ratio(&scene.motion, end, (tolerance, limit), text, write, progress);
+    let found = certify_greatest_ratio(&scene.motion, end, (tolerance, limit), text, most_handles, write, progress);
     Ok(found.map(|found| answer(scene, limit, found)))
 }
 

@@ -17,7 +17,8 @@ const SHARE: f64 = 0.9;
 const SPARE: f64 = 2e-12;
 
 /// Encloses the greatest ratio as [`super::greatest_ratio`] does, and writes a certificate that no handle exceeds `limit`
-/// metres per second. `scene` is the text of the motion's scene.
+/// metres per second. `scene` is the text of the motion's scene. The
+/// search gives up after `most_handles`.
 ///
 /// # Errors
 /// A line cannot be written.
@@ -26,12 +27,13 @@ pub fn certify_greatest_ratio(
     travelled: f64,
     (tolerance, limit): (f64, f64),
     scene: &str,
+    most_handles: u64,
     write: Write<'_>,
     progress: &mut dyn FnMut(f64),
 ) -> io::Result<GreatestRatio> {
     let (version, about) = (env!("CARGO_PKG_VERSION"), Some(About::GreatestSpeed));
     write(&CertificateLine::Certificate { format: crate::FORMAT, version, about, scene })?;
-    let search = RatioSearch::new(motion, travelled);
+    let search = RatioSearch::new(motion, travelled, most_handles);
     let mut steps: Vec<Stretch> = Vec::new();
     let found = search.run(SHARE * tolerance, Some(&mut steps), progress);
     steps.sort_by(|a, b| a.0.total_cmp(&b.0));
