@@ -8,6 +8,7 @@ macro_rules! eprintln {
     }};
 }
 
+mod certificate_file;
 pub mod chase;
 pub mod check;
 pub mod control;

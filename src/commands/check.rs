@@ -4,7 +4,10 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use bench_dragon::certify::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
+use bench_dragon::certify::{
+    CertificateLine, CertifyError, ClearanceEnclosure, MOST_CLEARANCE_STEPS, certify_least_clearance,
+    enclose_least_clearance,
+};
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::Motion;
@@ -16,6 +19,7 @@ use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 use bench_dragon::show::timed_cues;
 use serde::Serialize;
 
+use super::certificate_file::CertificateFile;
 use super::events::{find_least_clearance, least_clearance, sentence};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
@@ -24,7 +28,8 @@ use super::{CommandError, Common, Output, expect_exact_motion, figure, number, p
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArguments {
-    /// A certificate of `events --certify` for this scene: check it and print what it proves
+    /// A certificate of `events --certify`, `check --certify` or `plan speed --certify` for this scene: check it and
+    /// print what it proves
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
     /// Prove the least clearance of the show: enclose it within a nanometre, rounding included. Seconds to minutes;
@@ -43,6 +48,9 @@ pub struct CheckArguments {
     /// The benches of --swept, counted from 1; by default all
     #[arg(long, value_name = "FIRST-LAST", requires = "swept", value_parser = benches)]
     benches: Option<Benches>,
+    /// Write the certificate of the proof to this file, for `verify`
+    #[arg(long, value_name = "FILE", requires = "prove")]
+    certify: Option<PathBuf>,
 }
 
 /// The line of `check --prove --json`.
@@ -72,7 +80,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     if arguments.prove && common.json {
         let (found, freeze) = find_least_clearance(&scene, &timeline, common);
-        let enclosure = enclosed(&scene, found, freeze, common)?;
+        let enclosure = enclosed(&scene, &text.text, (found, freeze), arguments.certify.as_deref(), common)?;
         output.json(&clearance_line(&scene, found, enclosure))?;
         return output.finish();
     }
@@ -156,7 +164,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     let (found, freeze) = find_least_clearance(&scene, &timeline, common);
     output.line(&format!("  {}", least_clearance(&scene, found)))?;
     if arguments.prove {
-        let enclosure = enclosed(&scene, found, freeze, common)?;
+        let enclosure = enclosed(&scene, &text.text, (found, freeze), arguments.certify.as_deref(), common)?;
         output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
     }
     if let Some(ground) = ground {
@@ -185,20 +193,34 @@ impl CheckArguments {
     }
 }
 
-/// Encloses the least clearance between two numbers, if it can be proved.
+/// Encloses the least clearance between two numbers, if it can be proved. Writes the certificate to `file`.
 fn enclosed(
     scene: &Scene,
-    found: Option<TimedClearance>,
-    freeze: &TimedEvent,
+    text: &str,
+    (found, freeze): (Option<TimedClearance>, &TimedEvent),
+    file: Option<&Path>,
     common: &Common,
 ) -> Result<Option<ClearanceEnclosure>, CommandError> {
     expect_exact_motion(scene)?;
+    let certificate = file.map(CertificateFile::create).transpose()?;
+    let Some(TimedClearance { least, .. }) = found else {
+        let sentence = "no certificate is written: the search found no least clearance";
+        return if file.is_some() { Err(CommandError::Failed(sentence.to_owned())) } else { Ok(None) };
+    };
     let bar = progress_bar(1000, common).with_message("proving the least clearance");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let enclosure = found.and_then(|found| {
-        enclose_least_clearance(&scene.motion, freeze, &found.least, MOST_CLEARANCE_STEPS, &mut progress)
-    });
+    let most_steps = MOST_CLEARANCE_STEPS;
+    let Some(mut certificate) = certificate else {
+        let enclosure = enclose_least_clearance(&scene.motion, freeze, &least, most_steps, &mut progress);
+        bar.finish_and_clear();
+        return Ok(enclosure);
+    };
+    let mut write = |line: &CertificateLine| certificate.write(line);
+    let motion = &scene.motion;
+    let enclosure = certify_least_clearance(motion, freeze, &least, text, most_steps, &mut write, &mut progress);
     bar.finish_and_clear();
+    let enclosure = enclosure.map_err(|CertifyError::Write(error)| error)?;
+    certificate.finish()?;
     Ok(enclosure)
 }
 

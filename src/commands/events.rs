@@ -1,6 +1,5 @@
 //! `events`: the events that end the show, in order; with a proof on request.
 
-use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Status};
@@ -9,7 +8,7 @@ use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::Scene;
 use serde::Serialize;
 
-use super::new_file::NewFile;
+use super::certificate_file::CertificateFile;
 use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
 
 /// Arguments of `events`.
@@ -100,17 +99,14 @@ fn certified(
     common: &Common,
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
     expect_exact_motion(scene)?;
-    let mut writer = BufWriter::new(NewFile::create(file)?);
+    let mut certificate = CertificateFile::create(file)?;
     let bar = progress_bar(1000, common).with_message("proving");
-    let mut write = |line: &certify::CertificateLine| {
-        serde_json::to_writer(&mut writer, line).map_err(io::Error::from)?;
-        writer.write_all(b"\n")
-    };
+    let mut write = |line: &certify::CertificateLine| certificate.write(line);
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let outcomes = certify::certify(&scene.motion, timeline, text, MOST_STEPS, &mut write, &mut progress);
     bar.finish_and_clear();
     let outcomes = outcomes.map_err(|CertifyError::Write(error)| error)?;
-    writer.into_inner().map_err(io::Error::from)?.finish()?;
+    certificate.finish()?;
     Ok(outcomes)
 }
 

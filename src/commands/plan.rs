@@ -1,9 +1,17 @@
 //! `plan`: answers for a choreographer, with the place that decides them.
 
-use bench_dragon::certify::plan::{GreatestSpeed, LeastPitch, Overlap, PlanError, greatest_speed, least_pitch};
+use std::path::{Path, PathBuf};
+
+use bench_dragon::certify::CertificateLine;
+use bench_dragon::certify::plan::{
+    GreatestSpeed, LeastPitch, Overlap, PlanError, certify_greatest_speed, certify_least_pitch, greatest_speed,
+    least_pitch,
+};
+use bench_dragon::certify::speed::MOST_HANDLES;
 use bench_dragon::show::scene::Accepted;
 use serde::Serialize;
 
+use super::certificate_file::CertificateFile;
 use super::events::bench_name;
 use super::{CommandError, Common, Output, expect_exact_motion, number, progress_bar, search_timeline};
 
@@ -21,12 +29,18 @@ enum Question {
         /// Metres from the centre that the front handle of the head must reach
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
         reach_radius: f64,
+        /// Write the certificate of the proof to this file, for `verify`
+        #[arg(long, value_name = "FILE")]
+        certify: Option<PathBuf>,
     },
     /// The greatest constant speed of the head at which no handle of the show exceeds a limit
     Speed {
         /// Metres per second that no handle may exceed
         #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
         max_handle_speed: f64,
+        /// Write the certificate of the proof to this file, for `verify`
+        #[arg(long, value_name = "FILE")]
+        certify: Option<PathBuf>,
     },
 }
 
@@ -60,19 +74,29 @@ struct SpeedLine {
 
 /// Plans the pitch or the speed.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
-    match arguments.question {
-        Question::Pitch { reach_radius } => plan_pitch(common, reach_radius),
-        Question::Speed { max_handle_speed } => plan_speed(common, max_handle_speed),
+    match &arguments.question {
+        Question::Pitch { reach_radius, certify } => plan_pitch(common, *reach_radius, certify.as_deref()),
+        Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
     }
 }
 
-fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
+fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), CommandError> {
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
-    let scene = common.load_scene()?;
+    let text = common.scene_text()?;
+    let scene = text.parse()?;
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
-    let found = least_pitch(scene.team(), radius, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let found = if let Some(file) = file {
+        let mut certificate = CertificateFile::create(file)?;
+        let mut write = |line: &CertificateLine| certificate.write(line);
+        let found = certify_least_pitch(scene.team(), radius, &text.text, &mut write, &mut progress)??;
+        certificate.finish()?;
+        found
+    } else {
+        least_pitch(scene.team(), radius, &mut progress)?
+    };
     bar.finish_and_clear();
-    let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found?;
+    let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;
     let mut output = Output::standard();
     if common.json {
         let status = if proved { "proved" } else { "given_up" };
@@ -124,15 +148,26 @@ fn plan_pitch(common: &Common, radius: f64) -> Result<(), CommandError> {
     output.finish()
 }
 
-fn plan_speed(common: &Common, limit: f64) -> Result<(), CommandError> {
+fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), CommandError> {
     Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
-    let scene = common.load_scene()?;
+    let text = common.scene_text()?;
+    let scene = text.parse()?;
     expect_exact_motion(&scene)?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
-    let found = greatest_speed(&scene, &timeline, limit, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let found = if let Some(file) = file {
+        let mut certificate = CertificateFile::create(file)?;
+        let mut write = |line: &CertificateLine| certificate.write(line);
+        let (text, most) = (&text.text, MOST_HANDLES);
+        let found = certify_greatest_speed(&scene, &timeline, limit, text, most, &mut write, &mut progress)??;
+        certificate.finish()?;
+        found
+    } else {
+        greatest_speed(&scene, &timeline, limit, &mut progress)?
+    };
     bar.finish_and_clear();
-    let GreatestSpeed { value_lo, value_hi, time, handle, ratio, proved, steps } = found?;
+    let GreatestSpeed { value_lo, value_hi, time, handle, ratio, proved, steps } = found;
     let mut output = Output::standard();
     if common.json {
         let status = if proved { "proved" } else { "given_up" };

@@ -1,4 +1,4 @@
-//! Every certificate that the search writes is accepted by the checker: on tight routes, full turns, S-bends near a lock,
+//! Every certificate of events, of the least clearance and of the greatest speed that is written is accepted by the checker: on tight routes, full turns, S-bends near a lock,
 //! and on the random scenes of the oracle.
 //!
 //! `BENCH_DRAGON_LONG=1` makes 100,000 scenes in place of 400, `BENCH_DRAGON_CASES=few` 40.
@@ -9,8 +9,9 @@ use std::io;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use bench_dragon::certify::{CertificateLine, certify};
-use bench_dragon::proof::{Status, verify};
+use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
+use bench_dragon::certify::{CertificateLine, certify, certify_least_clearance};
+use bench_dragon::proof::{Proved, Status, Until, verify};
 use bench_dragon::show::scene::Scene;
 use fastrand::Rng;
 
@@ -93,15 +94,88 @@ fn certified(text: &str) -> Option<Vec<Status>> {
 fn certified_in(text: &str, most_steps: u64) -> Option<Vec<Status>> {
     let scene = Scene::parse(text, "tight", "tight").ok()?;
     let timeline = scene.motion.timeline(&mut |_| ());
+    let proved = accepted(text, |write| {
+        certify(&scene.motion, &timeline, text, most_steps, write, &mut |_| ()).unwrap();
+    });
+    Some(proved.results.into_iter().map(|outcome| outcome.status).collect())
+}
+
+/// Has the checker read the lines that a search writes.
+///
+/// # Panics
+/// The checker refuses them.
+fn accepted(text: &str, search: impl FnOnce(&mut dyn FnMut(&CertificateLine) -> io::Result<()>)) -> Proved {
+    let mut lines = Vec::new();
+    search(&mut |line| {
+        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
+        lines.push(b'\n');
+        Ok(())
+    });
+    verify(lines.as_slice(), &mut |_| ()).unwrap_or_else(|refused| panic!("{refused}\n{text}"))
+}
+
+/// Writes the certificate of a show's least clearance and has it checked. Returns the end of the stretch that is proved;
+/// `None` for a scene without a clearance.
+fn clearance_certified(text: &str) -> Option<Until> {
+    let scene = Scene::parse(text, "tight", "tight").ok()?;
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let freeze = timeline.freeze(scene.stops_at_contact());
+    let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ())?.least;
+    let mut enclosed = None;
+    let proved = accepted(text, |write| {
+        enclosed =
+            certify_least_clearance(&scene.motion, freeze, &hint, text, MOST_STEPS / 4, write, &mut |_| ()).unwrap();
+    });
+    let claim = proved.least_clearance.unwrap();
+    if let (Some(lo), Some(hi), Some(enclosed)) = (claim.lo, claim.hi, enclosed) {
+        assert!(hi - lo <= 1e-9 && lo >= enclosed.lo && (hi - enclosed.hi).abs() < 1e-9, "{claim:?} {enclosed:?}");
+    }
+    Some(claim.until)
+}
+
+/// Writes the certificate of the greatest speed and has it checked. Returns false for a show without such a speed, or
+/// one that is not decided.
+fn speed_certified(text: &str) -> bool {
+    let Ok(scene) = Scene::parse(text, "tight", "tight") else { return false };
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let mut found = None;
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| {
         serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
         lines.push(b'\n');
         Ok(())
     };
-    certify(&scene.motion, &timeline, text, most_steps, &mut write, &mut |_| ()).unwrap();
+    if let Ok(Ok(speed)) = certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, &mut write, &mut |_| ()) {
+        found = Some(speed);
+    }
+    let Some(speed) = found else { return false };
     let proved = verify(lines.as_slice(), &mut |_| ()).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
-    Some(proved.results.into_iter().map(|outcome| outcome.status).collect())
+    let claim = proved.greatest_speed.unwrap();
+    assert_eq!((claim.value_lo, claim.value_hi), (speed.value_lo, speed.value_hi), "{text}");
+    assert!(claim.value_hi - claim.value_lo <= 1e-9, "{claim:?}\n{text}");
+    true
+}
+
+/// Certificates of the least pitch: of a team like the paper's, and of one whose head locks.
+#[test]
+fn certificates_of_the_least_pitch_are_accepted() {
+    for (head, body, width, inset, radius) in
+        [(3.41, 2.2, 0.3, 0.275, 4.5), (2.0, 2.0, 0.2, 0.1, 3.0), (3.0, 1.2, 0.4, 0.1, 1.6), (5.0, 1.0, 0.1, 0.1, 1.5)]
+    {
+        let text = format!(
+            "[team]\nbenches = 40\nhead_length = {head}\nbody_length = {body}\nwidth = {width}\nhole_inset = {inset}\n\
+             [path]\nkind = \"spiral\"\npitch = 0.6\nstart_turn = 12.0\n[motion]\nhead_speed = 1.0\n"
+        );
+        let scene = Scene::parse(&text, "pitch", "pitch").unwrap();
+        let mut found = None;
+        let proved = accepted(&text, |write| {
+            found = Some(certify_least_pitch(scene.team(), radius, &text, write, &mut |_| ()).unwrap().unwrap());
+        });
+        let (claim, found) = (proved.least_pitch.unwrap(), found.unwrap());
+        println!("{claim:?} {found:?} {} steps", proved.steps);
+        assert_eq!((claim.radius, claim.from, claim.value_hi), (radius, found.from, found.value_hi), "{text}");
+        assert_eq!(claim.value_lo, (found.intervals > 0).then_some(found.value_lo), "{text}");
+    }
 }
 
 #[test]
@@ -120,7 +194,13 @@ fn every_certificate_of_a_tight_route_is_accepted() {
                     }
                     let text = scene(index, &mut Rng::with_seed(0x7163 + index as u64));
                     let results = certified(&text).unwrap_or_default();
+                    let until = clearance_certified(&text);
+                    let has_speed = speed_certified(&text);
                     let mut statuses = statuses.lock().unwrap();
+                    *statuses.entry("speeds".to_owned()).or_default() += usize::from(has_speed);
+                    if let Some(until) = until {
+                        *statuses.entry(format!("clearance to {until:?}")).or_default() += 1;
+                    }
                     for status in results {
                         *statuses.entry(format!("{status:?}")).or_default() += 1;
                     }
@@ -133,6 +213,8 @@ fn every_certificate_of_a_tight_route_is_accepted() {
     let [proved, none, undecided] =
         ["Proved", "None", "Undecided"].map(|status| statuses.get(status).copied().unwrap_or(0));
     // Most scenes are legal, and most of those are decided.
+    let to_end = statuses.get("clearance to PathEnd").copied().unwrap_or(0);
+    assert!(to_end * 10 > count && statuses["speeds"] * 10 > count, "{statuses:?}");
     assert!(proved > count && none > count / 2 && undecided * 10 < proved + none, "{statuses:?}");
 }
 

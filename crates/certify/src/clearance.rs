@@ -1,16 +1,21 @@
 //! Enclosure of the least clearance of a show: steps of the head that prove the lower bound, and one place that proves
 //! the upper bound. Lemma 6 of `docs/proofs.md`.
 
-use super::boards::MovingBoard;
-use super::capsule::{Span, Spanned};
+mod apart;
+mod certificate;
+
+use std::io;
+
+use super::CertifyError;
+use super::capsule::Span;
 use super::first_order::When;
 use super::first_order_step::{FirstOrderStep, StepPoints, step_points};
 use super::grid::GridPoint;
 use super::interval::Interval;
-use super::lines::Links;
-use super::path::{Curve, ExactPath, Place};
+use super::lines::{CertificateLine, Links, Step};
+use super::path::{ExactPath, Place};
 use super::search::{LEAST, path_end};
-use super::step::{Chain, Claim, Listed, Obstacle};
+use super::step::{Chain, Obstacle};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::contact::LeastClearance;
@@ -70,23 +75,36 @@ pub fn enclose_least_clearance(
     most_steps: u64,
     progress: &mut dyn FnMut(f64),
 ) -> Option<ClearanceEnclosure> {
-    let (path, event) = (motion.path(), &show_end.event);
-    let chain = Chain::new(path, ExactPath::new(motion.description()), motion.team());
-    let slack = END_SLACK * (1.0 + path.length());
-    match event.kind {
-        EventKind::Contact if event.travelled > 0.0 => {
-            Descent::new(chain, event.travelled, most_steps).touch(event, progress)
-        }
-        EventKind::Contact => Descent::new(chain, 0.0, most_steps).at_start(hint),
-        EventKind::PathEnd => {
-            let target = path_end(&chain.exact, path);
-            Descent::new(chain, event.travelled - slack, most_steps).least(hint, &target, progress)
-        }
-        EventKind::Stall | EventKind::Lock => {
-            let end = event.travelled - slack.max(BEFORE_LOCK[0]);
-            (end > 0.0).then(|| Descent::new(chain, end, most_steps).least_until_lock(event, hint, progress))?
-        }
-    }
+    Descent::new(chain_of(motion), show_end.event.travelled, most_steps, None).run(motion, show_end, hint, progress)
+}
+
+/// Encloses the least clearance as [`enclose_least_clearance`] does, and writes a certificate. `scene` is the text of the
+/// motion's scene. The certificate of a show that ends with a lock ends a nanometre of travel before the lock.
+///
+/// # Errors
+/// [`CertifyError::Write`]
+pub fn certify_least_clearance(
+    motion: &Motion,
+    show_end: &TimedEvent,
+    hint: &LeastClearance,
+    scene: &str,
+    most_steps: u64,
+    write: Write<'_>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Option<ClearanceEnclosure>, CertifyError> {
+    certificate::first_line(&mut *write, scene)?;
+    let end = show_end.event.travelled;
+    let mut descent = Descent::new(chain_of(motion), end, most_steps, Some(write));
+    let enclosure = descent.run(motion, show_end, hint, progress);
+    descent.write_result(motion.head_speed())?;
+    Ok(enclosure)
+}
+
+/// A function that receives each line of a certificate.
+pub type Write<'w> = &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>;
+
+fn chain_of(motion: &Motion) -> Chain<'_> {
+    Chain::new(motion.path(), ExactPath::new(motion.description()), motion.team())
 }
 
 /// An upper bound of the clearance of two boards, and its place.
@@ -94,12 +112,21 @@ pub fn enclose_least_clearance(
 struct Upper {
     value: f64,
     travelled: f64,
+    /// The first and the last place of the head.
+    head: [Place; 2],
     benches: [usize; 2],
 }
 
 /// The state of one search.
-pub(super) struct Descent<'a> {
+pub(super) struct Descent<'a, 'w> {
     chain: Chain<'a>,
+    write: Option<Write<'w>>,
+    /// The error that ended the writing.
+    failed: Option<io::Error>,
+    /// The least threshold of the steps that were shown, and the end of the last of them.
+    shown: Option<(f64, Place)>,
+    /// The end of the certified stretch.
+    finish: Option<Finish>,
     at: GridPoint,
     links: Links,
     covered: bool,
@@ -114,19 +141,31 @@ pub(super) struct Descent<'a> {
     floor: Option<f64>,
 }
 
+/// The end of the show, as a certificate states it.
+#[derive(Debug, Clone, Copy)]
+enum Finish {
+    PathEnd,
+    /// The benches of the first contact.
+    Contact([usize; 2]),
+}
+
 /// A step that was not shown completely.
 struct Refused {
     obstacle: Obstacle,
     nearer: Option<Upper>,
 }
 
-impl<'a> Descent<'a> {
-    /// Creates a search from the start to `end`, metres of travel.
-    pub fn new(chain: Chain<'a>, end: f64, most_steps: u64) -> Self {
+impl<'a, 'w> Descent<'a, 'w> {
+    /// Creates a search from the start to `end`, metres of travel. `write` receives each step that is shown.
+    pub fn new(chain: Chain<'a>, end: f64, most_steps: u64, write: Option<Write<'w>>) -> Self {
         let step = 0.25 * chain.team.shortest_link();
         let at = GridPoint::at(Place(0, 0.0, 0.0), 0.0);
         let mut descent = Self {
             chain,
+            write,
+            failed: None,
+            shown: None,
+            finish: None,
             at,
             links: Links::All,
             covered: true,
@@ -143,6 +182,31 @@ impl<'a> Descent<'a> {
         descent
     }
 
+    /// Encloses the least clearance of a show.
+    fn run(
+        &mut self,
+        motion: &Motion,
+        show_end: &TimedEvent,
+        hint: &LeastClearance,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<ClearanceEnclosure> {
+        let (path, event) = (motion.path(), &show_end.event);
+        let slack = END_SLACK * (1.0 + path.length());
+        match event.kind {
+            EventKind::Contact if event.travelled > 0.0 => self.touch(event, progress),
+            EventKind::Contact => self.at_start(hint),
+            EventKind::PathEnd => {
+                self.end = event.travelled - slack;
+                let target = path_end(&self.chain.exact, path);
+                self.least(hint, &target, progress)
+            }
+            EventKind::Stall | EventKind::Lock => {
+                self.end = event.travelled - slack.max(BEFORE_LOCK[0]);
+                (self.end > 0.0).then(|| self.least_until_lock(event, hint, progress))?
+            }
+        }
+    }
+
     /// Returns the nearest grid point on one side of a place for which `holds` is proved.
     fn beside(&self, travelled: f64, side: f64, holds: impl Fn(Interval) -> bool) -> Option<GridPoint> {
         let Chain { path, exact, .. } = &self.chain;
@@ -153,18 +217,19 @@ impl<'a> Descent<'a> {
 
     /// Encloses the least clearance from the start to `target`.
     fn least(
-        mut self,
+        &mut self,
         hint: &LeastClearance,
         target: &GridPoint,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
         let until = self.descend(hint, target, progress)?;
+        self.finish = until.is_none().then_some(Finish::PathEnd);
         Some(self.enclosed(self.upper?, until))
     }
 
     /// Encloses the least clearance of a show that ends with a lock.
     fn least_until_lock(
-        mut self,
+        &mut self,
         lock: &Event,
         hint: &LeastClearance,
         progress: &mut dyn FnMut(f64),
@@ -199,44 +264,6 @@ impl<'a> Descent<'a> {
         Some(self.go_to(target, progress))
     }
 
-    /// Returns true if no two boards are nearer than the threshold from here to a lock. Until then the lost handle
-    /// stays between two places that it cannot pass, and the handles behind it follow.
-    fn stays_to_lock(&mut self, lock: &Event) -> bool {
-        let link = lock.bench_a.unwrap_or(0) as usize;
-        let most = TOUCH * self.chain.team.shortest_link();
-        let least = 2.0 * (lock.travelled - self.at.travelled).max(BEFORE_LOCK[2]);
-        (0..40).map(|power| least * 2f64.powi(power)).take_while(|beyond| *beyond < most).any(|beyond| {
-            let mut to = self.grid_point(lock.travelled + beyond);
-            let (chain, at, mut end) = (&self.chain, &mut self.at, to.clone());
-            let Some(mut handles) = chain.spans(at, &mut to, link) else { return false };
-            let Some(last) = chain.spans(&mut to, &mut end, link) else { return false };
-            let Some(window) = chain.until_lock(at, link, &handles[link], &last[link]) else { return false };
-            handles.push(Spanned::new(&chain.exact, window));
-            self.are_apart_behind(handles, window)
-        })
-    }
-
-    /// Returns true if all boards are apart while the last of `handles` is anywhere in the window and the others are in
-    /// their spans.
-    fn are_apart_behind(&self, handles: Vec<Spanned>, window: Span) -> bool {
-        let chain = &self.chain;
-        let [mut from, mut to] = [window.0, window.1].map(|place| {
-            let mut point = GridPoint::at(place, self.at.travelled);
-            point.handles = vec![point.handles[0]; handles.len()];
-            point
-        });
-        // Lemma 4 applies if handle 1 is lost.
-        let is_covered = handles.len() == 2 && chain.start.is_some_and(|start| chain.exact.in_order(start, window.0));
-        let links = if is_covered { self.links } else { Links::All };
-        let mut listed = Listed::behind(chain, handles, f64::INFINITY);
-        while listed.handles.len() <= chain.team.benches && !self.is_enough(&listed, links) {
-            if listed.extend(&mut from, &mut to, Claim { links, moving: false, clear: false }).is_err() {
-                return false;
-            }
-        }
-        self.boards_are_apart(&listed, None, links).is_ok()
-    }
-
     /// Returns the metres of travel up to which the search has come.
     fn travelled(&self) -> f64 {
         self.chain.exact.travelled(self.at.head).lo.max(0.0)
@@ -263,7 +290,7 @@ impl<'a> Descent<'a> {
     }
 
     /// Encloses the least clearance of a show that ends at its start.
-    fn at_start(mut self, hint: &LeastClearance) -> Option<ClearanceEnclosure> {
+    fn at_start(&mut self, hint: &LeastClearance) -> Option<ClearanceEnclosure> {
         let after = self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)?;
         let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
         self.upper = Some(self.upper_between(self.at.clone(), after.clone(), benches)?);
@@ -273,9 +300,9 @@ impl<'a> Descent<'a> {
 
     /// Encloses the least clearance of a show that ends at its first contact. It is 0 if boards are apart at the start,
     /// overlap shortly after the contact, and handles move continuously between the two.
-    fn touch(mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Option<ClearanceEnclosure> {
+    fn touch(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Option<ClearanceEnclosure> {
         let benches = [event.bench_a?, event.bench_b?].map(|bench| bench as usize);
-        let touch = Upper { value: 0.0, travelled: event.travelled, benches };
+        let touch = Upper { value: 0.0, travelled: event.travelled, head: [self.at.head; 2], benches };
         let after = self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)?;
         self.floor = Some(0.0);
         let mut until = self.go_to(&after, progress);
@@ -288,24 +315,27 @@ impl<'a> Descent<'a> {
                 (upper.value < 0.0).then_some(point)
             })?;
         until = until.or_else(|| self.go_to(&overlapping, progress));
+        if until.is_none() && self.write_contact(&overlapping, benches) {
+            self.finish = Some(Finish::Contact(benches));
+        }
         self.upper = Some(touch);
         until.is_none().then(|| ClearanceEnclosure { lo: 0.0, ..self.enclosed(touch, None) })
     }
 
     fn enclosed(&self, upper: Upper, until: Option<f64>) -> ClearanceEnclosure {
-        let Upper { value: hi, travelled, benches: [bench_a, bench_b] } = upper;
+        let Upper { value: hi, travelled, benches: [bench_a, bench_b], .. } = upper;
         ClearanceEnclosure { lo: self.threshold(), hi, travelled, bench_a, bench_b, until, steps: self.steps }
     }
 
     /// Returns an upper bound of the clearance of two boards with the head anywhere between two places.
     fn upper_between(&self, mut from: GridPoint, mut to: GridPoint, benches: [usize; 2]) -> Option<Upper> {
-        let mut middle = from.clone();
+        let (mut middle, head) = (from.clone(), [from.head, to.head]);
         let mut first_order = FirstOrderStep::new(&self.chain, &step_points(&mut from, &mut middle, &mut to));
         while first_order.listed.handles.len() <= benches[1] + 1 {
             first_order.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
         }
         let [one, other] = benches.map(|bench| first_order.board(bench));
-        Some(Upper { value: one.at_most(&other, When::Always), travelled: to.travelled, benches })
+        Some(Upper { value: one.at_most(&other, When::Always), travelled: to.travelled, head, benches })
     }
 
     /// Goes to `target`. Returns the travel that it reached if a step before cannot be shown.
@@ -343,7 +373,7 @@ impl<'a> Descent<'a> {
                 }
                 Err(_) => true,
             };
-            if given_up || self.steps > self.most_steps {
+            if given_up || self.steps > self.most_steps || self.failed.is_some() {
                 return Some(self.travelled());
             }
         }
@@ -369,8 +399,14 @@ impl<'a> Descent<'a> {
         let mut from = std::mem::replace(&mut self.at, to.clone());
         let shown = self.show_between(&mut StepPoints { from: &mut from, middle: &mut middle, to });
         self.at = from;
-        let (body_forward, start, second) = shown?;
-        self.chain.start.get_or_insert(start.1);
+        let ShownStep { step, body_forward } = shown?;
+        self.chain.start = self.chain.start.or(step.spans.first().map(|span| span.1));
+        if let Some(metres) = step.apart {
+            let least = self.shown.map_or(metres, |(least, _)| least.min(metres));
+            self.shown = Some((least, step.to));
+        }
+        let second = step.spans.get(1).copied();
+        self.write(&CertificateLine::Step(step));
         self.covered &= body_forward;
         if !self.covered {
             self.links = Links::All;
@@ -382,8 +418,8 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Shows a step. Returns true if every link behind the head's goes forward, with the spans of handles 1 and 2.
-    fn show_between(&self, points: &mut StepPoints) -> Result<(bool, Span, Option<Span>), Refused> {
+    /// Shows a step.
+    fn show_between(&self, points: &mut StepPoints) -> Result<ShownStep, Refused> {
         let mut first_order = FirstOrderStep::new(&self.chain, points);
         while first_order.listed.handles.len() <= self.chain.team.benches
             && !self.is_enough(&first_order.listed, self.links)
@@ -403,93 +439,26 @@ impl<'a> Descent<'a> {
                     .then(|| Upper {
                         value: one.at_most(&other, When::Middle),
                         travelled: points.middle.travelled,
+                        head: [first_order.at; 2],
                         benches,
                     })
                     .filter(|nearer| self.upper.is_some_and(|upper| nearer.value < upper.value - 1e-3 * WIDTH));
                 Refused { obstacle: Obstacle::Pair(benches[0], benches[1]), nearer }
             })?;
         }
-        let handles = &first_order.listed.handles;
-        Ok((first_order.listed.body_forward, handles[1].span, handles.get(2).map(|second| second.span)))
+        let looks = self.looks_at_boards();
+        let FirstOrderStep { listed, places, .. } = first_order;
+        let spans: Vec<Span> = listed.handles[1..].iter().map(|handle| handle.span).collect();
+        let Span(from, to) = listed.handles[0].span;
+        let (apart, at) = if looks { (Some(self.threshold()), places) } else { (None, Vec::new()) };
+        let step = Step { links: self.links, from, to, moving: false, clear: false, spans, apart, at };
+        Ok(ShownStep { step, body_forward: listed.body_forward })
     }
+}
 
-    /// Returns true if the listed handles suffice for a step.
-    fn is_enough(&self, listed: &Listed, links: Links) -> bool {
-        let last = listed.handles.len() - 1;
-        if last < 2 {
-            return false;
-        }
-        let chain = &self.chain;
-        match links {
-            Links::Front if !self.looks_at_boards() => true,
-            Links::Front if matches!(chain.exact.segments[0].curve, Curve::Inward { .. }) => [0, 1]
-                .iter()
-                .all(|bench| listed.is_beyond(self.threshold().max(0.0), &chain.board(&listed.handles, *bench), last)),
-            _ => listed.is_on_line(last),
-        }
-    }
-
-    /// Shows that no two boards come as near as the threshold: all pairs, or the pairs with board 0 or 1.
-    ///
-    /// # Errors
-    /// A pair of which it cannot be shown.
-    fn boards_are_apart(
-        &self,
-        listed: &Listed,
-        first_order: Option<&FirstOrderStep>,
-        links: Links,
-    ) -> Result<(), [usize; 2]> {
-        let (chain, benches, threshold) = (&self.chain, self.chain.team.benches, self.threshold());
-        let count = listed.handles.len() - 1;
-        let boards: Vec<_> = (0..count).map(|bench| chain.board(&listed.handles, bench)).collect();
-        let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
-        let firsts = if links == Links::All { count } else { count.min(2) };
-        let far = threshold.max(0.0);
-        let are_apart = |[a, b]: [usize; 2]| match first_order {
-            Some(first_order) => first_order.are_apart([a, b], threshold),
-            None => boards[a].is_apart_by(threshold, &boards[b]),
-        };
-        for (a, board) in boards[..firsts].iter().enumerate() {
-            let mut beyond = false;
-            for (b, other) in boards.iter().enumerate().skip(a + 2) {
-                beyond = is_spiral && listed.is_beyond(far, board, b);
-                if beyond {
-                    break;
-                }
-                if !board.is_further_than(far, other) && !are_apart([a, b]) {
-                    return Err([a, b]);
-                }
-            }
-            let next = count.max(a + 2);
-            if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, first_order, next) {
-                return Err([a, next]);
-            }
-        }
-        let spare = (chain.links[1] - chain.shape.inset * 2.0).lo;
-        if links == Links::All && !is_spiral && count < benches && spare <= threshold {
-            return Err([count, count + 2]);
-        }
-        Ok(())
-    }
-
-    /// Returns true if a board is apart from the boards from `next` on, which are not listed.
-    fn is_apart_from_rest(
-        &self,
-        (a, board): (usize, &MovingBoard),
-        listed: &Listed,
-        first_order: Option<&FirstOrderStep>,
-        next: usize,
-    ) -> bool {
-        let threshold = self.threshold();
-        if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) {
-            return listed.is_beyond(threshold.max(0.0), board, listed.handles.len() - 1);
-        }
-        board.is_further_than(threshold.max(0.0), &listed.straight_run(next))
-            || match first_order {
-                Some(first_order) => {
-                    first_order.board(a).is_further_than(threshold, &first_order.straight_run(next), When::Always)
-                }
-                None => board.is_apart_by(threshold, &listed.straight_run(next)),
-            }
-    }
+/// A step that was shown.
+struct ShownStep {
+    step: Step,
+    /// True if every link behind the head's goes forward.
+    body_forward: bool,
 }

@@ -34,6 +34,9 @@ pub(super) struct FirstOrderHandle {
 /// Number of times that the products of a link are enclosed again from the last enclosure of its rear handle.
 const REFINEMENTS: u32 = 3;
 
+/// Factor of the errors: the checker of certificates has other capsules, and its errors may be a little greater.
+const SPARE: f64 = 1.01;
+
 /// Moments of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum When {
@@ -84,8 +87,8 @@ impl FirstOrderHandle {
         let (far, metres) = (Interval::point(rate.magnitude()), Interval::point(half_step));
         let bend = |reach: Interval| reach.square() * 0.5 * self.curvature;
         let off = Interval::point(self.offset);
-        let still = (off + bend(off)).hi;
-        let error = (off + metres * uneven + bend(off + far * metres)).hi;
+        let still = (off + bend(off)).hi * SPARE;
+        let error = (off + metres * uneven + bend(off + far * metres)).hi * SPARE;
         Self { velocity: scaled(self.tangent, Interval::point(middle)), rate, still, error, ..self }
     }
 

@@ -29,6 +29,8 @@ pub(super) struct FirstOrderStep<'c, 'a> {
     chain: &'c Chain<'a>,
     pub listed: Listed<'c, 'a>,
     handles: Vec<FirstOrderHandle>,
+    /// The place of each handle near which it is in the middle of the step.
+    pub places: Vec<Place>,
     /// The place of the head in the middle of the step.
     pub at: Place,
     half_step: f64,
@@ -43,7 +45,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         let at = if inside { middle.head } else { from.head };
         let half_step = exact.length(from.head, at).max(exact.length(at, to.head));
         let handles = vec![FirstOrderHandle::head(exact, &listed.handles[0], at, half_step)];
-        Self { chain, listed, handles, at, half_step }
+        Self { chain, listed, handles, places: vec![at], at, half_step }
     }
 
     /// Encloses one more handle.
@@ -57,6 +59,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         let length = self.chain.link(link);
         let follower = self.handles[link].follower(exact, spans, at, length, self.half_step);
         self.handles.push(follower.ok_or(Obstacle::Link(link))?);
+        self.places.push(at);
         Ok(())
     }
 

@@ -64,7 +64,7 @@ pub(super) fn place(param: Param) -> Place {
 }
 
 /// Returns the place of a parameter, with its low word.
-fn fine_place(param: Param) -> Place {
+pub(super) fn fine_place(param: Param) -> Place {
     let Coordinate { high, low } = param.coordinate();
     Place(param.segment(), high, low)
 }

@@ -27,8 +27,13 @@ mod step;
 use std::io;
 
 pub use capsule::Span;
-pub use clearance::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
-pub use lines::{CertificateLine, CertifiedEvent, FORMAT, Links, Status, Step, WIDE};
+pub use clearance::{
+    ClearanceEnclosure, MOST_CLEARANCE_STEPS, Write, certify_least_clearance, enclose_least_clearance,
+};
+pub use lines::{
+    About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedPitch, CertifiedSpeed, FORMAT, Links, Status,
+    Step, Until, WIDE,
+};
 pub use path::Place;
 
 use bench_dragon_motion::Motion;

@@ -33,6 +33,9 @@ pub enum CertificateLine<'a> {
         format: u32,
         /// The version of the program.
         version: &'a str,
+        /// The question; `None` for events.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        about: Option<About>,
         /// The text of the scene.
         scene: &'a str,
     },
@@ -50,6 +53,21 @@ pub enum CertificateLine<'a> {
         spans: Vec<Span>,
         /// The point, metres.
         point: [f64; 2],
+    },
+    /// Two boards are no further apart than a number of metres.
+    Near {
+        /// The two benches, counted from 0, the one nearer the head first.
+        benches: [usize; 2],
+        /// The first place of the head.
+        from: Place,
+        /// The last place of the head.
+        to: Place,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A place of each of these spans, the head's first.
+        at: Vec<Place>,
+        /// Metres.
+        most: f64,
     },
     /// The front product of a link is negative.
     Stall {
@@ -84,6 +102,142 @@ pub enum CertificateLine<'a> {
     PathEnd,
     /// The result for one kind of event.
     Result(CertifiedEvent),
+    /// The result for the least clearance.
+    LeastClearance(CertifiedClearance),
+    /// The speeds of all handles over a step of the head.
+    Speeds {
+        /// The first place of the head.
+        from: Place,
+        /// The last place of the head.
+        to: Place,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A place of each span, the head's first.
+        at: Vec<Place>,
+    },
+    /// The speed of a handle with the head at the first place of `at`.
+    Fast {
+        /// The handle, counted from 0.
+        handle: usize,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A place of each span, the head's first.
+        at: Vec<Place>,
+    },
+    /// The result for the greatest speed.
+    GreatestSpeed(CertifiedSpeed),
+    /// The question about the least pitch.
+    Reach {
+        /// Metres from the centre that the head is to reach.
+        radius: f64,
+        /// The least pitch that is tested, metres per turn.
+        from: f64,
+    },
+    /// Two boards overlap with all pitches of an interval. Coordinates are in units of pitch / 2 pi.
+    Overlap {
+        /// The least pitch, metres per turn.
+        from: f64,
+        /// The greatest pitch, metres per turn.
+        to: f64,
+        /// The polar angle of the head, radians.
+        theta: f64,
+        /// The two benches, counted from 0.
+        benches: [usize; 2],
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// The point.
+        point: [f64; 2],
+    },
+    /// The head's link locks with all pitches of an interval.
+    HeadLocks {
+        /// The least pitch, metres per turn.
+        from: f64,
+        /// The greatest pitch, metres per turn.
+        to: f64,
+    },
+    /// No boards touch further out than a radius. Steps on the spiral of this pitch follow.
+    Far {
+        /// Metres per turn.
+        pitch: f64,
+        /// Metres from the centre.
+        radius: f64,
+    },
+    /// The result for the least pitch.
+    LeastPitch(CertifiedPitch),
+}
+
+/// The certified least pitch with which a team reaches a radius.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertifiedPitch {
+    /// Metres from the centre that the head is to reach.
+    pub radius: f64,
+    /// The least pitch that is tested, metres per turn.
+    pub from: f64,
+    /// Metres per turn: with every pitch from `from` to this, two boards overlap or a link locks before.
+    pub value_lo: Option<f64>,
+    /// Metres per turn: with this pitch the head reaches the radius.
+    pub value_hi: Option<f64>,
+}
+
+/// The question of a certificate that is not about events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum About {
+    /// The least clearance.
+    LeastClearance,
+    /// The greatest speed.
+    GreatestSpeed,
+    /// The least pitch.
+    LeastPitch,
+}
+
+/// The certified greatest speed of the head at which no handle exceeds a limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertifiedSpeed {
+    /// Metres per second that no handle may exceed.
+    pub limit: f64,
+    /// Metres per second: with the head no faster, no handle exceeds the limit.
+    pub value_lo: f64,
+    /// Metres per second: with the head any faster, the handle exceeds the limit.
+    pub value_hi: f64,
+    /// The handle has at least this ratio to the head's speed at one place.
+    pub ratio_lo: f64,
+    /// No handle has a greater ratio to the head's speed.
+    pub ratio_hi: f64,
+    /// The handle, counted from 0.
+    pub handle: usize,
+    /// Simulated seconds up to which this holds, from the start on.
+    pub time_until: f64,
+}
+
+/// The end of the stretch for which a least clearance is certified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Until {
+    /// The path's end.
+    PathEnd,
+    /// The first contact.
+    Contact,
+    /// A time.
+    Time,
+}
+
+/// The certified least clearance, from the scene's start on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertifiedClearance {
+    /// Metres: no two boards that share no handle are nearer.
+    pub lo: Option<f64>,
+    /// Metres: at one place the two benches are no further apart.
+    pub hi: Option<f64>,
+    /// The end of the stretch.
+    pub until: Until,
+    /// Simulated seconds of that end, for [`Until::Time`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_until: Option<f64>,
+    /// The bench of the two that is nearer the head, counted from 0.
+    pub bench_a: Option<usize>,
+    /// The other bench.
+    pub bench_b: Option<usize>,
 }
 
 /// A step of the head, and the statements that hold throughout it.
@@ -101,6 +255,12 @@ pub struct Step {
     pub clear: bool,
     /// The spans of the handles from 1 on.
     pub spans: Vec<Span>,
+    /// Metres that boards are further apart in this step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub apart: Option<f64>,
+    /// A place of each span, the head's first, for `apart`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub at: Vec<Place>,
 }
 
 /// The proved result for one kind of event.

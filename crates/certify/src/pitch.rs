@@ -12,7 +12,7 @@ use super::clearance::Descent;
 use super::elementary::{pi, sin_cos};
 use super::grid::GridPoint;
 use super::interval::Interval;
-use super::lines::Links;
+use super::lines::{CertificateLine, Links, Step};
 use super::path::{ExactPath, Place};
 use super::step::{Chain, Claim, Listed, links_of};
 use bench_dragon_motion::model::description::PathDescription;
@@ -45,11 +45,12 @@ impl Pitches<'_> {
         Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
     }
 
-    /// Returns true if, with every pitch, the two boards are proved to overlap.
-    pub fn all_overlap(&self) -> bool {
+    /// Returns the spans of the handles from 1 on and a point, if with every pitch the two boards are proved to have the
+    /// point in common. Lengths are in units of a.
+    pub fn overlap(&self) -> Option<(Vec<Span>, [f64; 2])> {
         let Self { team, from, to, theta, benches } = *self;
         if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
-            return false;
+            return None;
         }
         let a = self.radius_per_radian();
         // The path and the team only give the starting guess of the handles.
@@ -57,9 +58,8 @@ impl Pitches<'_> {
         let handle = benches[1] + 1;
         let mut ends = [GridPoint::at(Place(0, theta, 0.0), 0.0), GridPoint::at(Place(0, theta, 0.0), 0.0)];
         let [first, last] = &mut ends;
-        if first.extend_to(handle, &wide, team).is_err() || last.extend_to(handle, &narrow, team).is_err() {
-            return false;
-        }
+        first.extend_to(handle, &wide, team).ok()?;
+        last.extend_to(handle, &narrow, team).ok()?;
         let mut chain = Chain::new(&wide, ExactPath::inward(Interval::ONE, Interval::ZERO), team);
         chain.links = chain.links.map(|link| link.over(a));
         let Shape { inset, half_width } = chain.shape;
@@ -67,11 +67,10 @@ impl Pitches<'_> {
         let claim = Claim { links: Links::All, moving: false, clear: false };
         let mut listed = Listed::new(&chain, Span(Place(0, theta, 0.0), Place(0, theta, 0.0)), f64::INFINITY);
         while listed.handles.len() <= handle {
-            if listed.extend(first, last, claim).is_err() {
-                return false;
-            }
+            listed.extend(first, last, claim).ok()?;
         }
-        chain.common_point(&listed.handles, benches).is_some()
+        let point = chain.common_point(&listed.handles, benches)?;
+        Some((listed.handles[1..].iter().map(|handle| handle.span).collect(), point))
     }
 }
 
@@ -122,18 +121,34 @@ pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> 
 /// Limit of turns of a scene: no steps are tried beyond.
 const MOST_TURNS: f64 = 1e7;
 
-/// Returns true if a team is proved to reach `radius`, metres from the centre, on a spiral of this pitch from any
-/// distance. Until the head's front handle is there, no two boards touch and no link locks. `progress` receives the
-/// share of the way that is done.
-pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, progress: &mut dyn FnMut(f64)) -> bool {
-    let Some(begin) = clear_beyond(team, pitch, radius) else { return false };
-    if begin <= radius {
-        return true;
+/// The proof that a team reaches a radius with one pitch.
+#[derive(Debug, Clone)]
+pub(crate) struct Reached {
+    /// Metres from the centre from which on Lemma 8 holds.
+    pub far: f64,
+    /// The steps from there to the radius.
+    pub steps: Vec<Step>,
+}
+
+/// Returns the proof, if there is one, that a team reaches `radius`, metres from the centre, on a spiral of this pitch
+/// from any distance. Until the head's front handle is there, no two boards touch and no link locks. `progress` receives
+/// the share of the way that is done.
+pub(crate) fn reaches(
+    team: &Team,
+    pitch: f64,
+    radius: f64,
+    most_steps: u64,
+    progress: &mut dyn FnMut(f64),
+) -> Option<Reached> {
+    let far = clear_beyond(team, pitch, radius)?;
+    let mut steps = Vec::new();
+    if far <= radius {
+        return Some(Reached { far, steps });
     }
     // The head begins a little further out. Rounding may take that back, which is checked below.
-    let start_turn = begin * (1.0 + 1e-9) / pitch;
+    let start_turn = far * (1.0 + 1e-9) / pitch;
     if start_turn > MOST_TURNS {
-        return false;
+        return None;
     }
     let description = PathDescription::Spiral { pitch, start_turn };
     let path = Path::spiral(pitch, start_turn);
@@ -142,6 +157,14 @@ pub(crate) fn reaches(team: &Team, pitch: f64, radius: f64, most_steps: u64, pro
     let theta = Interval::point(radius).over(a).lo;
     let end = GridPoint::at(Place(0, theta, 0.0), exact.travelled(Place(0, theta, 0.0)).middle());
     let travelled = end.travelled;
-    let descent = Descent::new(Chain::new(&path, exact, team), travelled, most_steps).after_all_further_out();
-    begin <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress)
+    let mut keep = |line: &CertificateLine| {
+        if let CertificateLine::Step(step) = line {
+            steps.push(step.clone());
+        }
+        Ok(())
+    };
+    let chain = Chain::new(&path, exact, team);
+    let descent = Descent::new(chain, travelled, most_steps, Some(&mut keep)).after_all_further_out();
+    let holds = far <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress);
+    holds.then_some(Reached { far, steps })
 }

@@ -8,8 +8,8 @@ mod pitch;
 mod speed;
 mod trial;
 
-pub use pitch::{LeastPitch, Overlap, least_pitch};
-pub use speed::{GreatestSpeed, greatest_speed};
+pub use pitch::{LeastPitch, Overlap, certify_least_pitch, least_pitch};
+pub use speed::{GreatestSpeed, certify_greatest_speed, greatest_speed};
 
 /// The reason, in one sentence, for a question without an answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -84,7 +84,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     /// Writes the certificate and returns what it proves.
     pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<CertifiedEvent>, CertifyError> {
         let (version, scene) = (env!("CARGO_PKG_VERSION"), self.given.scene);
-        (self.write)(&CertificateLine::Certificate { format: super::FORMAT, version, scene })
+        (self.write)(&CertificateLine::Certificate { format: super::FORMAT, version, about: None, scene })
             .map_err(CertifyError::Write)?;
         let stuck = match self.motion(progress) {
             Ok(()) => None,

@@ -4,11 +4,13 @@
 //! In: a scene's motion, and the end of the travel. Out: two numbers that enclose the greatest ratio; the proof does
 //! not depend on a solver or on samples. `plan` calls it.
 
+mod certificate;
 mod step;
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+pub use self::certificate::certify_greatest_ratio;
 use self::step::{Bounds, Speeds};
 use super::grid::{GridPoint, place};
 use super::interval::Interval;
@@ -19,8 +21,8 @@ use bench_dragon_motion::Motion;
 /// Distance that doubles can resolve, as a share of the path length in metres.
 const LEAST: f64 = 1e-14;
 
-/// Limit of handles to enclose: half a minute to a minute.
-const MOST_HANDLES: u64 = 8_000_000;
+/// Default limit of handles to enclose: half a minute to a minute.
+pub const MOST_HANDLES: u64 = 8_000_000;
 
 /// The greatest ratio of a handle's speed to the head's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +42,9 @@ pub struct GreatestRatio {
     /// Number of steps of the head that were enclosed.
     pub steps: u64,
 }
+
+/// A part of the head's travel, metres.
+pub(crate) type Stretch = (f64, f64);
 
 impl GreatestRatio {
     /// Returns a lower and an upper bound of a positive number divided by the ratio.
@@ -82,20 +87,31 @@ impl Ord for OpenStep {
 /// Encloses the greatest ratio of a handle's speed to the head's over the first `travelled` metres of the head, to a
 /// share of `tolerance`. `progress` receives the share of the work that is done, from 0 to 1.
 pub fn greatest_ratio(motion: &Motion, travelled: f64, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
-    let exact = ExactPath::new(motion.description());
-    let speeds = Speeds { chain: Chain::new(motion.path(), exact, motion.team()) };
-    RatioSearch { speeds, end: travelled, least: LEAST * (1.0 + motion.path().length()) }.run(tolerance, progress)
+    RatioSearch::new(motion, travelled, MOST_HANDLES).run(tolerance, None, progress)
 }
 
 struct RatioSearch<'a> {
     speeds: Speeds<'a>,
     end: f64,
+    most_handles: u64,
     /// Distance that doubles can resolve, metres.
     least: f64,
 }
 
-impl RatioSearch<'_> {
-    fn run(&self, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
+impl<'a> RatioSearch<'a> {
+    fn new(motion: &'a Motion, travelled: f64, most_handles: u64) -> Self {
+        let exact = ExactPath::new(motion.description());
+        let speeds = Speeds { chain: Chain::new(motion.path(), exact, motion.team()) };
+        Self { speeds, end: travelled, most_handles, least: LEAST * (1.0 + motion.path().length()) }
+    }
+
+    /// Encloses the greatest ratio. `steps` receives the steps that show the upper bound, in any order.
+    fn run(
+        &self,
+        tolerance: f64,
+        mut steps: Option<&mut Vec<Stretch>>,
+        progress: &mut dyn FnMut(f64),
+    ) -> GreatestRatio {
         // The ratio of the head itself.
         let mut best =
             GreatestRatio { lo: 1.0, hi: 1.0, handle: 0, travelled: 0.0, ratio: 1.0, proved: false, steps: 0 };
@@ -109,7 +125,11 @@ impl RatioSearch<'_> {
         while let Some(OpenStep { upper, from, to }) = open.pop() {
             let middle = 0.5 * from + 0.5 * to;
             let done = enough(&best, upper);
-            if done || handles > MOST_HANDLES || to - from < self.least {
+            if done || handles > self.most_handles || to - from < self.least {
+                if let Some(steps) = steps.take() {
+                    steps.push((from, to));
+                    steps.extend(open.drain().map(|step| (step.from, step.to)));
+                }
                 return GreatestRatio { hi: upper.max(settled), proved: done, ..best };
             }
             for (from, to) in [(from, middle), (middle, to)] {
@@ -126,6 +146,7 @@ impl RatioSearch<'_> {
                 let upper = bounds.map_or(f64::INFINITY, |bounds| bounds.upper);
                 if enough(&best, upper) {
                     settled = settled.max(upper);
+                    steps.iter_mut().for_each(|steps| steps.push((from, to)));
                 } else {
                     open.push(OpenStep { upper, from, to });
                 }

@@ -105,7 +105,8 @@ impl<'a> Chain<'a> {
         }
         let spans = listed.handles[1..].iter().map(|handle| handle.span).collect();
         let Claim { links, moving, clear } = claim;
-        let step = Step { links, from: from.head, to: to.head, moving, clear, spans };
+        let (apart, at) = (None, Vec::new());
+        let step = Step { links, from: from.head, to: to.head, moving, clear, spans, apart, at };
         Ok(Shown { step, body_forward: listed.body_forward })
     }
 

@@ -47,7 +47,8 @@ pub(super) struct Board<'a> {
     overhang: Interval,
     half_width: Interval,
     rough: Rough,
-    /// The greatest extent in each of the eight fixed directions.
+    /// The greatest extent in each of the eight fixed directions, in doubles and exactly.
+    rough_compass: [f64; 8],
     compass: [OnceCell<Interval>; 8],
 }
 
@@ -58,7 +59,8 @@ impl<'a> Board<'a> {
         let overhang = team.hole_inset / length;
         let half_width = team.width * Interval::new(0.5);
         let rough = Rough::new(front, rear, length.rough(), overhang.rough(), half_width.rough());
-        Self { front, rear, middle, length, overhang, half_width, rough, compass: Default::default() }
+        let (rough_compass, compass) = (COMPASS.map(|n| rough.extent(n)), Default::default());
+        Self { front, rear, middle, length, overhang, half_width, rough, rough_compass, compass }
     }
 
     /// Returns H(n): an upper bound of n . x over the board.
@@ -86,24 +88,56 @@ impl<'a> Board<'a> {
         self.compass[direction].get_or_init(|| self.extent(&Axis::new(COMPASS[direction])))
     }
 
+    /// Returns true if one of the eight fixed directions shows that the gap between two boards is more than `metres`.
+    pub fn is_clearly_apart_by(&self, metres: &Interval, other: &Self) -> bool {
+        let (direction, rough) = self.best_of_compass(other);
+        if rough < metres.rough() {
+            return false;
+        }
+        let gap = -(self.compass_extent(direction) + other.compass_extent((direction + 4) % 8));
+        // The diagonals are longer than 1, and shorter than 1.5.
+        (metres.max(&Interval::new(0.0)) * Interval::new(1.5)).is_below(&gap)
+    }
+
+    /// Returns the best of the eight fixed directions by doubles, and its distance in metres.
+    fn best_of_compass(&self, other: &Self) -> (usize, f64) {
+        let apart = |n: usize| -self.rough_compass[n] - other.rough_compass[(n + 4) % 8];
+        (0..8).map(|n| (n, apart(n))).fold((0, f64::NEG_INFINITY), |best, new| if new.1 > best.1 { new } else { best })
+    }
+
     /// Returns true if Lemma 2 shows the two boards to be apart.
     pub fn is_apart_from(&self, other: &Self) -> bool {
-        let apart = |n: [f64; 2]| -self.rough.extent(n) - other.rough.extent([-n[0], -n[1]]);
-        let fixed = (0..8).map(|direction| (direction, apart(COMPASS[direction])));
-        let (direction, metres) =
-            fixed.fold((0, f64::NEG_INFINITY), |best, new| if new.1 > best.1 { new } else { best });
-        let opposite = (direction + 4) % 8;
-        if metres > CLEARLY_APART && (self.compass_extent(direction) + other.compass_extent(opposite)).is_negative() {
-            return true;
-        }
-        let proved = |n: [f64; 2]| {
-            let axis = Axis::new(n);
-            let opposite = Axis { n: Vector { x: -axis.n.x, y: -axis.n.y }, norm: axis.norm };
-            (self.extent(&axis) + other.extent(&opposite)).is_negative()
-        };
-        let mut axes: Vec<_> = self.rough.axes(&other.rough).into_iter().map(|n| (n, apart(n))).collect();
+        let (_, rough) = self.best_of_compass(other);
+        let zero = Interval::new(0.0);
+        rough > CLEARLY_APART && self.is_clearly_apart_by(&zero, other)
+            || self.is_apart_by(&zero, other)
+            || self.is_apart_somehow(&zero, other)
+    }
+
+    /// Returns true if Lemma 2 shows that the gap between two boards is more than `metres`, in a direction of their sides
+    /// or between them.
+    pub fn is_apart_by(&self, metres: &Interval, other: &Self) -> bool {
+        let rough = metres.rough();
+        let mut axes: Vec<_> =
+            self.rough.axes(&other.rough).into_iter().map(|n| (n, self.rough_gap(other, n))).collect();
+        axes.retain(|(_, gap)| *gap >= rough);
         axes.sort_by(|a, b| b.1.total_cmp(&a.1));
-        axes.iter().take(MOST_TRIES).any(|(n, _)| proved(*n)) || best_direction(apart).is_some_and(proved)
+        axes.iter().take(MOST_TRIES).any(|(n, _)| self.is_apart_along(*n, metres, other))
+    }
+
+    /// Returns true if Lemma 2 shows that the gap between two boards is more than `metres`, in any direction.
+    pub fn is_apart_somehow(&self, metres: &Interval, other: &Self) -> bool {
+        best_direction(|n| self.rough_gap(other, n)).is_some_and(|n| self.is_apart_along(n, metres, other))
+    }
+
+    fn rough_gap(&self, other: &Self, n: [f64; 2]) -> f64 {
+        -self.rough.extent(n) - other.rough.extent([-n[0], -n[1]])
+    }
+
+    fn is_apart_along(&self, n: [f64; 2], metres: &Interval, other: &Self) -> bool {
+        let axis = Axis::new(n);
+        let opposite = Axis { n: Vector { x: -axis.n.x, y: -axis.n.y }, norm: axis.norm };
+        (self.extent(&axis) + other.extent(&opposite) + axis.norm * metres).is_negative()
     }
 }
 
@@ -225,10 +259,10 @@ impl Rough {
     }
 }
 
-/// Returns true if Lemma 3, *Ring*, shows boards near the centre of the spiral to be apart from all body boards further
-/// out. The handles of the former are at most `reach` metres from the centre, those of the latter at least `ring`
+/// Returns true if Lemma 3, *Ring*, shows boards near the centre of the spiral to be more than `metres` apart from all
+/// body boards further out. The handles of the former are at most `reach` metres from the centre, those of the latter at least `ring`
 /// metres.
-pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> bool {
+pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval, metres: &Interval) -> bool {
     let half_link = team.link(1) * Interval::new(0.5);
     let half_width = team.width * Interval::new(0.5);
     if !half_link.is_below(ring) {
@@ -236,7 +270,7 @@ pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval) -> 
     }
     let inner = (ring.square() - half_link.square()).sqrt().min(&(ring - team.hole_inset)) - half_width;
     let outer = reach + (team.hole_inset.square() + half_width.square()).sqrt();
-    outer.is_below(&inner)
+    (outer + metres).is_below(&inner)
 }
 
 /// Returns true if a point is in a board for all positions of its handles in their spans (Lemma 5, *Contact*).

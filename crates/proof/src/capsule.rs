@@ -70,6 +70,22 @@ impl<'a> Pair<'a> {
         of.tangent.dot(&self.middle) + slack.around_zero()
     }
 
+    /// Returns n . d for all unit normals n to the left of `of`. `of` and `other` are the two spans.
+    fn across(&self, of: &Capsule, other: &Capsule) -> Interval {
+        let slack = other.half * of.tangent.cross(&other.tangent).abs() + self.sag + of.turn * self.distance;
+        of.tangent.cross(&self.middle) + slack.around_zero()
+    }
+
+    /// Returns n(u) . d, n being the unit normal to the left.
+    pub fn front_across(&self) -> Interval {
+        self.across(self.front, self.rear)
+    }
+
+    /// Returns n(x) . d.
+    pub fn rear_across(&self) -> Interval {
+        self.across(self.rear, self.front)
+    }
+
     /// Returns the front product f(u, x) = t(u) . d.
     pub fn front_product(&self) -> Interval {
         self.product(self.front, self.rear)

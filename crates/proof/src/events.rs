@@ -2,6 +2,7 @@
 
 use super::boards::{Board, covers};
 use super::chain::{Chain, span_is_one};
+use super::first_order::FirstOrder;
 use super::interval::{Interval, Vector};
 use super::link;
 use super::path::{Place, Span};
@@ -17,6 +18,8 @@ pub(super) struct Events {
     pub stall: Option<(usize, Place)>,
     /// The end of the motion.
     pub finish: Option<Finish>,
+    /// Two benches, and metres that they are no further apart at a place of the motion.
+    pub near: Option<([usize; 2], Interval)>,
 }
 
 /// The end of a motion.
@@ -84,6 +87,45 @@ impl Events {
             }
         }
         self.contact = Some((benches, from));
+        Ok(())
+    }
+
+    /// Checks and adds two boards that are no further apart than `most` metres: Lemma 6, *From above*.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn add_near(
+        &mut self,
+        scene: &Scene,
+        steps: &Steps,
+        [a, b]: [usize; 2],
+        head: Span,
+        (spans, at): (&[Span], &[Place]),
+        most: f64,
+    ) -> Result<(), String> {
+        if self.near.is_some() {
+            return Err("a second line `near`".to_owned());
+        }
+        if a + 2 > b || b >= spans.len() {
+            return Err(format!("benches {a} and {b} share a handle, or are not both listed in order"));
+        }
+        let path = &scene.path;
+        let chain = Chain::check(scene, head, spans)?;
+        let Span(from, to) = head;
+        // Some place of the span is in the motion, and steps have come to it.
+        if !Interval::new(0.0).is_at_most(&path.travelled(to)) || !path.is_within(from) {
+            return Err("the head is before the start or beyond the end of the path".to_owned());
+        }
+        if !steps.apart_end.is_some_and(|end| path.in_order(from, end)) {
+            return Err("no step has come there".to_owned());
+        }
+        let step = FirstOrder::new(scene, &chain, at)?;
+        let [one, other] = [a, b].map(|bench| step.board(bench, &scene.team));
+        let most = Interval::new(most);
+        if !one.at_most(&other).is_at_most(&most) {
+            return Err(format!("benches {a} and {b} may be further apart than it says (Lemma 6)"));
+        }
+        self.near = Some(([a, b], most));
         Ok(())
     }
 

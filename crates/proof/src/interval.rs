@@ -108,6 +108,18 @@ impl Interval {
         Self { lo: smaller(self.lo, other.lo), hi: smaller(self.hi, other.hi) }
     }
 
+    /// Returns all numbers of both intervals and between them.
+    pub fn hull(&self, other: &Self) -> Self {
+        Self { lo: smaller(self.lo, other.lo), hi: greater(self.hi, other.hi) }
+    }
+
+    /// Returns the numbers that both intervals have. Two enclosures of one number have a common number: without one the
+    /// result is NaN.
+    pub fn meet(&self, other: &Self) -> Self {
+        let both = Self { lo: greater(self.lo, other.lo), hi: smaller(self.hi, other.hi) };
+        if both.hi < both.lo { Self::not_a_number() } else { both }
+    }
+
     /// Returns the absolute value.
     pub fn abs(&self) -> Self {
         match self.side() {
@@ -278,6 +290,11 @@ impl Vector {
     /// Returns the vector `factor` times as long.
     pub fn scaled(&self, factor: &Interval) -> Self {
         Self { x: self.x * factor, y: self.y * factor }
+    }
+
+    /// Returns the vector turned by a quarter to the left.
+    pub fn turned_left(&self) -> Self {
+        Self { x: -self.y, y: self.x }
     }
 
     /// Returns the sum.

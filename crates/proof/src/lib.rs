@@ -1,21 +1,28 @@
-//! The checker of certificates of events: the rules of docs/proofs.md, and nothing else. `verify`, `check
+//! The checker of certificates: the rules of docs/proofs.md, and nothing else. `verify`, `check
 //! --certificate` and `view --certificate` call it.
 //!
-//! In: the lines of a certificate. Out: its proved events, or the first line that does not follow. It depends on no
+//! In: the lines of a certificate. Out: its proved claims, or the first line that does not follow. It depends on no
 //! other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
 
+mod apart;
 mod boards;
 mod capsule;
 mod chain;
 mod elementary;
 mod events;
+mod far;
+mod first_order;
+mod greatest;
 mod interval;
 mod lines;
 mod link;
 mod number;
 mod path;
+mod pitch;
 mod results;
 mod scene;
+mod sides;
+mod speeds;
 mod steps;
 
 #[cfg(test)]
@@ -26,9 +33,11 @@ use std::io::{self, BufRead, Read};
 use serde::Serialize;
 
 use self::events::{Events, LockShown};
-use self::lines::ParsedLine;
-pub use self::lines::{EventKind, ProvedEvent, Status};
+use self::greatest::Greatest;
+use self::lines::{About, ParsedLine};
+pub use self::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedPitch, ProvedSpeed, Status, Until};
 use self::path::Span;
+use self::pitch::Pitch;
 use self::scene::Scene;
 use self::steps::{Step, Steps};
 
@@ -44,8 +53,17 @@ pub struct Proved {
     pub scene: String,
     /// The version of the program that wrote the certificate.
     pub version: String,
-    /// The results for contact, stall, lock and path end, in this order.
+    /// The results for contact, stall, lock and path end, in this order; none in a certificate of another question.
     pub results: Vec<ProvedEvent>,
+    /// The least clearance, in a certificate of that question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_clearance: Option<ProvedClearance>,
+    /// The greatest speed, in a certificate of that question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub greatest_speed: Option<ProvedSpeed>,
+    /// The least pitch, in a certificate of that question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_pitch: Option<ProvedPitch>,
     /// Number of steps checked.
     pub steps: u64,
     /// Number of links checked, in all steps.
@@ -118,43 +136,90 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
         }
     }
     match checker {
-        Some(checker) if checker.proved.results.len() == 4 => Ok(checker.finished()),
-        Some(_) => Err(Refused::Form { line: 1, problem: "the file ends before its four results".to_owned() }),
+        Some(checker) if checker.is_complete() => Ok(checker.finished()),
+        Some(Checker { about: About::Events, .. }) => {
+            Err(Refused::Form { line: 1, problem: "the file ends before its four results".to_owned() })
+        }
+        Some(_) => Err(Refused::Form { line: 1, problem: "the file ends before its result".to_owned() }),
         None => Err(Refused::Form { line: 1, problem: "the file is empty".to_owned() }),
     }
 }
 
 /// The state of the check.
 struct Checker {
+    about: About,
     scene: Scene,
     steps: Steps,
     events: Events,
+    greatest: Greatest,
+    pitch: Option<Pitch>,
     proved: Proved,
 }
 
 impl Checker {
     fn begin(first: ParsedLine) -> Result<Self, String> {
-        let ParsedLine::Certificate { format, version, scene: text } = first else {
+        let ParsedLine::Certificate { format, version, about, scene: text } = first else {
             return Err("the first line is not that of a certificate".to_owned());
         };
         if format != FORMAT {
             return Err(format!("a certificate of format {format}, expected {FORMAT}"));
         }
         let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
-        let proved = Proved { scene: text, version, results: Vec::new(), steps: 0, links: 0, pairs: 0 };
-        Ok(Self { scene, steps: Steps::new(), events: Events::default(), proved })
+        let (results, steps, links, pairs) = (Vec::new(), 0, 0, 0);
+        let proved = Proved {
+            scene: text,
+            version,
+            results,
+            least_clearance: None,
+            greatest_speed: None,
+            least_pitch: None,
+            steps,
+            links,
+            pairs,
+        };
+        let (steps, events, greatest) = (Steps::new(), Events::default(), Greatest::default());
+        Ok(Self { about, scene, steps, events, greatest, pitch: None, proved })
+    }
+
+    /// Returns true if all results of the question are there.
+    fn is_complete(&self) -> bool {
+        match self.about {
+            About::Events => self.proved.results.len() == 4,
+            About::LeastClearance => self.proved.least_clearance.is_some(),
+            About::GreatestSpeed => self.proved.greatest_speed.is_some(),
+            About::LeastPitch => self.proved.least_pitch.is_some(),
+        }
     }
 
     fn add(&mut self, line: ParsedLine) -> Result<(), String> {
-        let Self { scene, steps, events, proved } = self;
-        let is_result = matches!(line, ParsedLine::Result(_));
-        if !is_result && (events.finish.is_some() || !proved.results.is_empty()) {
+        if self.about != About::Events && self.is_complete() {
+            return Err("nothing can follow the result".to_owned());
+        }
+        let Self { about, scene, steps, events, greatest, pitch, proved } = self;
+        let question = match line {
+            ParsedLine::Result(_) => Some(About::Events),
+            ParsedLine::LeastClearance(_) => Some(About::LeastClearance),
+            ParsedLine::GreatestSpeed(_) => Some(About::GreatestSpeed),
+            ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
+            _ => None,
+        };
+        if question.is_some_and(|question| question != *about) {
+            return Err("it is a result of another question".to_owned());
+        }
+        if question.is_none() && (events.finish.is_some() || !proved.results.is_empty()) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
         }
         match line {
             ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
-            ParsedLine::Step { links, from, to, moving, clear, spans } => {
-                steps.add(scene, Step { links, head: Span(from, to), moving, clear, spans })
+            ParsedLine::Step { links, from, to, moving, clear, spans, apart, at } => {
+                let step = Step { links, head: Span(from, to), moving, clear, spans, apart, at };
+                match pitch {
+                    Some(pitch) => pitch.add_step(step),
+                    None => steps.add(scene, step),
+                }
+            }
+            ParsedLine::Near { benches, from, to, spans, at, most } => {
+                events.add_near(scene, steps, benches, Span(from, to), (&spans, &at), most)
             }
             ParsedLine::Contact { benches, from, to, spans, point } => {
                 events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
@@ -174,11 +239,46 @@ impl Checker {
                 proved.results.push(outcome);
                 Ok(())
             }
+            ParsedLine::LeastClearance(outcome) => {
+                results::check_clearance(scene, steps, events, &outcome)?;
+                proved.least_clearance = Some(outcome);
+                Ok(())
+            }
+            ParsedLine::Speeds { from, to, spans, at } => greatest.add_step(scene, Span(from, to), &spans, &at),
+            ParsedLine::Fast { handle, spans, at } => greatest.add_fast(scene, handle, &spans, &at),
+            ParsedLine::GreatestSpeed(outcome) => {
+                greatest.check(scene, &outcome)?;
+                proved.greatest_speed = Some(outcome);
+                Ok(())
+            }
+            ParsedLine::Reach { radius, from } if *about == About::LeastPitch && pitch.is_none() => {
+                *pitch = Some(Pitch::new(radius, from)?);
+                Ok(())
+            }
+            ParsedLine::Reach { .. } => Err("a line `reach` of another question, or a second one".to_owned()),
+            ParsedLine::Overlap { from, to, theta, benches, spans, point } => {
+                begun(pitch)?.add_overlap(scene, [from, to], theta, benches, &spans, point)
+            }
+            ParsedLine::HeadLocks { from, to } => begun(pitch)?.add_lock(scene, from, to),
+            ParsedLine::Far { pitch: free, radius } => begun(pitch)?.add_far(scene, free, radius),
+            ParsedLine::LeastPitch(outcome) => {
+                begun(pitch)?.check(&outcome)?;
+                proved.least_pitch = Some(outcome);
+                Ok(())
+            }
         }
     }
 
     fn finished(self) -> Proved {
         let Steps { steps, links, pairs, .. } = self.steps;
+        let of_pitch = self.pitch.as_ref().map_or((0, 0, 0), Pitch::counts);
+        let (steps, links) = (steps + self.greatest.steps + of_pitch.0, links + self.greatest.links + of_pitch.1);
+        let pairs = pairs + of_pitch.2;
         Proved { steps, links, pairs, ..self.proved }
     }
+}
+
+/// Returns the pitch that a line is about.
+fn begun(pitch: &mut Option<Pitch>) -> Result<&mut Pitch, String> {
+    pitch.as_mut().ok_or_else(|| "no line `reach` precedes it".to_owned())
 }

@@ -11,6 +11,8 @@ pub(super) enum ParsedLine {
     Certificate {
         format: u32,
         version: String,
+        #[serde(default)]
+        about: About,
         scene: String,
     },
     Step {
@@ -20,6 +22,18 @@ pub(super) enum ParsedLine {
         moving: bool,
         clear: bool,
         spans: Vec<Span>,
+        #[serde(default)]
+        apart: Option<f64>,
+        #[serde(default)]
+        at: Vec<Place>,
+    },
+    Near {
+        benches: [usize; 2],
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        at: Vec<Place>,
+        most: f64,
     },
     Contact {
         benches: [usize; 2],
@@ -46,6 +60,51 @@ pub(super) enum ParsedLine {
     },
     PathEnd {},
     Result(ProvedEvent),
+    LeastClearance(ProvedClearance),
+    Speeds {
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        at: Vec<Place>,
+    },
+    Fast {
+        handle: usize,
+        spans: Vec<Span>,
+        at: Vec<Place>,
+    },
+    GreatestSpeed(ProvedSpeed),
+    Reach {
+        radius: f64,
+        from: f64,
+    },
+    Overlap {
+        from: f64,
+        to: f64,
+        theta: f64,
+        benches: [usize; 2],
+        spans: Vec<Span>,
+        point: [f64; 2],
+    },
+    HeadLocks {
+        from: f64,
+        to: f64,
+    },
+    Far {
+        pitch: f64,
+        radius: f64,
+    },
+    LeastPitch(ProvedPitch),
+}
+
+/// The question that a certificate answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum About {
+    #[default]
+    Events,
+    LeastClearance,
+    GreatestSpeed,
+    LeastPitch,
 }
 
 /// The links that a step shows.
@@ -105,4 +164,75 @@ pub struct ProvedEvent {
     /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not checked.
     #[serde(default)]
     pub because: Option<String>,
+}
+
+/// The end of the stretch for which a least clearance is proved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Until {
+    /// The path's end.
+    PathEnd,
+    /// The first contact.
+    Contact,
+    /// A time.
+    Time,
+}
+
+/// The proved least clearance, from the scene's start on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvedClearance {
+    /// Metres: no two boards that share no handle are nearer.
+    #[serde(default)]
+    pub lo: Option<f64>,
+    /// Metres: at one place the two benches are no further apart.
+    #[serde(default)]
+    pub hi: Option<f64>,
+    /// The end of the stretch.
+    pub until: Until,
+    /// Seconds of that end, for [`Until::Time`].
+    #[serde(default)]
+    pub time_until: Option<f64>,
+    /// The bench of the two that is nearer the head, counted from 0.
+    #[serde(default)]
+    pub bench_a: Option<usize>,
+    /// The other bench.
+    #[serde(default)]
+    pub bench_b: Option<usize>,
+}
+
+/// The proved greatest speed of the head at which no handle exceeds a limit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvedSpeed {
+    /// Metres per second that no handle may exceed.
+    pub limit: f64,
+    /// Metres per second: with the head no faster, no handle exceeds the limit.
+    pub value_lo: f64,
+    /// Metres per second: with the head any faster, the handle exceeds the limit.
+    pub value_hi: f64,
+    /// The handle has at least this ratio to the head's speed at one place.
+    pub ratio_lo: f64,
+    /// No handle has a greater ratio to the head's speed.
+    pub ratio_hi: f64,
+    /// The handle, counted from 0.
+    pub handle: usize,
+    /// Seconds at the scene's own speed up to which this holds, from its start on.
+    pub time_until: f64,
+}
+
+/// The proved least pitch with which a team reaches a radius on an inward spiral, from any distance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvedPitch {
+    /// Metres from the centre that the head is to reach.
+    pub radius: f64,
+    /// The least pitch that is looked at, metres per turn.
+    pub from: f64,
+    /// Metres per turn: with every pitch from `from` to this, two boards overlap or a link locks before.
+    #[serde(default)]
+    pub value_lo: Option<f64>,
+    /// Metres per turn: with this pitch the head reaches the radius.
+    #[serde(default)]
+    pub value_hi: Option<f64>,
 }

@@ -15,7 +15,7 @@ pub(super) struct Place(pub usize, pub f64, #[serde(default)] pub f64);
 
 impl Place {
     /// Returns the coordinate.
-    fn coordinate(self) -> Interval {
+    pub fn coordinate(self) -> Interval {
         let coordinate = Interval::new(self.1);
         if self.2 == 0.0 { coordinate } else { coordinate + Interval::new(self.2) }
     }
@@ -120,6 +120,33 @@ impl Curve {
             Self::Outward { .. } => spiral(to, from),
             Self::Line { .. } => Interval::new(0.0),
             Self::Arc { .. } => to - from,
+        }
+    }
+
+    /// Returns the curvature from one coordinate to a later one, positive to the left, 1/m.
+    fn bend(&self, from: &Interval, to: &Interval) -> Interval {
+        match self {
+            // The curvature falls with the angle.
+            Self::Inward { a } => -spiral_curvature(a, from).hull(&spiral_curvature(a, to)),
+            Self::Outward { a } => spiral_curvature(a, from).hull(&spiral_curvature(a, to)),
+            Self::Line { .. } => Interval::new(0.0),
+            Self::Arc { direction, to_centre, radius, .. } => {
+                let is_left = direction.cross(to_centre).is_positive();
+                Interval::new(if is_left { 1.0 } else { -1.0 }) / radius
+            }
+        }
+    }
+
+    /// Returns the change of that curvature per metre from one coordinate to a later one, 1/m^2.
+    fn bend_rate(&self, from: &Interval, to: &Interval) -> Interval {
+        match self {
+            Self::Inward { a } | Self::Outward { a } => {
+                let theta = from.hull(to);
+                let square = theta.square();
+                let w_squared = square + Interval::new(1.0);
+                -(theta * (square + Interval::new(4.0)) / (a.square() * w_squared * w_squared.square()))
+            }
+            Self::Line { .. } | Self::Arc { .. } => Interval::new(0.0),
         }
     }
 
@@ -286,6 +313,11 @@ impl Path {
         matches!(self.segments[segment].curve, Curve::Line { .. })
     }
 
+    /// Returns true if the segment is an arc.
+    pub fn is_arc(&self, segment: usize) -> bool {
+        matches!(self.segments[segment].curve, Curve::Arc { .. })
+    }
+
     /// Returns the metres from the centre at a place of an inward spiral.
     pub fn spiral_radius(&self, place: Place) -> Option<Interval> {
         match &self.segments[place.0].curve {
@@ -299,7 +331,7 @@ impl Path {
         (from.0..=to.0).map(move |index| {
             let nothing = || Interval::new(0.0) / Interval::new(0.0);
             let segment = &self.segments[index];
-            let begin = if index == from.0 { Interval::new(from.1) } else { segment.begin.unwrap_or_else(nothing) };
+            let begin = if index == from.0 { from.coordinate() } else { segment.begin.unwrap_or_else(nothing) };
             let end = if index == to.0 { to.coordinate() } else { segment.end.unwrap_or_else(nothing) };
             (index, begin, end)
         })
@@ -321,6 +353,18 @@ impl Path {
             .map(|(index, begin, end)| self.segments[index].curve.curvature_bound(&begin, &end))
             .fold(Interval::new(0.0), |most, part| most.max(&part))
             .upper()
+    }
+
+    /// Returns the curvature anywhere in a span, positive to the left, 1/m.
+    pub fn bend(&self, Span(from, to): Span) -> Interval {
+        let parts = self.parts(from, to).map(|(index, begin, end)| self.segments[index].curve.bend(&begin, &end));
+        parts.reduce(|all, part| all.hull(&part)).unwrap_or_else(|| Interval::new(0.0))
+    }
+
+    /// Returns the change of that curvature per metre, 1/m^2; `None` for a span with a junction.
+    pub fn bend_rate(&self, Span(from, to): Span) -> Option<Interval> {
+        let (begin, end) = (from.coordinate(), to.coordinate());
+        (from.0 == to.0).then(|| self.segments[from.0].curve.bend_rate(&begin, &end))
     }
 
     /// Returns an upper bound of the radians by which the path turns from one place to a later one.

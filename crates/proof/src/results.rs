@@ -2,7 +2,7 @@
 
 use super::events::{Events, Finish};
 use super::interval::Interval;
-use super::lines::{EventKind, ProvedEvent, Status};
+use super::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
 use super::path::Place;
 use super::scene::Scene;
 use super::steps::Steps;
@@ -63,6 +63,55 @@ pub(super) fn check(
             }
         }
         (Status::Proved, ..) => Err("a time is missing".to_owned()),
+    }
+}
+
+/// Checks the result of a certificate of the least clearance.
+///
+/// # Errors
+/// The condition that does not follow.
+pub(super) fn check_clearance(
+    scene: &Scene,
+    steps: &Steps,
+    events: &Events,
+    outcome: &ProvedClearance,
+) -> Result<(), String> {
+    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b } = *outcome;
+    let zero = Interval::new(0.0);
+    let comes_to = |metres: &Interval| steps.apart_end.is_some_and(|end| metres.is_at_most(&scene.path.travelled(end)));
+    if lo.is_some_and(|lo| !(lo.is_finite() && lo <= steps.apart && comes_to(&zero))) {
+        return Err("the clearance lo does not follow".to_owned());
+    }
+    let near = match until {
+        Until::PathEnd if steps.all_apart && matches!(events.finish, Some(Finish::PathEnd)) => events.near,
+        Until::PathEnd => return Err("the steps that say how far boards are apart end before the path".to_owned()),
+        Until::Contact => {
+            // Boards are apart at the start, and two overlap later.
+            let begins = steps.apart >= 0.0 && lo.is_none_or(|lo| lo <= 0.0) && comes_to(&zero);
+            let contact = events.contact.filter(|_| begins);
+            Some(contact.map(|(benches, _)| (benches, zero)).ok_or("a first contact does not follow")?)
+        }
+        Until::Time => {
+            let is_reached = |time: f64| lo.is_none() || comes_to(&(Interval::new(time) * scene.head_speed));
+            if !time_until.is_some_and(|time| time >= 0.0 && is_reached(time)) {
+                return Err("time_until does not follow".to_owned());
+            }
+            events.near
+        }
+    };
+    if (until == Until::Time) != time_until.is_some() {
+        return Err("time_until is of another end".to_owned());
+    }
+    match (hi, near) {
+        (None, _) if bench_a.is_none() && bench_b.is_none() => Ok(()),
+        (Some(hi), Some(([a, b], most))) if (Some(a), Some(b)) == (bench_a, bench_b) => {
+            if most.is_at_most(&Interval::new(hi)) {
+                Ok(())
+            } else {
+                Err("the clearance hi does not follow".to_owned())
+            }
+        }
+        _ => Err("the clearance hi, or its benches, do not follow".to_owned()),
     }
 }
 

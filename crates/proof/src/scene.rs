@@ -138,6 +138,32 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// Returns the same team in units of `unit` metres, on the inward spiral r = theta.
+    pub fn in_units(&self, unit: &Interval) -> Self {
+        let Team { benches, width, hole_inset, head_link, body_link } = &self.team;
+        let team = Team {
+            benches: *benches,
+            width: width / unit,
+            hole_inset: hole_inset / unit,
+            head_link: head_link / unit,
+            body_link: body_link / unit,
+        };
+        Self { team, ..self.on_spiral(Interval::new(1.0)) }
+    }
+
+    /// Returns the same team on the inward spiral r = a theta. The travel is measured from the centre, negative before
+    /// it.
+    pub fn on_spiral(&self, a: Interval) -> Self {
+        let Team { benches, width, hole_inset, head_link, body_link } = self.team;
+        let team = Team { benches, width, hole_inset, head_link, body_link };
+        let zero = Interval::new(0.0);
+        let inward = Segment { curve: Curve::Inward { a }, begin: None, end: Some(zero) };
+        let path = Path::new(vec![inward], zero, PathEnd::Coordinate(zero), zero);
+        Self { team, path, head_speed: self.head_speed }
+    }
+}
+
 impl TeamText {
     fn read(&self) -> Result<Team, String> {
         if self.benches == 0 || self.benches > MOST {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::apart;
 use super::boards::{Board, is_inside_ring};
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
@@ -17,6 +18,10 @@ pub(super) struct Step {
     pub moving: bool,
     pub clear: bool,
     pub spans: Vec<Span>,
+    /// Metres that boards are said to be more apart.
+    pub apart: Option<f64>,
+    /// Places of all listed handles with the head at one place.
+    pub at: Vec<Place>,
 }
 
 /// The consequences of the steps so far.
@@ -26,9 +31,14 @@ pub(super) struct Steps {
     /// The ends of the last moving step and of the last clear step.
     pub moving_end: Option<Place>,
     pub clear_end: Option<Place>,
-    /// True if all steps were moving, and if all were clear.
+    /// The end of the last step that says how far boards are apart.
+    pub apart_end: Option<Place>,
+    /// True if all steps were moving, if all were clear, and if all say how far boards are apart.
     pub all_moving: bool,
     pub all_clear: bool,
+    pub all_apart: bool,
+    /// Metres by which boards were apart in all steps up to `apart_end`.
+    pub apart: f64,
     /// Spans of the last step.
     pub spans: Vec<Span>,
     /// Lemma 4: S is not beyond this place, the end of handle 1's span in the first step.
@@ -49,8 +59,11 @@ impl Steps {
             end: None,
             moving_end: None,
             clear_end: None,
+            apart_end: None,
             all_moving: true,
             all_clear: true,
+            all_apart: true,
+            apart: f64::INFINITY,
             spans: Vec::new(),
             start_of_second: None,
             has_come: false,
@@ -61,12 +74,17 @@ impl Steps {
         }
     }
 
+    /// Begins where handle 1 has come from far out, and everything further out is shown: in Lemma 4, S is out there.
+    pub fn far_out() -> Self {
+        Self { start_of_second: Some(Place(0, f64::INFINITY, 0.0)), has_come: true, ..Self::new() }
+    }
+
     /// Checks a step and adds its consequences.
     ///
     /// # Errors
     /// The condition that does not follow.
     pub fn add(&mut self, scene: &Scene, step: Step) -> Result<(), String> {
-        let Step { links, head, moving, clear, spans } = step;
+        let Step { links, head, moving, clear, spans, apart, at } = step;
         let Span(from, to) = head;
         span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
         match self.end {
@@ -86,6 +104,7 @@ impl Steps {
         }
         self.add_moving(moving, to, &chain)?;
         self.add_clear(scene, links, clear, to, &chain)?;
+        self.add_apart(scene, links, (apart, &at), to, &chain)?;
         self.steps += 1;
         self.links += chain.products.len() as u64;
         self.end = Some(to);
@@ -152,6 +171,30 @@ impl Steps {
         self.clear_end = Some(to);
         Ok(())
     }
+
+    fn add_apart(
+        &mut self,
+        scene: &Scene,
+        links: Links,
+        (apart, at): (Option<f64>, &[Place]),
+        to: Place,
+        chain: &Chain,
+    ) -> Result<(), String> {
+        let Some(metres) = apart else {
+            self.all_apart = false;
+            return Ok(());
+        };
+        if !self.all_apart {
+            return Err("it says how far boards are apart after a step that does not".to_owned());
+        }
+        if !metres.is_finite() {
+            return Err(format!("`apart` is {metres:?}, expected a number"));
+        }
+        self.pairs += apart::check(scene, links, chain, at, metres)?;
+        self.apart = self.apart.min(metres);
+        self.apart_end = Some(to);
+        Ok(())
+    }
 }
 
 /// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs with boards 0
@@ -162,10 +205,10 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
         .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
         .collect();
     let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
-    let mut pairs = 0;
+    let (mut pairs, zero) = (0, Interval::new(0.0));
     for a in 0..about {
         for b in a + 2..boards.len() {
-            if !boards[a].is_apart_from(&boards[b]) && check_ring(scene, chain, a..a + 1, b).is_err() {
+            if !boards[a].is_apart_from(&boards[b]) && check_ring(scene, chain, a..a + 1, b, &zero).is_err() {
                 return Err(format!("it claims to be clear, but benches {a} and {b} may touch (Lemma 2)"));
             }
             pairs += 1;
@@ -179,8 +222,22 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
         return Ok(pairs + about as u64);
     }
     // Only a step of the front links gets here.
-    check_ring(scene, chain, 0..2, chain.last())?;
+    check_ring(scene, chain, 0..2, chain.last(), &zero)?;
     Ok(pairs + about as u64)
+}
+
+/// Returns the first and the last handle of the boards from `first` on, where the last listed handle is on segment 0, a
+/// line; and the metres between the two.
+pub(super) fn straight_run(scene: &Scene, chain: &Chain, first: usize) -> (Capsule, Capsule, Interval) {
+    let (team, last) = (&scene.team, chain.last());
+    let length = team.links(first, team.benches - 1);
+    let front: Capsule = if first == last {
+        chain.capsules[last].clone()
+    } else {
+        chain.capsules[last].behind(&team.links(last, first - 1))
+    };
+    let rear = front.behind(&length);
+    (front, rear, length)
 }
 
 /// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The boards `about` are apart from
@@ -197,13 +254,7 @@ fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), Strin
         if first >= team.benches {
             continue;
         }
-        let length = team.links(first, team.benches - 1);
-        let front: Capsule = if first == last {
-            chain.capsules[last].clone()
-        } else {
-            chain.capsules[last].behind(&team.links(last, first - 1))
-        };
-        let rear = front.behind(&length);
+        let (front, rear, length) = straight_run(scene, chain, first);
         if !board.is_apart_from(&Board::new(&front, &rear, length, team)) {
             return Err(format!("it claims to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"));
         }
@@ -211,15 +262,21 @@ fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), Strin
     Ok(())
 }
 
-/// Checks Lemma 3, *Ring*: some boards are apart from all body boards from a handle on.
-fn check_ring(scene: &Scene, chain: &Chain, boards: Range<usize>, from_handle: usize) -> Result<(), String> {
+/// Checks Lemma 3, *Ring*: some boards are more than `metres` apart from all body boards from a handle on.
+pub(super) fn check_ring(
+    scene: &Scene,
+    chain: &Chain,
+    boards: Range<usize>,
+    from_handle: usize,
+    metres: &Interval,
+) -> Result<(), String> {
     let Span(_, latest) = chain.capsules[from_handle].span;
     let ring = scene.path.spiral_radius(latest).filter(|_| latest.0 == 0);
     let ring = ring.ok_or("it claims to be clear, but the last handle listed is not on segment 0, an inward spiral")?;
     let reach = (chain.capsules[boards.start..=boards.end].iter())
         .map(|capsule| capsule.point.norm() + capsule.half)
         .fold(Interval::new(0.0), |most, metres| most.max(&metres));
-    if is_inside_ring(&scene.team, &reach, &ring) {
+    if is_inside_ring(&scene.team, &reach, &ring, metres) {
         Ok(())
     } else {
         Err("it claims to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)".to_owned())

@@ -5,6 +5,7 @@ fn cases(all: usize, few: usize) -> usize {
     if std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few") { few } else { all }
 }
 
+mod clearance;
 mod intervals;
 mod lemmas;
 mod rules;

@@ -1,9 +1,11 @@
-//! The report of `verify` on a certificate of events.
+//! The report of `verify` on a certificate.
 
 use std::io::BufRead;
 
 use bench_dragon::messages::hexadecimal;
-use bench_dragon::proof::{EventKind, Proved, ProvedEvent, Refused, Status, scene_hash};
+use bench_dragon::proof::{
+    EventKind, Proved, ProvedClearance, ProvedEvent, ProvedPitch, ProvedSpeed, Refused, Status, Until, scene_hash,
+};
 use bench_dragon::show::scene::printable;
 use serde::Serialize;
 use serde_json::json;
@@ -37,8 +39,8 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
         return output.finish();
     }
     output.line(&format!("BLAKE3 of the scene's text: {scene_hash}"))?;
-    for outcome in &proved.results {
-        output.line(&sentence(outcome))?;
+    for sentence in sentences(&proved) {
+        output.line(&sentence)?;
     }
     let Proved { steps, links, pairs, .. } = proved;
     output.line(&format!("{steps} steps, {links} links over spans and {pairs} pairs of boards were checked."))?;
@@ -46,7 +48,7 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
 }
 
 /// Checks that a certificate is of the scene with this text; `shown` is the file's name in sentences. Returns a
-/// sentence for each kind of event.
+/// sentence for each result.
 pub fn proved_of(
     scene: &str,
     shown: &str,
@@ -58,7 +60,18 @@ pub fn proved_of(
         let sentence = format!("{shown} is the certificate of a scene with another text, expected one of this scene");
         return Err(CommandError::BadInput(sentence));
     }
-    Ok(proved.results.iter().map(sentence).collect())
+    Ok(sentences(&proved))
+}
+
+/// Returns a sentence for each result.
+fn sentences(proved: &Proved) -> Vec<String> {
+    let Proved { results, least_clearance, greatest_speed, least_pitch, .. } = proved;
+    let others = [
+        least_clearance.as_ref().map(clearance_sentence),
+        greatest_speed.as_ref().map(speed_sentence),
+        least_pitch.as_ref().map(pitch_sentence),
+    ];
+    results.iter().map(sentence).chain(others.into_iter().flatten()).collect()
 }
 
 /// Returns the error for a refused certificate.
@@ -109,5 +122,51 @@ fn sentence(outcome: &ProvedEvent) -> String {
                 outcome.because.as_deref().map_or(String::new(), |because| format!(": {}", printable(because)));
             format!("{event}: undecided, but not before {lo}{because}")
         }
+    }
+}
+
+/// Returns a sentence on a proved least clearance.
+fn clearance_sentence(outcome: &ProvedClearance) -> String {
+    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b } = *outcome;
+    let until = match (until, time_until) {
+        (Until::PathEnd, _) => "from the start to the path's end".to_owned(),
+        (Until::Contact, _) => "from the start to the first contact".to_owned(),
+        (Until::Time, time) => format!("from the start to {} s", time.unwrap_or(0.0)),
+    };
+    let below = lo.map(|lo| format!("no two boards that share no handle are nearer than {lo} m"));
+    let above = hi.zip(bench_a.zip(bench_b)).map(|(hi, (a, b))| {
+        format!("benches {} and {} (counting from 1) are no further apart than {hi} m at one moment", a + 1, b + 1)
+    });
+    let claims: Vec<String> = below.into_iter().chain(above).collect();
+    match claims.is_empty() {
+        true => format!("least clearance {until}: undecided"),
+        false => format!("least clearance {until}: proved that {}", claims.join(", and that ")),
+    }
+}
+
+/// Returns a sentence on a proved greatest speed.
+fn speed_sentence(outcome: &ProvedSpeed) -> String {
+    let ProvedSpeed { limit, value_lo, value_hi, ratio_lo, ratio_hi, handle, time_until } = *outcome;
+    let handle = handle + 1;
+    format!(
+        "greatest speed from the start to {time_until} s of the scene: proved that no handle exceeds {limit} m/s with the \
+         head at {value_lo} m/s, and that handle {handle} (counting from 1) does with the head faster than {value_hi} \
+         m/s; the greatest ratio is between {ratio_lo} and {ratio_hi}"
+    )
+}
+
+/// Returns a sentence on a proved least pitch.
+fn pitch_sentence(outcome: &ProvedPitch) -> String {
+    let ProvedPitch { radius, from, value_lo, value_hi } = *outcome;
+    let blocked = value_lo.map(|value_lo| {
+        format!("with every pitch from {from} m to {value_lo} m two boards overlap, or a link locks, before {radius} m")
+    });
+    let free = value_hi.map(|value_hi| {
+        format!("with {value_hi} m the head reaches {radius} m, and no two boards that share no handle touch before")
+    });
+    let claims: Vec<String> = blocked.into_iter().chain(free).collect();
+    match claims.is_empty() {
+        true => "least pitch: undecided".to_owned(),
+        false => format!("least pitch: proved that {}", claims.join(", and that ")),
     }
 }

@@ -5,10 +5,14 @@
 //! ([`super::trial`]) only suggests where to search.
 
 use std::f64::consts::TAU;
+use std::io;
 
 use super::PlanError;
 use super::trial::{Nearest, Obstacle, deepest, free_from, obstacle};
-use crate::pitch::{Pitches, head_locks, reaches};
+use crate::capsule::Span;
+use crate::clearance::Write;
+use crate::lines::{About, CertificateLine, CertifiedPitch};
+use crate::pitch::{Pitches, Reached, head_locks, reaches};
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
@@ -74,19 +78,60 @@ const SHALLOW: f64 = 0.5;
 /// The radius is reached with every pitch from the least one on, or with none.
 pub fn least_pitch(team: &Team, radius: f64, progress: &mut dyn FnMut(f64)) -> Result<LeastPitch, PlanError> {
     let mut propose = |from: f64, to: f64, progress: &mut dyn FnMut(f64)| free_from(team, (from, to), radius, progress);
-    decided(team, radius, &mut propose, progress)
+    Ok(decided(team, radius, &mut propose, false, progress)?.0)
+}
+
+/// Encloses the least pitch as [`least_pitch`] does, and writes a certificate. `scene` is the text of the team's scene.
+///
+/// # Errors
+/// As [`least_pitch`]; a line cannot be written.
+pub fn certify_least_pitch(
+    team: &Team,
+    radius: f64,
+    scene: &str,
+    write: Write<'_>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<io::Result<LeastPitch>, PlanError> {
+    let mut propose = |from: f64, to: f64, progress: &mut dyn FnMut(f64)| free_from(team, (from, to), radius, progress);
+    let (found, proof) = decided(team, radius, &mut propose, true, progress)?;
+    Ok(written(&found, proof, radius, scene, write).map(|()| found))
+}
+
+/// The lines that prove an enclosure.
+#[derive(Default)]
+struct Proof {
+    /// A line for each interval of pitches, if requested.
+    intervals: Vec<CertificateLine<'static>>,
+    /// The proof for `value_hi`.
+    reached: Option<Reached>,
+}
+
+fn written(found: &LeastPitch, proof: Proof, radius: f64, scene: &str, write: Write<'_>) -> io::Result<()> {
+    let (version, about) = (env!("CARGO_PKG_VERSION"), Some(About::LeastPitch));
+    let LeastPitch { from, value_hi, intervals, .. } = *found;
+    write(&CertificateLine::Certificate { format: crate::FORMAT, version, about, scene })?;
+    write(&CertificateLine::Reach { radius, from })?;
+    proof.intervals.iter().try_for_each(&mut *write)?;
+    if let (Some(pitch), Some(Reached { far, steps })) = (value_hi, proof.reached) {
+        write(&CertificateLine::Far { pitch, radius: far })?;
+        steps.into_iter().try_for_each(|step| write(&CertificateLine::Step(step)))?;
+    }
+    let value_lo = (intervals > 0).then_some(found.value_lo);
+    write(&CertificateLine::LeastPitch(CertifiedPitch { radius, from, value_lo, value_hi }))
 }
 
 /// A function that proposes the least pitch between two with which the radius might be reached.
 type Propose<'p> = &'p mut dyn FnMut(f64, f64, &mut dyn FnMut(f64)) -> Option<f64>;
 
-/// Encloses the least pitch with any proposals. Wrong proposals only cost time.
+/// Encloses the least pitch with any proposals. Wrong proposals only cost time. `keeps` requests the lines of the
+/// intervals.
 fn decided(
     team: &Team,
     radius: f64,
     propose: Propose<'_>,
+    keeps: bool,
     progress: &mut dyn FnMut(f64),
-) -> Result<LeastPitch, PlanError> {
+) -> Result<(LeastPitch, Proof), PlanError> {
     let Accepted { least, greatest, .. } = Accepted::LENGTH;
     let from = least.max(0.5 * team.width);
     if team.benches >= 3 && 2.0 * team.hole_inset >= team.link(1) {
@@ -96,15 +141,24 @@ fn decided(
             team.link(1)
         )));
     }
-    let mut blocked =
-        Blocked { team, radius, pitch: from, locks: false, deepest: None, shown: None, shallow: SHALLOW, intervals: 0 };
+    let mut blocked = Blocked {
+        team,
+        radius,
+        pitch: from,
+        locks: false,
+        deepest: None,
+        shown: None,
+        shallow: SHALLOW,
+        intervals: 0,
+        lines: keeps.then(Vec::new),
+    };
     let reaches = |pitch: f64, progress: &mut dyn FnMut(f64)| reaches(team, pitch, radius, MOST_STEPS, progress);
-    let mut value_hi = None;
+    let (mut value_hi, mut reached) = (None, None);
     let mut next = from;
     for _ in 0..MOST_PROPOSALS {
         // The more turns fit into the radius, the longer the way.
         let proposed = propose(next, greatest, &mut |pitch| progress(0.3 * (1.0 - (-0.3 * pitch / from).exp())));
-        if proposed == Some(from) && reaches(from, progress) {
+        if proposed == Some(from) && reaches(from, progress).is_some() {
             return Err(PlanError(format!(
                 "the team reaches {radius} m with a pitch of {from} m already, the least that is tested: it is too \
                  short to meet itself before"
@@ -121,20 +175,24 @@ fn decided(
         }
         // Boards that come free before the proposed pitch may be the answer.
         let upper = proposed.filter(|_| done).map_or(blocked.pitch + WIDTH, |pitch| pitch + BESIDE);
-        if reaches(upper, &mut |share| progress(0.8 + 0.2 * share)) {
+        reached = reaches(upper, &mut |share| progress(0.8 + 0.2 * share));
+        if reached.is_some() {
             value_hi = Some(upper);
             break;
         }
         if !done {
             // A pitch that reaches the radius, further from the lower number than requested.
-            value_hi = proposed.map(|pitch| pitch + BESIDE).filter(|pitch| reaches(*pitch, progress));
+            let further = proposed.map(|pitch| pitch + BESIDE);
+            reached = further.and_then(|pitch| reaches(pitch, progress));
+            value_hi = further.filter(|_| reached.is_some());
             break;
         }
         next = upper;
     }
-    let Blocked { pitch: value_lo, intervals, shown: overlap, .. } = blocked;
+    let Blocked { pitch: value_lo, intervals, shown: overlap, lines, .. } = blocked;
     let proved = intervals > 0 && value_hi.is_some_and(|value_hi| value_hi - value_lo <= 1e-9);
-    Ok(LeastPitch { value_lo, value_hi, from, overlap, proved, intervals })
+    let proof = Proof { intervals: lines.unwrap_or_default(), reached };
+    Ok((LeastPitch { value_lo, value_hi, from, overlap, proved, intervals }, proof))
 }
 
 /// Two boards that overlap at a pitch, their depth, and the head's distance from the centre in metres.
@@ -160,6 +218,14 @@ struct Blocked<'a> {
     /// Share of its first depth below which the overlap is shallow.
     shallow: f64,
     intervals: u64,
+    /// A line for each interval, if they are kept.
+    lines: Option<Vec<CertificateLine<'static>>>,
+}
+
+/// The proof for an interval of pitches.
+enum Shown {
+    Lock,
+    Overlap { theta: f64, benches: [usize; 2], spans: Vec<Span>, point: [f64; 2] },
 }
 
 impl Blocked<'_> {
@@ -169,22 +235,34 @@ impl Blocked<'_> {
         let mut width = FIRST_SHARE * from;
         while self.pitch < to && self.intervals < MOST_INTERVALS {
             width = width.min(to - self.pitch);
-            if !self.holds(width) {
+            let mut proof = self.holds(width);
+            if proof.is_none() {
                 if !self.follow() {
                     break;
                 }
-                while width > LEAST_SHARE * self.pitch && !self.holds(width) {
+                while width > LEAST_SHARE * self.pitch {
+                    proof = self.holds(width);
+                    if proof.is_some() {
+                        break;
+                    }
                     width *= 0.5;
                 }
-                if width <= LEAST_SHARE * self.pitch {
-                    break;
-                }
             }
+            let Some(proof) = proof else { break };
             let next = (self.pitch + width).min(to);
             self.shown = self.deepest.filter(|_| !self.locks).map(|Deepest { pair, head_radius, .. }| {
                 // The polar angle holds for all pitches of the interval.
                 Overlap { bench_a: pair.0, bench_b: pair.1, head_radius: head_radius * next / self.pitch }
             });
+            if let Some(lines) = &mut self.lines {
+                let (from, to) = (self.pitch, next);
+                lines.push(match proof {
+                    Shown::Lock => CertificateLine::HeadLocks { from, to },
+                    Shown::Overlap { theta, benches, spans, point } => {
+                        CertificateLine::Overlap { from, to, theta, benches, spans, point }
+                    }
+                });
+            }
             self.pitch = next;
             width *= GROWTH;
             self.intervals += 1;
@@ -192,18 +270,19 @@ impl Blocked<'_> {
         }
     }
 
-    /// Returns true if, for all pitches up to `width` further on, the two boards are proved to overlap, or the head's
-    /// link to lock.
-    fn holds(&self, width: f64) -> bool {
+    /// Returns the proof, if there is one, that the two boards overlap or the head's link locks for all pitches up to
+    /// `width` further on.
+    fn holds(&self, width: f64) -> Option<Shown> {
         let (from, to) = (self.pitch, self.pitch + width);
         if self.locks {
-            return head_locks(self.team, (from, to), self.radius);
+            return head_locks(self.team, (from, to), self.radius).then_some(Shown::Lock);
         }
-        let Some(deepest) = self.deepest else { return false };
+        let deepest = self.deepest?;
         let theta = deepest.head_radius * TAU / from;
         let benches = [deepest.pair.0 as usize, deepest.pair.1 as usize];
         let pitches = Pitches { team: self.team, from, to, theta, benches };
-        pitches.are_outside(self.radius) && pitches.all_overlap()
+        let (spans, point) = pitches.are_outside(self.radius).then(|| pitches.overlap())??;
+        Some(Shown::Overlap { theta, benches, spans, point })
     }
 
     /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds

@@ -3,8 +3,11 @@
 //! In: a scene, its events, a limit. Out: two speeds that enclose the greatest one, proved. See "Lemma 7" in
 //! `docs/proofs.md`.
 
+use std::io;
+
 use super::PlanError;
-use crate::speed::{GreatestRatio, greatest_ratio};
+use crate::clearance::Write;
+use crate::speed::{GreatestRatio, certify_greatest_ratio, greatest_ratio};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
@@ -50,6 +53,31 @@ pub fn greatest_speed(
     limit: f64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<GreatestSpeed, PlanError> {
+    let (end, tolerance) = asked(scene, timeline, limit)?;
+    Ok(answer(scene, limit, greatest_ratio(&scene.motion, end, tolerance, progress)))
+}
+
+/// Encloses the greatest speed as [`greatest_speed`] does, and writes a certificate. `text` is the scene's text. The
+/// search gives up after `most_handles`.
+///
+/// # Errors
+/// As [`greatest_speed`]; a line cannot be written, or the speed is not decided.
+pub fn certify_greatest_speed(
+    scene: &Scene,
+    timeline: &Timeline,
+    limit: f64,
+    text: &str,
+    most_handles: u64,
+    write: Write<'_>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<io::Result<GreatestSpeed>, PlanError> {
+    let (end, tolerance) = asked(scene, timeline, limit)?;
+    let found = certify_greatest_ratio(&scene.motion, end, (tolerance, limit), text, most_handles, write, progress);
+    Ok(found.map(|found| answer(scene, limit, found)))
+}
+
+/// Returns the metres that the head travels in the show, and the tolerance of the ratio.
+fn asked(scene: &Scene, timeline: &Timeline, limit: f64) -> Result<(f64, f64), PlanError> {
     let show_end = timeline.freeze(scene.stops_at_contact());
     if show_end.event.kind == EventKind::Lock {
         return Err(PlanError(format!(
@@ -58,10 +86,12 @@ pub fn greatest_speed(
         )));
     }
     // A little less, since the two speeds are rounded away from each other.
-    let tolerance = 0.999 * TOLERANCE / limit.clamp(1.0, LARGE);
-    let found = greatest_ratio(&scene.motion, show_end.event.travelled, tolerance, progress);
-    let GreatestRatio { handle, travelled, ratio, proved, steps, .. } = found;
+    Ok((show_end.event.travelled, 0.999 * TOLERANCE / limit.clamp(1.0, LARGE)))
+}
+
+fn answer(scene: &Scene, limit: f64, found: GreatestRatio) -> GreatestSpeed {
     let (value_lo, value_hi) = found.divide(limit);
+    let GreatestRatio { handle, travelled, ratio, proved, steps, .. } = found;
     let time = scene.motion.time_at(travelled);
-    Ok(GreatestSpeed { value_lo, value_hi, time, handle: handle as u32, ratio, proved, steps })
+    GreatestSpeed { value_lo, value_hi, time, handle: handle as u32, ratio, proved, steps }
 }

@@ -73,7 +73,7 @@ impl Speeds<'_> {
     }
 
     /// Returns true if no handle behind the last one can be faster than it.
-    fn is_enough(&self, handles: &[Spanned]) -> bool {
+    pub fn is_enough(&self, handles: &[Spanned]) -> bool {
         let (last, benches) = (handles.len() - 1, self.chain.team.benches);
         let Place(segment, at, _) = handles[last].span.1;
         if last == benches {

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::{Proved, Refused, verify};
 
-const SCENE: &str = r#"
+pub(super) const SCENE: &str = r#"
 [team]
 benches = 3
 head_length = 3.0
@@ -23,7 +23,7 @@ head_speed = 2.0
 "#;
 
 /// Returns the place `metres` from the start.
-fn place(metres: f64) -> Value {
+pub(super) fn place(metres: f64) -> Value {
     match metres {
         _ if metres < 0.0 => json!([0, metres]),
         _ if metres < 4.0 => json!([1, metres]),
@@ -32,17 +32,17 @@ fn place(metres: f64) -> Value {
 }
 
 /// Metres from the head back to handles 1, 2, 3, and the half width of each span.
-const BACK: [(f64, f64); 3] = [(2.5, 0.01), (4.5, 0.02), (6.5, 0.03)];
+pub(super) const BACK: [(f64, f64); 3] = [(2.5, 0.01), (4.5, 0.02), (6.5, 0.03)];
 
 /// Returns the step from `from` to `to`.
-fn step(from: f64, to: f64) -> Value {
+pub(super) fn step(from: f64, to: f64) -> Value {
     let spans: Vec<_> =
         BACK.iter().map(|(back, more)| json!([place(from - back - more), place(to - back + more)])).collect();
     json!({"type": "step", "links": "all", "from": place(from), "to": place(to), "moving": true, "clear": true,
         "spans": spans})
 }
 
-fn certificate() -> Vec<Value> {
+pub(super) fn certificate() -> Vec<Value> {
     let mut lines = vec![json!({"type": "certificate", "format": 2, "version": "0.1.0", "scene": SCENE})];
     let ends = [-0.5, 0.3, 1.3, 2.3, 3.3, 4.3, 5.3, 6.3, 7.3, 8.3, 9.3, 10.0];
     lines.extend(ends.windows(2).map(|ends| step(ends[0], ends[1])));
@@ -53,13 +53,13 @@ fn certificate() -> Vec<Value> {
     lines
 }
 
-fn check(lines: &[Value]) -> Result<Proved, Refused> {
+pub(super) fn check(lines: &[Value]) -> Result<Proved, Refused> {
     let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
     verify(text.as_bytes(), &mut |_| {})
 }
 
 #[track_caller]
-fn assert_refused(lines: &[Value], line: u64, says: &str) {
+pub(super) fn assert_refused(lines: &[Value], line: u64, says: &str) {
     match check(lines) {
         Ok(_) => panic!("accepted, expected: {says}"),
         Err(error) => {

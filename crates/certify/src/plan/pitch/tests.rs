@@ -9,7 +9,7 @@ const RADIUS: f64 = 0.18;
 /// Returns the result for a sequence of proposals, followed by none.
 fn with_proposals(proposals: &[f64]) -> LeastPitch {
     let mut proposals = proposals.iter().copied();
-    decided(&TEAM, RADIUS, &mut |_, _, _| proposals.next(), &mut |_| ()).unwrap()
+    decided(&TEAM, RADIUS, &mut |_, _, _| proposals.next(), false, &mut |_| ()).unwrap().0
 }
 
 #[test]

@@ -1,0 +1,99 @@
+//! The lines of a certificate of the least clearance, beside its steps. See "The file" in `docs/proofs.md`.
+
+use std::io;
+
+use super::{Descent, Finish, Upper, Write};
+use crate::capsule::Spanned;
+use crate::first_order::When;
+use crate::first_order_step::{FirstOrderStep, step_points};
+use crate::grid::GridPoint;
+use crate::interval::Interval;
+use crate::lines::{About, CertificateLine, CertifiedClearance, Links, Until};
+
+/// Metres that are added to an upper bound for the rounding of the checker.
+const SPARE: f64 = 1e-12;
+
+/// Writes the first line.
+pub(super) fn first_line(write: Write<'_>, scene: &str) -> io::Result<()> {
+    let (version, about) = (env!("CARGO_PKG_VERSION"), Some(About::LeastClearance));
+    write(&CertificateLine::Certificate { format: crate::FORMAT, version, about, scene })
+}
+
+impl Descent<'_, '_> {
+    /// Writes a line, unless there is no certificate or an earlier line could not be written.
+    pub(super) fn write(&mut self, line: &CertificateLine) {
+        if let (Some(write), None) = (&mut self.write, &self.failed) {
+            self.failed = write(line).err();
+        }
+    }
+
+    /// Writes that two boards overlap with the head at `point`, the end of the last step. Returns true if that is shown.
+    pub(super) fn write_contact(&mut self, point: &GridPoint, benches: [usize; 2]) -> bool {
+        let found = (self.chain.spans(&mut point.clone(), &mut point.clone(), benches[1] + 1))
+            .and_then(|handles| Some((self.chain.common_point(&handles, benches)?, handles)));
+        let Some((common, handles)) = found else { return false };
+        let (from, to) = (point.head, point.head);
+        self.write(&CertificateLine::Contact { benches, from, to, spans: spans_of(&handles), point: common });
+        true
+    }
+
+    /// Writes that two boards are near, at a place that the steps have come to. Returns the upper bound.
+    fn write_near(&mut self, Upper { head, travelled, benches, .. }: Upper) -> Option<f64> {
+        let (chain, (_, end)) = (&self.chain, self.shown?);
+        if !chain.exact.in_order(head[0], end) {
+            return None;
+        }
+        let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
+        let mut middle = from.clone();
+        let mut step = FirstOrderStep::new(chain, &step_points(&mut from, &mut middle, &mut to));
+        while step.listed.handles.len() <= benches[1] + 1 {
+            step.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
+        }
+        let [one, other] = benches.map(|bench| step.board(bench));
+        let most = one.at_most(&other, When::Always) + SPARE;
+        let (spans, at) = (spans_of(&step.listed.handles), step.places);
+        self.write(&CertificateLine::Near { benches, from: head[0], to: head[1], spans, at, most });
+        Some(most)
+    }
+
+    /// Writes the last lines.
+    ///
+    /// # Errors
+    /// A line cannot be written.
+    pub(super) fn write_result(mut self, head_speed: f64) -> io::Result<()> {
+        let near = self.upper.filter(|_| !matches!(self.finish, Some(Finish::Contact(_))));
+        let hi = near.and_then(|upper| self.write_near(upper));
+        let benches = near.filter(|_| hi.is_some()).map(|upper| upper.benches);
+        let mut result = CertifiedClearance {
+            lo: self.shown.map(|(least, _)| least),
+            hi,
+            until: Until::Time,
+            time_until: None,
+            bench_a: benches.map(|benches| benches[0]),
+            bench_b: benches.map(|benches| benches[1]),
+        };
+        match self.finish {
+            Some(Finish::PathEnd) => {
+                self.write(&CertificateLine::PathEnd);
+                result.until = Until::PathEnd;
+            }
+            Some(Finish::Contact([bench_a, bench_b])) => {
+                let benches = (Some(bench_a), Some(bench_b));
+                (result.lo, result.hi, (result.bench_a, result.bench_b)) = (Some(0.0), Some(0.0), benches);
+                result.until = Until::Contact;
+            }
+            None => {
+                let time = self.shown.map_or(0.0, |(_, end)| {
+                    (self.chain.exact.travelled(end).over(Interval::point(head_speed)) * (1.0 - 1e-14)).lo
+                });
+                result.time_until = Some(time.max(0.0));
+            }
+        }
+        self.write(&CertificateLine::LeastClearance(result));
+        self.failed.map_or(Ok(()), Err)
+    }
+}
+
+fn spans_of(handles: &[Spanned]) -> Vec<crate::Span> {
+    handles[1..].iter().map(|handle| handle.span).collect()
+}

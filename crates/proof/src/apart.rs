@@ -1,0 +1,77 @@
+//! Boards that are further apart than a number of metres over a step: Lemma 6 of docs/proofs.md.
+
+use super::boards::Board;
+use super::chain::Chain;
+use super::first_order::{FirstOrder, FirstOrderBoard, When};
+use super::interval::Interval;
+use super::lines::Links;
+use super::path::{Place, Span};
+use super::scene::Scene;
+use super::steps::{check_ring, straight_run};
+
+/// Checks that no two boards that share no handle are as near as `metres`. A step of the front links concerns only the
+/// pairs with boards 0 and 1. `at` has a place of each listed handle's span. Returns the number of pairs.
+///
+/// # Errors
+/// The pair that does not follow.
+pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, at: &[Place], metres: f64) -> Result<u64, String> {
+    let team = &scene.team;
+    let step = FirstOrder::new(scene, chain, at)?;
+    let metres = Interval::new(metres);
+    let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
+        .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
+        .collect();
+    let first_order: Vec<FirstOrderBoard> = (0..boards.len()).map(|bench| step.board(bench, team)).collect();
+    let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
+    let far = metres.max(&Interval::new(0.0));
+    let mut pairs = 0;
+    for a in 0..about {
+        for b in a + 2..boards.len() {
+            let when = if are_on_one_circle(scene, chain, a, b) { When::Middle } else { When::Always };
+            let is_apart = boards[a].is_clearly_apart_by(&metres, &boards[b])
+                || boards[a].is_apart_by(&metres, &boards[b])
+                || first_order[a].is_apart_by(&metres, &first_order[b], when)
+                || boards[a].is_apart_somehow(&metres, &boards[b])
+                || check_ring(scene, chain, a..a + 1, b, &far).is_ok();
+            if !is_apart {
+                return Err(format!("benches {a} and {b} may be nearer than it says (Lemma 6)"));
+            }
+            pairs += 1;
+        }
+    }
+    if chain.last() == team.benches {
+        return Ok(pairs);
+    }
+    if !chain.ends_on_line(scene) {
+        // Only a step of the front links gets here.
+        check_ring(scene, chain, 0..2, chain.last(), &far)?;
+        return Ok(pairs + about as u64);
+    }
+    for a in 0..about {
+        let first = chain.last().max(a + 2);
+        if first >= team.benches {
+            continue;
+        }
+        let (front, rear, length) = straight_run(scene, chain, first);
+        let run = Board::new(&front, &rear, length, team);
+        let is_apart = boards[a].is_clearly_apart_by(&metres, &run)
+            || boards[a].is_apart_by(&metres, &run)
+            || first_order[a].is_apart_by(&metres, &step.straight_run(first, team), When::Always)
+            || boards[a].is_apart_somehow(&metres, &run);
+        if !is_apart {
+            return Err(format!("bench {a} may be nearer to one on the line than it says (Lemmas 3 and 6)"));
+        }
+        pairs += 1;
+    }
+    // Boards on the line among themselves.
+    if links == Links::All && !metres.is_below(&(team.link(1) - team.hole_inset - team.hole_inset)) {
+        return Err("benches on a line may be nearer than it says (Lemma 3)".to_owned());
+    }
+    Ok(pairs)
+}
+
+/// Returns true if all handles of two boards, and the handles between, stay on one arc (Lemma 6, *Rigid*).
+fn are_on_one_circle(scene: &Scene, chain: &Chain, a: usize, b: usize) -> bool {
+    let (Span(_, latest), Span(earliest, _)) = (chain.capsules[a].span, chain.capsules[b + 1].span);
+    latest.0 == earliest.0 && scene.path.is_arc(latest.0)
+}

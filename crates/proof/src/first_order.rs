@@ -1,0 +1,293 @@
+//! First-order enclosures of handles and boards over a step of the head: Lemma 6 of docs/proofs.md.
+//!
+//! tau is the head's distance in metres from the place m_0, at most `half_step`. Doubles choose the directions in which
+//! two boards may be apart; intervals prove it.
+
+use super::capsule::{Capsule, Pair};
+use super::chain::{Chain, span_is_one};
+use super::interval::{Interval, Vector};
+use super::path::{At, Place, Span};
+use super::scene::{Scene, Team};
+use super::sides::Sides;
+
+/// Number of times that the products of a link are enclosed again from the enclosure of its rear handle.
+const ROUNDS: usize = 3;
+/// Limit of directions tried for a pair, the best first.
+const MOST_TRIES: usize = 4;
+
+/// A handle: `point` + tau `velocity`, and an error.
+#[derive(Debug, Clone)]
+pub(super) struct Handle {
+    /// p(m), t(m).
+    pub point: Vector,
+    pub tangent: Vector,
+    /// K of the handle's span.
+    curvature: Interval,
+    /// P: metres of the handle per metre of the head, anywhere in the step.
+    pub rate: Interval,
+    velocity: Vector,
+    /// d: an upper bound of the metres from m to the handle at tau = 0.
+    pub offset: Interval,
+    /// Upper bounds of the error at tau = 0 and anywhere in the step.
+    still: Interval,
+    error: Interval,
+}
+
+/// The moments of a step for which a statement holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum When {
+    /// tau = 0.
+    Middle,
+    Always,
+}
+
+/// The listed handles over a step.
+pub(super) struct FirstOrder {
+    pub handles: Vec<Handle>,
+    /// Upper bound of |tau|.
+    pub half_step: Interval,
+}
+
+impl FirstOrder {
+    /// Encloses the listed handles of a chain. `at` has a place of each handle's span, the head's first.
+    ///
+    /// # Errors
+    /// A place that is missing or not in its span.
+    pub fn new(scene: &Scene, chain: &Chain, at: &[Place]) -> Result<Self, String> {
+        let path = &scene.path;
+        if at.len() != chain.capsules.len() {
+            return Err(format!("{} places in `at`, expected {}", at.len(), chain.capsules.len()));
+        }
+        for (handle, (place, capsule)) in at.iter().zip(&chain.capsules).enumerate() {
+            span_is_one(scene, Span(*place, *place))
+                .map_err(|problem| format!("`at` of handle {handle}: {problem}"))?;
+            let Span(lo, hi) = capsule.span;
+            if !(path.in_order(lo, *place) && path.in_order(*place, hi)) {
+                return Err(format!("`at` of handle {handle} is not in the handle's span"));
+            }
+        }
+        let Span(from, to) = chain.capsules[0].span;
+        let half_step = path.metres_bound(from, at[0]).max(&path.metres_bound(at[0], to));
+        let zero = Interval::new(0.0);
+        let mut handles = vec![Handle::new(path.at(at[0]), &chain.capsules[0], Interval::new(1.0), zero, &half_step)];
+        for (index, pair) in chain.capsules.windows(2).enumerate() {
+            let point = path.at(at[index + 1]);
+            let front = &handles[index];
+            handles.push(front.follower(point, (&pair[0], &pair[1]), scene.team.link(index), &half_step));
+        }
+        Ok(Self { handles, half_step })
+    }
+
+    /// Returns the board of a bench.
+    pub fn board(&self, bench: usize, team: &Team) -> FirstOrderBoard {
+        let (front, rear) = (&self.handles[bench], &self.handles[bench + 1]);
+        FirstOrderBoard::new(front.clone(), rear.clone(), *team.link(bench), self.half_step, team)
+    }
+
+    /// Returns the boards from `first` to the last as one, where the last listed handle is on segment 0, a line.
+    pub fn straight_run(&self, first: usize, team: &Team) -> FirstOrderBoard {
+        let last = self.handles.len() - 1;
+        let front = if first == last {
+            self.handles[last].clone()
+        } else {
+            self.handles[last].behind(&team.links(last, first - 1))
+        };
+        let length = team.links(first, team.benches - 1);
+        FirstOrderBoard::new(front.clone(), front.behind(&length), length, self.half_step, team)
+    }
+}
+
+impl Handle {
+    fn new(
+        At { point, tangent }: At,
+        capsule: &Capsule,
+        rate: Interval,
+        offset: Interval,
+        half_step: &Interval,
+    ) -> Self {
+        let curvature = capsule.curvature;
+        let zero = Interval::new(0.0);
+        let handle = Self { point, tangent, curvature, rate, velocity: tangent, offset, still: zero, error: zero };
+        handle.with_rate(rate, half_step)
+    }
+
+    /// Returns the handle with another enclosure of P.
+    fn with_rate(self, rate: Interval, half_step: &Interval) -> Self {
+        let middle = Interval::new(rate.rough());
+        let uneven = (rate - middle).abs();
+        let bend = |metres: Interval| self.curvature * metres.square() * Interval::new(0.5);
+        let still = (self.offset + bend(self.offset)).upper();
+        let error = (self.offset + half_step * uneven + bend(self.offset + half_step * rate.abs())).upper();
+        Self { rate, velocity: self.tangent.scaled(&middle), still, error, ..self }
+    }
+
+    /// Returns the next handle, near the place with this point and tangent at tau = 0.
+    fn follower(&self, at: At, (front, rear): (&Capsule, &Capsule), link: &Interval, half_step: &Interval) -> Self {
+        let pair = Pair::new(front, rear);
+        let (mut f, mut g) = (pair.front_product(), pair.rear_product());
+        let miss = (self.point.minus(&at.point).norm_squared() - link.square()).abs() * Interval::new(0.5);
+        let offset = ((miss + f.abs() * self.offset) / g).upper();
+        let mut rear = Self::new(at, rear, self.rate * (f / g), offset, half_step);
+        for _ in 0..ROUNDS {
+            f = f.meet(&self.product(self, &rear, link, half_step));
+            g = g.meet(&rear.product(self, &rear, link, half_step));
+            rear = rear.with_rate(self.rate * (f / g), half_step);
+        }
+        rear
+    }
+
+    /// Returns t . (front - rear) over the step, t the tangent at this handle, which is one of the two.
+    fn product(&self, front: &Self, rear: &Self, link: &Interval, half_step: &Interval) -> Interval {
+        let (at, by) = (front.point.minus(&rear.point), front.velocity.minus(&rear.velocity));
+        let error = front.error + rear.error;
+        let tau = half_step.around_zero();
+        let turn = self.turn(half_step);
+        let aside = (self.tangent.cross(&at) + self.tangent.cross(&by) * tau).abs() + error;
+        let slack = error + turn * aside + turn.square() * link * Interval::new(0.5);
+        self.tangent.dot(&at) + self.tangent.dot(&by) * tau + slack.around_zero()
+    }
+
+    /// Returns b: an upper bound of the angle between the handle's tangent and t(m).
+    pub fn turn(&self, half_step: &Interval) -> Interval {
+        self.curvature * (self.offset + half_step * self.rate.abs())
+    }
+
+    /// Returns the handle moved back on its straight line.
+    fn behind(&self, metres: &Interval) -> Self {
+        Self { point: self.point.minus(&self.tangent.scaled(metres)), ..self.clone() }
+    }
+
+    fn error(&self, when: When) -> Interval {
+        if when == When::Middle { self.still } else { self.error }
+    }
+}
+
+/// A vector `at` + tau `by`, and an error.
+struct Linear {
+    at: Vector,
+    by: Vector,
+    error: Interval,
+}
+
+/// A direction fixed to a board: its parts along the board and to the left.
+type Direction = [f64; 2];
+
+const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+const SIDES: [Direction; 4] = [[0.0, 1.0], [0.0, -1.0], [1.0, 0.0], [-1.0, 0.0]];
+
+/// A board, or a run of boards on one straight line, over a step.
+pub(super) struct FirstOrderBoard {
+    front: Handle,
+    rear: Handle,
+    link: Interval,
+    half_length: Interval,
+    half_width: Interval,
+    half_step: Interval,
+    sides: Sides,
+}
+
+impl FirstOrderBoard {
+    fn new(front: Handle, rear: Handle, link: Interval, half_step: Interval, team: &Team) -> Self {
+        let half = Interval::new(0.5);
+        let (half_length, half_width) = (link * half + team.hole_inset, team.width * half);
+        let rough = |handle: &Handle| [handle.point.x.rough(), handle.point.y.rough()];
+        let sides = Sides::new(rough(&front), rough(&rear), half_length.rough(), half_width.rough());
+        Self { front, rear, link, half_length, half_width, half_step, sides }
+    }
+
+    /// Returns u, the vector from the rear to the front handle.
+    fn along(&self, when: When) -> Linear {
+        let (front, rear) = (&self.front, &self.rear);
+        let error = front.error(when) + rear.error(when);
+        Linear { at: front.point.minus(&rear.point), by: front.velocity.minus(&rear.velocity), error }
+    }
+
+    /// Returns w, the vector to a corner from the middle between the handles of another board.
+    fn corner(&self, [ahead, left]: [f64; 2], seen_from: &Self, when: When) -> Linear {
+        let along = self.along(when);
+        let share = self.half_length / self.link * Interval::new(ahead);
+        let aside = self.half_width / self.link * Interval::new(left);
+        let half = Interval::new(0.5);
+        let of = |front: &Vector, rear: &Vector, along: &Vector, own_front: &Vector, own_rear: &Vector| {
+            let middle = front.plus(rear).minus(own_front).minus(own_rear).scaled(&half);
+            middle.plus(&along.scaled(&share)).plus(&along.turned_left().scaled(&aside))
+        };
+        let ((front, rear), (own_front, own_rear)) = ((&self.front, &self.rear), (&seen_from.front, &seen_from.rear));
+        let error = (half + share).abs() * front.error(when)
+            + (half - share).abs() * rear.error(when)
+            + aside.abs() * along.error
+            + half * (own_front.error(when) + own_rear.error(when));
+        Linear {
+            at: of(&front.point, &rear.point, &along.at, &own_front.point, &own_rear.point),
+            by: of(&front.velocity, &rear.velocity, &along.by, &own_front.velocity, &own_rear.velocity),
+            error,
+        }
+    }
+
+    /// Returns the gap between this board and another along a direction fixed to this board.
+    fn gap(&self, other: &Self, direction: Direction, when: When) -> Interval {
+        let [ahead, left] = direction.map(Interval::new);
+        let size = Vector { x: ahead, y: left }.norm();
+        let Linear { at, by, error } = self.along(when);
+        let turned = |along: Vector| along.scaled(&ahead).plus(&along.turned_left().scaled(&left));
+        let normal = Linear { at: turned(at), by: turned(by), error: error * size };
+        let half_step = if when == When::Middle { Interval::new(0.0) } else { self.half_step };
+        let tau = half_step.around_zero();
+        let tau_squared = Interval::new(0.0).hull(&half_step.square());
+        let reach = |corner: [f64; 2]| {
+            let Linear { at, by, error } = other.corner(corner, self, when);
+            let far = at.norm() + by.norm() * half_step + error;
+            let slack = normal.error * far + (self.link * size + normal.error) * error;
+            normal.at.dot(&at)
+                + (normal.at.dot(&by) + normal.by.dot(&at)) * tau
+                + normal.by.dot(&by) * tau_squared
+                + slack.around_zero()
+        };
+        let least = CORNERS.map(reach).into_iter().reduce(|least, next| least.min(&next)).unwrap_or(size);
+        let support = self.half_length * ahead.abs() + self.half_width * left.abs();
+        (least / self.link - support) / size
+    }
+
+    /// Returns true if the gap between two boards is shown to be more than `metres`.
+    pub fn is_apart_by(&self, metres: &Interval, other: &Self, when: When) -> bool {
+        let mut tries: Vec<(f64, bool, Direction)> = Vec::with_capacity(10);
+        let mut add = |is_own: bool, direction: Direction| {
+            let (own, its) = if is_own { (&self.sides, &other.sides) } else { (&other.sides, &self.sides) };
+            tries.push((own.gap(its, direction), is_own, direction));
+        };
+        for is_own in [true, false] {
+            SIDES.iter().for_each(|direction| add(is_own, *direction));
+        }
+        // A direction that is fixed to the one board may serve where the same direction, fixed to the other, does not.
+        let between = self.sides.to_nearest(&other.sides);
+        add(true, self.sides.seen(between));
+        add(false, other.sides.seen(between.map(std::ops::Neg::neg)));
+        tries.sort_by(|a, b| b.0.total_cmp(&a.0));
+        tries.iter().take(MOST_TRIES).any(|(_, is_own, direction)| {
+            let (own, its) = if *is_own { (self, other) } else { (other, self) };
+            metres.is_below(&own.gap(its, *direction, when))
+        })
+    }
+
+    /// Returns an upper bound of the clearance of two boards throughout the step (Lemma 6, *From above*).
+    pub fn at_most(&self, other: &Self) -> Interval {
+        let of_sides = |own: &Self, its: &Self| SIDES.map(|direction| own.gap(its, direction, When::Always));
+        let gaps = of_sides(self, other).into_iter().chain(of_sides(other, self));
+        let greatest = gaps.reduce(|most, next| most.max(&next)).unwrap_or_else(|| Interval::new(0.0)).upper();
+        if !greatest.is_positive() {
+            return greatest;
+        }
+        let distance = |own: &Self, its: &Self| {
+            // The corner and the point of a side that are nearest by doubles.
+            let (corner, side, share) = own.sides.nearest_point(&its.sides);
+            let point = own.corner(CORNERS[corner], own, When::Always);
+            let [one, next] = [side, (side + 1) % 4].map(|end| its.corner(CORNERS[end], own, When::Always));
+            let share = Interval::new(share);
+            let by =
+                |one: Vector, next: Vector, point: Vector| one.plus(&next.minus(&one).scaled(&share)).minus(&point);
+            let (at, moved) = (by(one.at, next.at, point.at), by(one.by, next.by, point.by));
+            (at.norm() + moved.norm() * self.half_step + one.error.max(&next.error) + point.error).upper()
+        };
+        distance(self, other).min(&distance(other, self))
+    }
+}

@@ -1,0 +1,92 @@
+//! The rules of a certificate of the greatest speed: the file's lines for Lemma 7 of docs/proofs.md.
+
+use super::chain::span_is_one;
+use super::interval::Interval;
+use super::lines::ProvedSpeed;
+use super::path::{Place, Span};
+use super::scene::Scene;
+use super::speeds::Speeds;
+
+/// The consequences of the lines so far.
+#[derive(Default)]
+pub(super) struct Greatest {
+    /// The end of the last step, and a number that no ratio exceeds up to there.
+    pub so_far: Option<(Place, Interval)>,
+    /// A handle and its ratio at a place of the motion.
+    fast: Option<(usize, Interval)>,
+    /// Counts for the report.
+    pub steps: u64,
+    pub links: u64,
+}
+
+impl Greatest {
+    /// Checks and adds a step of the head.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn add_step(&mut self, scene: &Scene, head: Span, spans: &[Span], at: &[Place]) -> Result<(), String> {
+        let Span(from, to) = head;
+        span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
+        match self.so_far {
+            Some((end, _)) if end != from => return Err("it does not begin where the step before it ended".to_owned()),
+            None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
+                return Err("the first step begins beyond the start".to_owned());
+            }
+            _ => {}
+        }
+        let (Speeds { most, .. }, links) = Speeds::new(scene, head, spans, at)?;
+        let most = self.so_far.map_or(most, |(_, before)| before.max(&most));
+        self.so_far = Some((to, most));
+        self.steps += 1;
+        self.links += links;
+        Ok(())
+    }
+
+    /// Checks and adds the ratio of a handle with the head at a place.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn add_fast(&mut self, scene: &Scene, handle: usize, spans: &[Span], at: &[Place]) -> Result<(), String> {
+        let Some(&head) = at.first() else { return Err("no place is listed".to_owned()) };
+        span_is_one(scene, Span(head, head)).map_err(|problem| format!("the head: {problem}"))?;
+        if !Interval::new(0.0).is_at_most(&scene.path.travelled(head)) {
+            return Err("the head has not come to the start".to_owned());
+        }
+        if !self.so_far.is_some_and(|(end, _)| scene.path.in_order(head, end)) {
+            return Err("no step has come there".to_owned());
+        }
+        let (Speeds { at_place, .. }, _) = Speeds::new(scene, Span(head, head), spans, at)?;
+        let ratio = at_place.get(handle).ok_or_else(|| format!("handle {handle} is not listed"))?;
+        self.fast = Some((handle, ratio.abs()));
+        Ok(())
+    }
+
+    /// Checks the result.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn check(&self, scene: &Scene, outcome: &ProvedSpeed) -> Result<(), String> {
+        let ProvedSpeed { limit, value_lo, value_hi, ratio_lo, ratio_hi, handle, time_until } = *outcome;
+        let [limit, value_lo, value_hi, ratio_lo, ratio_hi, until] =
+            [limit, value_lo, value_hi, ratio_lo, ratio_hi, time_until].map(Interval::new);
+        let zero = Interval::new(0.0);
+        let Some((end, most)) = self.so_far else { return Err("no step precedes it".to_owned()) };
+        if !(zero.is_at_most(&until) && (until * scene.head_speed).is_at_most(&scene.path.travelled(end))) {
+            return Err("time_until does not follow".to_owned());
+        }
+        if !most.is_at_most(&ratio_hi) {
+            return Err("ratio_hi does not follow".to_owned());
+        }
+        let fastest = if handle == 0 { Some((0, Interval::new(1.0))) } else { self.fast };
+        if !fastest.is_some_and(|(fastest, ratio)| fastest == handle && ratio_lo.is_at_most(&ratio)) {
+            return Err("ratio_lo of this handle does not follow".to_owned());
+        }
+        if !(zero.is_at_most(&value_lo) && (value_lo * ratio_hi).is_at_most(&limit)) {
+            return Err("value_lo does not follow from limit and ratio_hi".to_owned());
+        }
+        if !(ratio_lo.is_positive() && limit.is_at_most(&(value_hi * ratio_lo))) {
+            return Err("value_hi does not follow from limit and ratio_lo".to_owned());
+        }
+        Ok(())
+    }
+}

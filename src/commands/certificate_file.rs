@@ -1,0 +1,39 @@
+//! The file of a certificate that a command writes with `--certify`.
+
+use std::io::{self, BufWriter, Write as _};
+use std::path::Path;
+
+use bench_dragon::certify::CertificateLine;
+
+use super::CommandError;
+use super::new_file::NewFile;
+
+/// A certificate that is being written.
+pub struct CertificateFile(BufWriter<NewFile>);
+
+impl CertificateFile {
+    /// Creates the file.
+    ///
+    /// # Errors
+    /// Bad input: the file cannot be written.
+    pub fn create(file: &Path) -> Result<Self, CommandError> {
+        Ok(Self(BufWriter::new(NewFile::create(file)?)))
+    }
+
+    /// Writes a line.
+    ///
+    /// # Errors
+    /// The line cannot be written.
+    pub fn write(&mut self, line: &CertificateLine) -> io::Result<()> {
+        serde_json::to_writer(&mut self.0, line).map_err(io::Error::from)?;
+        self.0.write_all(b"\n")
+    }
+
+    /// Completes the file under its name.
+    ///
+    /// # Errors
+    /// Failed: the disk is full, or the folder has changed.
+    pub fn finish(self) -> Result<(), CommandError> {
+        self.0.into_inner().map_err(io::Error::from)?.finish()
+    }
+}
