@@ -7,16 +7,20 @@ use std::path::{Path, PathBuf};
 use bench_dragon::certify::{ClearanceEnclosure, MOST_CLEARANCE_STEPS, enclose_least_clearance};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::Motion;
+use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon::motion::model::spiral::Direction;
 use bench_dragon::motion::solve::Velocities;
-use bench_dragon::motion::timeline::{TimedClearance, TimedEvent};
-use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
+use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene, printable};
 use serde::Serialize;
 
-use super::events::{find_least_clearance, least_clearance, sentence};
+use super::events::{bench_name, find_least_clearance, least_clearance, sentence};
 use super::verify::certificate::proved_of;
-use super::{CommandError, Common, Output, expect_exact_motion, figure, number, progress_bar, search_timeline};
+use super::{
+    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, figure, number, progress_bar,
+    search_timeline,
+};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -57,6 +61,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         output.json(&clearance_line(&scene, found, enclosure))?;
         return output.finish();
     }
+    if common.json {
+        return print_lines(&scene, &timeline, common, output);
+    }
     let team = scene.team();
     output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
     output.line(&format!(
@@ -77,6 +84,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             number(origin.x),
             number(origin.y)
         ))?;
+    }
+    if !scene.motion.ground().is_empty() {
+        output.line(&format!("  Stage: {}.", ground(&scene)))?;
     }
     let choice = scene.motion.solver(scene.velocities);
     output.line(&format!("  Solver: {}.", choice.reason))?;
@@ -130,6 +140,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     let (found, freeze) = find_least_clearance(&scene, &timeline, common);
     output.line(&format!("  {}", least_clearance(&scene, found)))?;
+    for least in obstacle_clearances(&scene, freeze, common) {
+        output.line(&format!("  {}", obstacle_sentence(&scene, &timeline, &least)))?;
+    }
     if arguments.prove {
         let enclosure = enclosed(&scene, found, freeze, common)?;
         output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
@@ -143,7 +156,85 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
+    if timeline.find(EventKind::Obstacle).is_some_and(|touch| touch.time == 0.0) {
+        log::warn!("a board is within the keep-out of an obstacle at the start of scene \"{}\"", scene.name);
+    }
     output.finish()
+}
+
+/// A line of `check --json`: the least clearance of two boards.
+#[derive(Serialize)]
+struct LeastClearanceLine {
+    check: &'static str,
+    clearance: Option<f64>,
+    time: Option<f64>,
+    bench_a: Option<u32>,
+    bench_b: Option<u32>,
+}
+
+/// A line of `check --json`: the least clearance of an obstacle.
+#[derive(Serialize)]
+struct ObstacleLine<'a> {
+    check: &'static str,
+    obstacle: &'a str,
+    clearance: f64,
+    time: f64,
+    bench: u32,
+}
+
+/// Prints the least clearances of the show as JSON lines.
+fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: Output) -> Result<(), CommandError> {
+    let (found, freeze) = find_least_clearance(scene, timeline, common);
+    output.json(&LeastClearanceLine {
+        check: "clearance",
+        clearance: found.map(|found| found.least.value),
+        time: found.map(|found| found.time),
+        bench_a: found.map(|found| found.least.bench_a),
+        bench_b: found.map(|found| found.least.bench_b),
+    })?;
+    for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, freeze, common) {
+        let obstacle = &scene.motion.ground().obstacles()[obstacle].name;
+        let (check, clearance, bench) = ("obstacle", least.value, least.bench);
+        output.json(&ObstacleLine { check, obstacle, clearance, time, bench })?;
+    }
+    output.finish()
+}
+
+/// Searches for the least clearance of each obstacle over the whole show.
+fn obstacle_clearances(scene: &Scene, freeze: &TimedEvent, common: &Common) -> Vec<TimedObstacleClearance> {
+    let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
+    let found = scene.motion.obstacle_clearances(freeze, &mut |share| bar.set_position((1000.0 * share) as u64));
+    bar.finish_and_clear();
+    found
+}
+
+/// Returns a sentence for people on the least clearance of an obstacle, and on its first touch.
+fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleClearance) -> String {
+    let TimedObstacleClearance { obstacle, least, time, searched_until } = *found;
+    let Obstacle { name, keep_out, .. } = &scene.motion.ground().obstacles()[obstacle];
+    let (value, at, bench) = (figure(least.value), figure(time), bench_name(scene, least.bench));
+    let up_to = searched_until
+        .map_or(String::new(), |until| format!(" up to t = {} s, where the search gave up", figure(until)));
+    let beyond = if *keep_out > 0.0 { format!(" beyond its keep-out of {keep_out} m") } else { String::new() };
+    let number = Some(scene.motion.obstacle_number(obstacle));
+    let first = timeline.events().iter().find(|timed| timed.event.bench_b == number);
+    let first = first.map_or(String::new(), |timed| format!(" First met at t = {} s.", figure(timed.time)));
+    format!(
+        "The least clearance of the {}{beyond}{up_to} is {value} m, at t = {at} s, of {bench} (counting from 1).{first}",
+        printable(name)
+    )
+}
+
+/// Describes the obstacles in words.
+fn ground(scene: &Scene) -> String {
+    let ground = scene.motion.ground();
+    let obstacles = ground.obstacles().len() - usize::from(ground.has_boundary());
+    let counted = match obstacles {
+        0 => "no obstacle".to_owned(),
+        1 => "1 obstacle".to_owned(),
+        count => format!("{count} obstacles"),
+    };
+    if ground.has_boundary() { format!("{counted} and a boundary") } else { counted }
 }
 
 /// Encloses the least clearance between two numbers, if it can be proved.
@@ -154,6 +245,7 @@ fn enclosed(
     common: &Common,
 ) -> Result<Option<ClearanceEnclosure>, CommandError> {
     expect_exact_motion(scene)?;
+    expect_empty_ground(scene)?;
     let bar = progress_bar(1000, common).with_message("proving the least clearance");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let enclosure = found.and_then(|found| {

@@ -4,6 +4,7 @@ mod bad_input;
 mod certify;
 mod draw;
 mod files;
+mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;

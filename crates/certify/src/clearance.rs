@@ -82,6 +82,7 @@ pub fn enclose_least_clearance(
             let target = path_end(&chain.exact, path);
             Descent::new(chain, event.travelled - slack, most_steps).least(hint, &target, progress)
         }
+        EventKind::Obstacle => None,
         EventKind::Stall | EventKind::Lock => {
             let end = event.travelled - slack.max(BEFORE_LOCK[0]);
             (end > 0.0).then(|| Descent::new(chain, end, most_steps).least_until_lock(event, hint, progress))?

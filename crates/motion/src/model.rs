@@ -14,6 +14,7 @@ pub mod path;
 pub mod root;
 pub mod segment;
 pub mod separation;
+pub mod shape;
 pub mod spiral;
 pub mod team;
 
