@@ -52,12 +52,16 @@ struct ClearanceLine {
 pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
     let scene = text.parse()?;
+    if arguments.prove {
+        expect_exact_motion(&scene)?;
+        expect_empty_ground(&scene)?;
+    }
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
     let certified = arguments.certificate.as_ref().map(|file| proved(&text.text, file, common)).transpose()?;
     if arguments.prove && common.json {
         let (found, freeze) = find_least_clearance(&scene, &timeline, common);
-        let enclosure = enclosed(&scene, found, freeze, common)?;
+        let enclosure = enclosed(&scene, found, freeze, common);
         output.json(&clearance_line(&scene, found, enclosure))?;
         return output.finish();
     }
@@ -144,7 +148,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         output.line(&format!("  {}", obstacle_sentence(&scene, &timeline, &least)))?;
     }
     if arguments.prove {
-        let enclosure = enclosed(&scene, found, freeze, common)?;
+        let enclosure = enclosed(&scene, found, freeze, common);
         output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
     }
     if let Some(sentences) = certified {
@@ -220,7 +224,7 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
     let first = timeline.events().iter().find(|timed| timed.event.bench_b == number);
     let first = first.map_or(String::new(), |timed| format!(" First met at t = {} s.", figure(timed.time)));
     format!(
-        "The least clearance of the {}{beyond}{up_to} is {value} m, at t = {at} s, of {bench} (counting from 1).{first}",
+        "The least clearance of the {}{beyond}{up_to} is {value} m, at t = {at} s, with {bench} (counting from 1).{first}",
         printable(name)
     )
 }
@@ -243,16 +247,14 @@ fn enclosed(
     found: Option<TimedClearance>,
     freeze: &TimedEvent,
     common: &Common,
-) -> Result<Option<ClearanceEnclosure>, CommandError> {
-    expect_exact_motion(scene)?;
-    expect_empty_ground(scene)?;
+) -> Option<ClearanceEnclosure> {
     let bar = progress_bar(1000, common).with_message("proving the least clearance");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let enclosure = found.and_then(|found| {
         enclose_least_clearance(&scene.motion, freeze, &found.least, MOST_CLEARANCE_STEPS, &mut progress)
     });
     bar.finish_and_clear();
-    Ok(enclosure)
+    enclosure
 }
 
 /// Returns a sentence for people on the proof of the least clearance.

@@ -123,3 +123,29 @@ fn a_team_that_starts_within_a_keep_out_meets_it_at_once_with_a_warning() {
     // Here the show stops, so that the boards never touch in it.
     assert!(text(&output.stdout).contains("The least clearance of the lamp beyond its keep-out of 1 m is -"));
 }
+
+#[test]
+fn a_picture_has_every_obstacle_at_its_place_with_its_keep_out() {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let output = program.args(["--scene", "config/square.toml", "draw", "--at", "46"]).output().unwrap();
+    let svg = text(&output.stdout);
+    let picture = roxmltree::Document::parse(&svg).unwrap();
+    let group = |id: &str| picture.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
+    let titled = |name: &str| {
+        let title = group("obstacles").descendants().find(|node| node.text() == Some(name)).unwrap();
+        title.parent_element().unwrap()
+    };
+    let lamp = titled("stone lamp");
+    assert_eq!(["cx", "cy", "r"].map(|key| lamp.attribute(key).unwrap()), ["4", "3.5", "0.4"]);
+    let around = group("keep-outs").children().find(|node| node.attribute("r") == Some("0.9")).unwrap();
+    assert_eq!(["cx", "cy"].map(|key| around.attribute(key).unwrap()), ["4", "3.5"]);
+    let outline = |name: &str| titled(name).attribute("d").unwrap().to_owned();
+    assert_eq!(outline("well house"), "M2 8L6 8L6 14L4 12L2 14Z");
+    assert_eq!(outline("northern spectators"), "M-4 22L18 22");
+    assert_eq!(outline("boundary"), "M-30 -20L30 -20L30 25L-30 25Z");
+    let wide: Vec<_> = group("keep-outs").children().filter_map(|node| node.attribute("stroke-width")).collect();
+    assert_eq!(wide, ["3", "3", "2", "2"]);
+    assert!(picture.descendants().any(|node| node.attribute("id") == Some("obstacle-names")));
+    let without = Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["draw", "--at", "46"]).output().unwrap();
+    assert!(!text(&without.stdout).contains("ground\""), "a scene without obstacles has no ground");
+}

@@ -52,7 +52,7 @@ fn the_clearance_of_every_frame_is_the_least_of_all() {
            [[stage.obstacles]]\nname = \"house\"\npolygon = [[1, 9.2], [2, 11], [0, 10]]\nkeep_out = 0.1\n";
     let turnaround = include_str!("../../config/turnaround.toml").to_owned()
         + "[placement]\norigin = [10.0, 2.0]\nrotation_turns = 0.2\nmirror = true\n\
-           [stage]\n[[stage.obstacles]]\nname = \"well\"\ncircle = { center = [10.0, 2.0], radius = 0.2 }\n";
+           [stage]\n[[stage.obstacles]]\nname = \"well\"\ncircle = { center = [10.0, 2.0], radius = 1.5 }\n";
     let newton = SQUARE.replace("head_speed = 1.0", "head_speed = 1.0\nsolver = \"newton\"");
     for (text, seconds) in [(SQUARE, 60.0), (&newton, 60.0), (&paper, 410.0), (&turnaround, 200.0)] {
         let scene = scene(&text.replace("on_contact = \"stop\"", "on_contact = \"continue\""));
