@@ -135,13 +135,14 @@ impl ObstacleMonitor {
                 let least = &table.least[cell * blocks..][..blocks];
                 // The bench behind the handle of `row` is the second one.
                 let rows = row..row + benches - 1;
-                for block in rows.start / BLOCK..rows.end.div_ceil(BLOCK) {
-                    if f64::from(least[block]) >= nearest.value {
+                let first_block = rows.start / BLOCK;
+                for (block, least) in (first_block..).zip(&least[first_block..rows.end.div_ceil(BLOCK)]) {
+                    if f64::from(*least) >= nearest.value {
                         continue;
                     }
-                    for row in rows.start.max(block * BLOCK)..rows.end.min((block + 1) * BLOCK) {
-                        let bench = row - rows.start + 1;
-                        if f64::from(bounds[row]) < nearest.value && bench != self.last_bench {
+                    let of_block = rows.start.max(block * BLOCK)..rows.end.min((block + 1) * BLOCK);
+                    for (bench, bound) in (of_block.start - rows.start + 1..).zip(&bounds[of_block]) {
+                        if f64::from(*bound) < nearest.value && bench != self.last_bench {
                             nearest.test(bench);
                         }
                     }
@@ -154,5 +155,43 @@ impl ObstacleMonitor {
         self.last_bench = bench;
         let (point_a, point_b) = self.ground.obstacles()[number].shape.nearest_points(&board);
         Some(PairClearance { value, bench_a: bench, bench_b: self.team.handles() + number, point_a, point_b })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::Obstacle;
+    use crate::model::Point;
+    use crate::model::path::Path;
+    use crate::model::shape::Shape;
+    use crate::solve::{Solver, Velocities};
+
+    const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+
+    #[test]
+    fn the_table_excludes_all_but_a_few_benches() {
+        let path = Path::spiral(0.55, 16.0);
+        let mut table = FollowerTable::new(&path, PAPER, 1.0, Velocities::Omitted).unwrap();
+        let lamp = Obstacle { name: String::new(), shape: Shape::circle(Point::new(0.3, 0.2), 0.5), keep_out: 0.2 };
+        let post = Obstacle { name: String::new(), shape: Shape::circle(Point::new(0.0, 12.5), 0.5), keep_out: 0.0 };
+        let monitor = ObstacleMonitor::new(PAPER, Ground::new(vec![lamp, post]), Some(&table));
+        let bounds = monitor.table.as_ref().unwrap();
+        let mut chain = Chain::new(224);
+        for tick in 0..400 {
+            let time = f64::from(tick) + 0.37;
+            table.solve(time, &mut chain).unwrap();
+            let (row, cell) = bounds.locate(time, 223).unwrap();
+            let mut slack = 0.0f64;
+            for bench in 1..223 {
+                let board = board(&chain, &PAPER, bench);
+                let clearances = monitor.ground.obstacles().iter().map(|obstacle| obstacle.clearance(&board));
+                let value = clearances.fold(f64::INFINITY, f64::min);
+                let bound = f64::from(bounds.bounds[cell * bounds.rows + row + bench - 1]);
+                assert!(bound <= value, "bench {bench} at {time}: {bound} {value}");
+                slack = slack.max(value - bound);
+            }
+            assert!(slack < 0.12, "{slack} at {time}");
+        }
     }
 }
