@@ -84,7 +84,7 @@ pub fn run() {
     let shapes = [
         Shape::circle(Point::new(0.3, 0.2), 0.5),
         Shape::line(wall.to_vec()),
-        Shape::polygon(wall.map(|corner| -corner).to_vec()),
+        Shape::polygon([(-9.0, -14.0), (0.0, -12.0), (9.0, -14.0)].map(|(x, y)| Point::new(x, y)).to_vec()),
         Shape::boundary(square.to_vec()),
     ];
     let obstacles = shapes.map(|shape| Obstacle { name: String::new(), shape, keep_out: 0.2 });
