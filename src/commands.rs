@@ -285,6 +285,15 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 
+/// Refuses a scene whose stage no proof knows.
+pub fn expect_empty_ground(scene: &Scene) -> Result<(), CommandError> {
+    if scene.motion.ground().is_empty() {
+        return Ok(());
+    }
+    let sentence = "the scene has obstacles, which no proof knows yet: expected a scene without the table [stage]";
+    Err(CommandError::BadInput(sentence.to_owned()))
+}
+
 /// Returns a flag that SIGINT, SIGTERM and SIGHUP set; SIGHUP unless it is ignored, as by `nohup`.
 ///
 /// Call it before other threads start: from then on one thread receives these signals. iceoryx2 treats an interrupted

@@ -29,6 +29,8 @@ STATES = (
     "lock",
     # The head has reached the end of the path.
     "path_end",
+    # A board has reached the keep-out of an obstacle, or has left the boundary by its keep-out.
+    "obstacle",
 )
 
 # The level of an alert.
@@ -43,6 +45,10 @@ LEVELS = (
     "stall",
     # A link is in a singular configuration: the motion cannot continue.
     "lock",
+    # No value has this number.
+    None,
+    # A board has reached the keep-out of an obstacle, or has left the boundary by its keep-out.
+    "obstacle",
 )
 
 # What an alert may be about, by the number of the state that the event leads to.
@@ -57,6 +63,8 @@ EVENTS = {
     4: "lock",
     # The head reaches the end of the path.
     5: "path_end",
+    # A board reaches the keep-out of an obstacle, or leaves the boundary by its keep-out.
+    6: "obstacle",
 }
 
 # The playback state: simulated time advances or stands still.
@@ -166,8 +174,9 @@ class FrameHeader(_Message):
         # Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged after the end of the
         # show.
         ("time_scale", ctypes.c_double),
-        # Metres between the nearest two boards that share no handle, negative when they overlap; NaN if the scene has
-        # no `[alerts]` or fewer than three benches.
+        # Metres between the nearest two boards that share no handle, negative when they overlap; of a scene with
+        # obstacles the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than three
+        # benches and no obstacles.
         ("min_clearance", ctypes.c_double),
         # The number of handles in this message.
         ("handles", ctypes.c_uint32),
@@ -188,9 +197,11 @@ class FrameHeader(_Message):
 class CollisionAlert(_Message):
     """A change of the alert level, or a step of the countdown towards an event.
 
-    `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level. The fields
-    that begin with `event` are the event the alert is about: the next contact, stall or lock while the level is clear
-    or approaching, else the event that has happened.
+    `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level, or a board
+    and an obstacle that are nearer. The fields that begin with `event` are the event the alert is about: the next
+    contact, obstacle, stall or lock while the level is clear or approaching, else the event that has happened. An
+    obstacle stands where a second bench would, by its number: the number of handles plus its place in the scene, the
+    boundary last.
 
     Over iceoryx2 the payload of `<name>/alerts`.
     """
@@ -209,8 +220,8 @@ class CollisionAlert(_Message):
         ("event_time", ctypes.c_double),
         # `event_time - sim_time`, simulated seconds; negative once it has passed; NaN if there is no event.
         ("time_to_event", ctypes.c_double),
-        # Metres between the nearest two boards in that frame, negative when they overlap; NaN if there are fewer than
-        # three benches.
+        # Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle;
+        # negative when they overlap; NaN if there are neither.
         ("clearance", ctypes.c_double),
         # The midpoint between the nearest two boards, metres right of the centre; NaN if there are fewer than three
         # benches.
@@ -218,8 +229,8 @@ class CollisionAlert(_Message):
         # The midpoint between the nearest two boards, metres up from the centre; NaN if there are fewer than three
         # benches.
         ("y", ctypes.c_double),
-        # The place of the event, metres right of the centre: the touching point of a contact, the rear handle of the
-        # bench that stalls or locks; NaN if there is no event.
+        # The place of the event, metres right of the centre: the touching point of a contact, the point of a board
+        # nearest to an obstacle, the rear handle of the bench that stalls or locks; NaN if there is no event.
         ("event_x", ctypes.c_double),
         # The place of the event, metres up from the centre; NaN if there is no event.
         ("event_y", ctypes.c_double),
@@ -227,14 +238,14 @@ class CollisionAlert(_Message):
         ("level", ctypes.c_uint32),
         # The first of the nearest two benches, from 0, or `NO_BENCH`.
         ("bench_a", ctypes.c_uint32),
-        # The second of the nearest two benches, or `NO_BENCH`.
+        # The second of the nearest two benches, or an obstacle's number, or `NO_BENCH`.
         ("bench_b", ctypes.c_uint32),
         # The kind of the event: one of `EVENTS`, with the number of the frame's state that it leads to; 0 if there is
         # no event.
         ("event", ctypes.c_uint32),
-        # The bench that stalls or locks, or the first of two that touch, or `NO_BENCH`.
+        # The bench that stalls, locks or reaches an obstacle, or the first of two that touch, or `NO_BENCH`.
         ("event_bench_a", ctypes.c_uint32),
-        # The second of two benches that touch, or `NO_BENCH`.
+        # The second of two benches that touch, or an obstacle's number, or `NO_BENCH`.
         ("event_bench_b", ctypes.c_uint32),
     ]
 

@@ -11,19 +11,23 @@ use bench_dragon::certify::{
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::Motion;
+use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon::motion::model::spiral::Direction;
 use bench_dragon::motion::solve::Velocities;
-use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
-use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
+use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene, printable};
 use bench_dragon::show::timed_cues;
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
-use super::events::{find_least_clearance, least_clearance, sentence};
+use super::events::{bench_name, find_least_clearance, least_clearance, sentence};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
-use super::{CommandError, Common, Output, expect_exact_motion, figure, number, progress_bar, search_timeline};
+use super::{
+    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, figure, number, progress_bar,
+    search_timeline,
+};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -71,12 +75,16 @@ struct ClearanceLine {
 pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
     let scene = text.parse()?;
+    if arguments.prove {
+        expect_exact_motion(&scene)?;
+        expect_empty_ground(&scene)?;
+    }
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
-    let ground = arguments.ground(&scene, &timeline, common)?;
+    let covered = arguments.covered(&scene, &timeline, common)?;
     let certified = arguments.certificate.as_ref().map(|file| proved(&text.text, file, common)).transpose()?;
-    if let (Some(ground), true) = (&ground, common.json) {
-        output.json(&ground.line())?;
+    if let (Some(covered), true) = (&covered, common.json) {
+        output.json(&covered.line())?;
     }
     if arguments.prove && common.json {
         let (found, freeze) = find_least_clearance(&scene, &timeline, common);
@@ -84,8 +92,8 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         output.json(&clearance_line(&scene, found, enclosure))?;
         return output.finish();
     }
-    if ground.is_some() && common.json {
-        return output.finish();
+    if common.json {
+        return if covered.is_some() { output.finish() } else { print_lines(&scene, &timeline, common, output) };
     }
     let team = scene.team();
     output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
@@ -107,6 +115,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             number(origin.x),
             number(origin.y)
         ))?;
+    }
+    if !scene.motion.ground().is_empty() {
+        output.line(&format!("  Stage: {}.", ground(&scene)))?;
     }
     let choice = scene.motion.solver(scene.velocities);
     output.line(&format!("  Solver: {}.", choice.reason))?;
@@ -163,12 +174,15 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     let (found, freeze) = find_least_clearance(&scene, &timeline, common);
     output.line(&format!("  {}", least_clearance(&scene, found)))?;
+    for least in obstacle_clearances(&scene, freeze, common) {
+        output.line(&format!("  {}", obstacle_sentence(&scene, &timeline, &least)))?;
+    }
     if arguments.prove {
         let enclosure = enclosed(&scene, &text.text, (found, freeze), arguments.certify.as_deref(), common)?;
         output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
     }
-    if let Some(ground) = ground {
-        output.line(&format!("  {}", ground.sentence()))?;
+    if let Some(covered) = covered {
+        output.line(&format!("  {}", covered.sentence()))?;
     }
     if let Some(sentences) = certified {
         output.line("  Proved of this scene:")?;
@@ -179,12 +193,90 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
+    if timeline.find(EventKind::Obstacle).is_some_and(|touch| touch.time == 0.0) {
+        log::warn!("a board is within the keep-out of an obstacle at the start of scene \"{}\"", scene.name);
+    }
     output.finish()
+}
+
+/// A line of `check --json`: the least clearance of two boards.
+#[derive(Serialize)]
+struct LeastClearanceLine {
+    check: &'static str,
+    clearance: Option<f64>,
+    time: Option<f64>,
+    bench_a: Option<u32>,
+    bench_b: Option<u32>,
+}
+
+/// A line of `check --json`: the least clearance of an obstacle.
+#[derive(Serialize)]
+struct ObstacleLine<'a> {
+    check: &'static str,
+    obstacle: &'a str,
+    clearance: f64,
+    time: f64,
+    bench: u32,
+}
+
+/// Prints the least clearances of the show as JSON lines.
+fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: Output) -> Result<(), CommandError> {
+    let (found, freeze) = find_least_clearance(scene, timeline, common);
+    output.json(&LeastClearanceLine {
+        check: "clearance",
+        clearance: found.map(|found| found.least.value),
+        time: found.map(|found| found.time),
+        bench_a: found.map(|found| found.least.bench_a),
+        bench_b: found.map(|found| found.least.bench_b),
+    })?;
+    for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, freeze, common) {
+        let obstacle = &scene.motion.ground().obstacles()[obstacle].name;
+        let (check, clearance, bench) = ("obstacle", least.value, least.bench);
+        output.json(&ObstacleLine { check, obstacle, clearance, time, bench })?;
+    }
+    output.finish()
+}
+
+/// Searches for the least clearance of each obstacle over the whole show.
+fn obstacle_clearances(scene: &Scene, freeze: &TimedEvent, common: &Common) -> Vec<TimedObstacleClearance> {
+    let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
+    let found = scene.motion.obstacle_clearances(freeze, &mut |share| bar.set_position((1000.0 * share) as u64));
+    bar.finish_and_clear();
+    found
+}
+
+/// Returns a sentence for people on the least clearance of an obstacle, and on its first touch.
+fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleClearance) -> String {
+    let TimedObstacleClearance { obstacle, least, time, searched_until } = *found;
+    let Obstacle { name, keep_out, .. } = &scene.motion.ground().obstacles()[obstacle];
+    let (value, at, bench) = (figure(least.value), figure(time), bench_name(scene, least.bench));
+    let up_to = searched_until
+        .map_or(String::new(), |until| format!(" up to t = {} s, where the search gave up", figure(until)));
+    let beyond = if *keep_out > 0.0 { format!(" beyond its keep-out of {keep_out} m") } else { String::new() };
+    let number = Some(scene.motion.obstacle_number(obstacle));
+    let first = timeline.events().iter().find(|timed| timed.event.bench_b == number);
+    let first = first.map_or(String::new(), |timed| format!(" First met at t = {} s.", figure(timed.time)));
+    format!(
+        "The least clearance of the {}{beyond}{up_to} is {value} m, at t = {at} s, with {bench} (counting from 1).{first}",
+        printable(name)
+    )
+}
+
+/// Describes the obstacles in words.
+fn ground(scene: &Scene) -> String {
+    let ground = scene.motion.ground();
+    let obstacles = ground.obstacles().len() - usize::from(ground.has_boundary());
+    let counted = match obstacles {
+        0 => "no obstacle".to_owned(),
+        1 => "1 obstacle".to_owned(),
+        count => format!("{count} obstacles"),
+    };
+    if ground.has_boundary() { format!("{counted} and a boundary") } else { counted }
 }
 
 impl CheckArguments {
     /// Writes the file of --swept and returns what it holds.
-    fn ground(&self, scene: &Scene, timeline: &Timeline, common: &Common) -> Result<Option<Swept>, CommandError> {
+    fn covered(&self, scene: &Scene, timeline: &Timeline, common: &Common) -> Result<Option<Swept>, CommandError> {
         let Some(file) = &self.swept else { return Ok(None) };
         let stretch = Stretch { from: self.from.as_deref(), until: self.until.as_deref(), benches: self.benches };
         let ground = swept(scene, timeline, stretch, common)?;

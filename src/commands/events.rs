@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Status};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
-use bench_dragon::show::scene::Scene;
+use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
-use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
+use super::{
+    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, figure, progress_bar, search_timeline,
+};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -33,6 +36,8 @@ struct EventLine {
     time: f64,
     bench_a: Option<u32>,
     bench_b: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    obstacle: Option<String>,
     x: Option<f64>,
     y: Option<f64>,
     #[serde(flatten)]
@@ -61,6 +66,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 time,
                 bench_a: event.bench_a,
                 bench_b: event.bench_b,
+                obstacle: scene.motion.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
                 x: event.place.map(|place| place.x),
                 y: event.place.map(|place| place.y),
                 enclosure: status(event.kind).map(enclosure),
@@ -77,9 +83,13 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
             Some(time) => format!("up to t = {} s, where the search gave up", figure(time)),
             None => "before the motion ends".to_owned(),
         };
-        for kind in [EventKind::Contact, EventKind::Stall] {
+        let obstacle = (!scene.motion.ground().is_empty()).then_some(EventKind::Obstacle);
+        for kind in [EventKind::Contact].into_iter().chain(obstacle).chain([EventKind::Stall]) {
             if timeline.find(kind).is_none() {
-                output.line(&format!("There is no {} {}.", kind.name(), until))?;
+                match kind {
+                    EventKind::Obstacle => output.line(&format!("No board meets an obstacle {until}."))?,
+                    _ => output.line(&format!("There is no {} {until}.", kind.name()))?,
+                }
                 if let Some(status) = status(kind) {
                     output.line(&proof_sentence(kind, status))?;
                 }
@@ -99,6 +109,7 @@ fn certified(
     common: &Common,
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
     expect_exact_motion(scene)?;
+    expect_empty_ground(scene)?;
     let mut certificate = CertificateFile::create(file)?;
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| certificate.write(line);
@@ -146,12 +157,22 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
     let what = match event.kind {
         EventKind::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
         EventKind::Contact => format!("{first} and {second} touch{place}"),
+        EventKind::Obstacle => {
+            let obstacle = scene.motion.obstacle_of(&event).map_or(second, obstacle_label);
+            let how = if time == 0.0 { "is at" } else { "meets" };
+            format!("{first} {how} {obstacle}{}{place}", if time == 0.0 { " from the start," } else { "" })
+        }
         EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
         EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot continue"),
         EventKind::PathEnd => "the head reaches the end of the path".to_owned(),
     };
     format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), figure(time))
         .replace("path (counting from 1)", "path")
+}
+
+/// Returns the name of an obstacle in a sentence.
+fn obstacle_label(obstacle: &Obstacle) -> String {
+    format!("the {}", printable(&obstacle.name))
 }
 
 /// Returns the least clearance of the whole show, and the event that ends it.

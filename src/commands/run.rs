@@ -227,6 +227,9 @@ impl RunSession<'_> {
         if self.timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
             log::warn!("boards overlap at the start of this scene");
         }
+        if self.timeline.find(EventKind::Obstacle).is_some_and(|touch| touch.time == 0.0) {
+            log::warn!("a board is within the keep-out of an obstacle at the start of this scene");
+        }
     }
 }
 

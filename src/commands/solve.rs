@@ -42,7 +42,8 @@ struct TimeLine {
 /// Solves the scene at the requested times and prints the table.
 pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
-    let wants_contact = arguments.at.iter().any(|time| time.trim() == EventKind::Contact.name());
+    let searched = [EventKind::Contact, EventKind::Obstacle];
+    let wants_contact = arguments.at.iter().any(|time| searched.iter().any(|kind| time.trim() == kind.name()));
     let timeline =
         if wants_contact { search_timeline(&scene, common) } else { scene.motion.timeline_without_contact() };
     let (count, times) = arguments.times(&timeline)?;
@@ -154,7 +155,7 @@ type Times = (u64, Box<dyn Iterator<Item = f64>>);
 /// Bad input: not a number, an event that does not happen, or a time after the motion's end.
 pub fn time_of(option: &str, text: &str, timeline: &Timeline) -> Result<f64, CommandError> {
     let text = text.trim();
-    let named = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd]
+    let named = [EventKind::Contact, EventKind::Obstacle, EventKind::Stall, EventKind::Lock, EventKind::PathEnd]
         .into_iter()
         .find(|kind| kind.name() == text);
     if let Some(kind) = named {
@@ -163,7 +164,9 @@ pub fn time_of(option: &str, text: &str, timeline: &Timeline) -> Result<f64, Com
         });
     }
     let time: f64 = text.parse().map_err(|_| {
-        CommandError::BadInput(format!("{option} {text}: expected seconds, or one of contact, stall, lock, path_end"))
+        CommandError::BadInput(format!(
+            "{option} {text}: expected seconds, or one of contact, obstacle, stall, lock, path_end"
+        ))
     })?;
     let end = timeline.end();
     if !(time.is_finite() && time >= 0.0) {

@@ -7,6 +7,7 @@ mod certificates;
 mod display;
 mod events;
 mod greatest_speed;
+mod ground;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod kinks;

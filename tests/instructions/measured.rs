@@ -7,7 +7,10 @@ use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
-use bench_dragon::motion::clearance::ClearanceMonitor;
+use bench_dragon::motion::clearance::{ClearanceMonitor, ObstacleMonitor};
+use bench_dragon::motion::ground::{Ground, Obstacle};
+use bench_dragon::motion::model::Point;
+use bench_dragon::motion::model::shape::Shape;
 use bench_dragon::motion::solve::selection;
 use bench_dragon::motion::solve::table::{FollowerTable, Instructions};
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
@@ -76,6 +79,17 @@ pub fn run() {
     let route = Scene::load("config/procession.toml".as_ref()).unwrap();
     let mut solver = route.motion.solver(Velocities::Computed).solver;
     frame("frame on a route, 60 benches", solver.as_mut(), ON_ROUTE, route.team().handles());
+    let square = [(-14.0, -14.0), (14.0, -14.0), (14.0, 14.0), (-14.0, 14.0)].map(|(x, y)| Point::new(x, y));
+    let wall = [(-9.0, 10.0), (0.0, 12.0), (9.0, 10.0)].map(|(x, y)| Point::new(x, y));
+    let shapes = [
+        Shape::circle(Point::new(0.3, 0.2), 0.5),
+        Shape::line(wall.to_vec()),
+        Shape::polygon([(-9.0, -14.0), (0.0, -12.0), (9.0, -14.0)].map(|(x, y)| Point::new(x, y)).to_vec()),
+        Shape::boundary(square.to_vec()),
+    ];
+    let obstacles = shapes.map(|shape| Obstacle { name: String::new(), shape, keep_out: 0.2 });
+    let obstacles = ObstacleMonitor::new(team, Ground::new(obstacles.into()), Some(&table));
+    obstacle_clearance(obstacles, table.for_frames(), team.handles());
     clearance(ClearanceMonitor::new(path, team, &table), table, team.handles());
     // A search for the contact would take long.
     let timeline = paper.motion.timeline_without_contact();
@@ -103,6 +117,21 @@ fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
         |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
         |(_, chain, monitor), number| {
             black_box(monitor.least_clearance(black_box(chain), time(number)));
+        },
+    );
+}
+
+/// Counts the obstacles' share of a frame's clearance. The head is where [`clearance`] has it; the nearest two boards
+/// are a quarter of a metre apart.
+fn obstacle_clearance(monitor: ObstacleMonitor, table: FollowerTable, handles: usize) {
+    let mut on = (table, Chain::new(handles), monitor);
+    let time = |number: u64| START + number as f64 / 60.0;
+    part(
+        "clearance of four obstacles",
+        &mut on,
+        |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
+        |(_, chain, monitor), number| {
+            black_box(monitor.nearest(black_box(chain), time(number), 0.25));
         },
     );
 }

@@ -38,6 +38,7 @@ impl Stage {
             timeline.events().iter().map(|timed| (timed.time, timed.event.kind)).collect();
         let level = |kind| match kind {
             EventKind::Contact => Some(Level::Contact),
+            EventKind::Obstacle => Some(Level::Obstacle),
             EventKind::Stall => Some(Level::Stall),
             EventKind::Lock => Some(Level::Lock),
             EventKind::PathEnd => None,
@@ -49,6 +50,7 @@ impl Stage {
         });
         let state = |kind: &EventKind| match kind {
             EventKind::Contact => FrameState::Contact,
+            EventKind::Obstacle => FrameState::Obstacle,
             EventKind::Stall => FrameState::Stall,
             EventKind::Lock => FrameState::Lock,
             EventKind::PathEnd => FrameState::PathEnd,

@@ -221,7 +221,8 @@ fn type_names_are_those_that_ros_2_gives_the_interface_files() {
 /// The names of numbers in the compiled enums and constants.
 struct Names {
     states: Vec<&'static str>,
-    levels: Vec<&'static str>,
+    /// By number; not every number is a level.
+    levels: Vec<Option<&'static str>>,
     playback: Vec<&'static str>,
     segments: Vec<&'static str>,
     /// All events that lead to a state, by its number.
@@ -244,7 +245,9 @@ fn names() -> Names {
     let alerted = events.clone().filter(|(_, kind)| Level::of(*kind).is_some());
     Names {
         states: in_order(FrameState::ALL.map(|state| (state as u32, state.name()))),
-        levels: in_order(Level::ALL.map(|level| (level as u32, level.name()))),
+        levels: (0..=Level::ALL.map(|level| level as u32).into_iter().max().unwrap())
+            .map(|number| Level::ALL.into_iter().find(|level| *level as u32 == number).map(Level::name))
+            .collect(),
         playback: in_order(PlaybackState::ALL.map(|playback| (playback as u32, playback.name()))),
         segments: in_order(segments.map(|number| (number, kind(number)))),
         events: events.map(|(number, kind)| (number, kind.name())).collect(),
@@ -262,7 +265,8 @@ fn constants_are_the_states_levels_events_playback_and_segments() {
     let names = names();
     let frame = joined([in_order("STATE_", &names.states), in_order("PLAYBACK_", &names.playback)]);
     assert_eq!(interface("HandlePoses").constants, frame);
-    let mut alert = in_order("LEVEL_", &names.levels);
+    let levels = names.levels.iter().zip(0..).filter_map(|(name, number)| Some((constant("LEVEL_", (*name)?), number)));
+    let mut alert: BTreeMap<String, u32> = levels.collect();
     alert.extend(names.alerted.iter().map(|(number, name)| (constant("EVENT_", name), *number)));
     alert.extend([("EVENT_NONE".to_owned(), 0), ("NO_BENCH".to_owned(), NO_BENCH)]);
     assert_eq!(interface("CollisionAlert").constants, alert);

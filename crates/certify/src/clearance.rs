@@ -200,6 +200,8 @@ impl<'a, 'w> Descent<'a, 'w> {
                 let target = path_end(&self.chain.exact, path);
                 self.least(hint, &target, progress)
             }
+            // The commands refuse a scene with obstacles.
+            EventKind::Obstacle => None,
             EventKind::Stall | EventKind::Lock => {
                 self.end = event.travelled - slack.max(BEFORE_LOCK[0]);
                 (self.end > 0.0).then(|| self.least_until_lock(event, hint, progress))?

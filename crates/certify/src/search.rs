@@ -118,6 +118,9 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         for event in self.given.events {
             match event.kind {
                 EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
+                EventKind::Obstacle => {
+                    return Err(Halt::Stuck("this program proves nothing of the obstacles of a stage".to_owned()));
+                }
                 EventKind::PathEnd => {
                     let beyond = path_end(&self.chain.exact, self.given.path);
                     self.go_to(event.travelled - self.around(), None, &mut progress)?;

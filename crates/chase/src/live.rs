@@ -302,6 +302,7 @@ impl Handler for Chase<'_> {
                 self.status.run_id = 0;
             }
             FeedEvent::Started { .. }
+            | FeedEvent::Scene { .. }
             | FeedEvent::Alert(_)
             | FeedEvent::Cue(_)
             | FeedEvent::Status(_)

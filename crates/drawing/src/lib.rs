@@ -9,6 +9,7 @@
 pub mod animation;
 mod benches;
 pub mod camera;
+mod ground;
 mod labels;
 mod look;
 mod marks;
@@ -88,7 +89,8 @@ impl<'a> Drawing<'a> {
     pub fn new(name: &'a str, motion: &'a Motion, timeline: &'a Timeline, extent: &Extent, look: Look) -> Self {
         let shown = match look.framing {
             Framing::Everything => {
-                let boards = extent.boards;
+                let mut boards = extent.boards;
+                ground::include(motion.ground(), &mut boards);
                 boards.padded(0.04 * boards.width().max(boards.height()) + motion.team().width)
             }
             Framing::Radius(radius) => StageBox::around(Point::origin(), 2.0 * radius, 2.0 * radius),
@@ -133,9 +135,9 @@ impl<'a> Drawing<'a> {
         let (outlined, what) = outlined(&happened, &overlaps);
         let outlined: Vec<usize> =
             outlined.into_iter().filter(|bench| boards.iter().any(|(seen, _)| seen == bench)).collect();
-        let mut stage = self.stage();
+        let mut stage = self.stage(palette);
         if let Some(area) = self.ground {
-            stage = stage.add(ground(area, palette));
+            stage = stage.add(covered(area, palette));
         }
         stage = stage.add(self.path(palette));
         stage =
@@ -149,7 +151,7 @@ impl<'a> Drawing<'a> {
                 let place = self.camera.sheet(place);
                 places.push(place);
                 marks = marks.add(past.sign(place, palette));
-                events.push((*past, past.sentence("here", benches)));
+                events.push((*past, past.sentence("here", self.motion)));
             }
         }
         let (mut signs, mut names) = ((false, false), Vec::new());
@@ -189,6 +191,9 @@ impl<'a> Drawing<'a> {
                 events: &events,
             };
             let (below, colour) = self.subtitle(time, &happened, &overlaps, palette);
+            if !self.motion.ground().is_empty() {
+                document = document.add(ground::labels(self.motion.ground(), &self.camera, palette));
+            }
             document = document
                 .add(labels::labels(&names, &boards, &places, self.motion.team().hole_inset, &self.camera, palette))
                 .add(sheet::axes(&self.camera, palette))
@@ -220,9 +225,11 @@ impl<'a> Drawing<'a> {
             .add(ground.set("fill", palette.ground))
     }
 
-    /// Returns the group of the stage, in metres.
-    fn stage(&self) -> Group {
-        Group::new().set("id", "stage").set("transform", self.camera.transform())
+    /// Returns the group of the stage, in metres, with the obstacles.
+    fn stage(&self, palette: &Palette) -> Group {
+        let stage = Group::new().set("id", "stage").set("transform", self.camera.transform());
+        let ground = self.motion.ground();
+        if ground.is_empty() { stage } else { stage.add(ground::group(ground, &self.camera, palette)) }
     }
 
     fn path(&self, palette: &Palette) -> Path {
@@ -270,7 +277,7 @@ impl<'a> Drawing<'a> {
         if let Some(now) = now {
             let place = now.timed.event.place.unwrap_or_default();
             let place = format!("at ({}, {}) m", rounded(place.x, 3), rounded(place.y, 3));
-            return (now.sentence(&place, benches), palette.danger);
+            return (now.sentence(&place, self.motion), palette.danger);
         }
         if let Some(sentence) = marks::overlap_sentence(overlaps, benches) {
             return (sentence, palette.danger);
@@ -291,8 +298,12 @@ impl<'a> Drawing<'a> {
         );
         for timed in self.timeline.events() {
             let (kind, time) = (timed.event.kind.name().replace('_', " "), rounded(timed.time, 3));
-            let benches = [timed.event.bench_a, timed.event.bench_b].into_iter().flatten();
-            let benches: Vec<String> = benches.map(|bench| format!("bench {}", bench + 1)).collect();
+            let obstacle = self.motion.obstacle_of(&timed.event);
+            let other = timed.event.bench_b.filter(|_| obstacle.is_none());
+            let benches =
+                [timed.event.bench_a, other].into_iter().flatten().map(|bench| format!("bench {}", bench + 1));
+            let benches: Vec<String> =
+                benches.chain(obstacle.map(|obstacle| format!("the {}", text(&obstacle.name)))).collect();
             let benches = if benches.is_empty() { String::new() } else { format!(", {}", benches.join(" and ")) };
             words += &format!(" Event: {kind} at {time} s{benches}.");
         }
@@ -325,13 +336,13 @@ fn name(bench: usize, last: usize, outlined: &[usize]) -> Option<String> {
 }
 
 /// Returns the ground that boards cover.
-fn ground(area: &SweptArea, palette: &Palette) -> Path {
+fn covered(area: &SweptArea, palette: &Palette) -> Path {
     let mut data = String::new();
     for ring in area.polygons().iter().flatten() {
         let corners: Vec<String> = ring.iter().map(|[x, y]| format!("{} {}", metres(*x), metres(*y))).collect();
         data += &format!("M{}z", corners.join("L"));
     }
-    Path::new().set("id", "ground").set("d", data).set("fill", palette.line).set("fill-rule", "evenodd")
+    Path::new().set("id", "swept").set("d", data).set("fill", palette.line).set("fill-rule", "evenodd")
 }
 
 /// Returns metres as SVG data, to a tenth of a micrometre.

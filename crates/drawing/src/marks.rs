@@ -8,6 +8,7 @@ use super::palette::Palette;
 use super::rounded;
 use bench_dragon_messages::sentence::bench_name;
 use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
@@ -42,17 +43,23 @@ pub fn happened(timeline: &Timeline, time: f64) -> Vec<Happened> {
 impl Happened {
     /// Returns the benches of the event, from 0.
     pub fn benches(&self) -> impl Iterator<Item = u32> + use<> {
-        [self.timed.event.bench_a, self.timed.event.bench_b].into_iter().flatten()
+        let other = self.timed.event.bench_b.filter(|_| self.timed.event.kind != EventKind::Obstacle);
+        [self.timed.event.bench_a, other].into_iter().flatten()
     }
 
-    /// Returns the sentence of the event for a team of `benches` benches, counted from 1 in words.
-    pub fn sentence(&self, place: &str, benches: usize) -> String {
-        let who: Vec<String> = self.benches().map(|bench| bench_name(bench, benches as u32)).collect();
+    /// Returns the sentence of the event, with benches counted from 1 in words.
+    pub fn sentence(&self, place: &str, motion: &Motion) -> String {
+        let who: Vec<String> = self.benches().map(|bench| bench_name(bench, motion.team().benches as u32)).collect();
+        let obstacle = motion.obstacle_of(&self.timed.event).map_or("", |obstacle| &obstacle.name);
         let who = who.join(" and ");
         let time = rounded(self.timed.time, 3);
         let sentence = match (self.timed.event.kind, self.tense) {
             (EventKind::Contact, Tense::Present) => format!("contact: {who} touch {place}"),
             (EventKind::Contact, Tense::Past) => format!("contact: {who} touched {place} at {time} s"),
+            (EventKind::Obstacle, Tense::Present) => format!("obstacle: {who} meets the {obstacle} {place}"),
+            (EventKind::Obstacle, Tense::Past) => {
+                format!("obstacle: {who} met the {obstacle} {place} at {time} s")
+            }
             (EventKind::Stall, Tense::Present) => format!("stall: {who} stalls, its rear handle {place}"),
             (EventKind::Stall, Tense::Past) => format!("stall: {who} stalled at {time} s, its rear handle {place}"),
             (EventKind::Lock, Tense::Present) => format!("lock: {who} locks, its rear handle {place}"),
@@ -63,7 +70,7 @@ impl Happened {
         sentence + " (counting from 1)"
     }
 
-    /// Returns the mark of the event: a ring and a cross for a contact, a diamond for a stall, a square for a lock. It
+    /// Returns the mark of the event: a ring and a cross for a contact or an obstacle, a diamond for a stall, a square for a lock. It
     /// has the colour of danger if the event is now, a quiet colour if it was before.
     pub fn sign(&self, (x, y): (f64, f64), palette: &Palette) -> Group {
         let colour = match self.tense {
@@ -78,7 +85,7 @@ impl Happened {
                 path.set("stroke", colour).set("stroke-width", width)
             };
             group = match self.timed.event.kind {
-                EventKind::Contact => group
+                EventKind::Contact | EventKind::Obstacle => group
                     .add(
                         Circle::new()
                             .set("cx", rounded(x, 3))

@@ -38,7 +38,7 @@ impl StageEvent {
 impl CollisionAlert {
     /// Returns the level, or `None` for a number that this layout does not know.
     pub fn alert_level(&self) -> Option<Level> {
-        of_number(&Level::ALL, self.level)
+        Level::ALL.into_iter().find(|level| *level as u32 == self.level)
     }
 
     /// Returns the kind of the alert's event; `None` if the alert has no event.
@@ -73,20 +73,31 @@ mod tests {
     #[test]
     fn numbers_are_those_of_the_design_and_come_back() {
         let states = FrameState::ALL.map(|state| (state as u32, state.name()));
-        let expected = [(0, "moving"), (1, "approaching"), (2, "contact"), (3, "stall"), (4, "lock"), (5, "path_end")];
+        let expected = [
+            (0, "moving"),
+            (1, "approaching"),
+            (2, "contact"),
+            (3, "stall"),
+            (4, "lock"),
+            (5, "path_end"),
+            (6, "obstacle"),
+        ];
         assert_eq!(states, expected);
         let levels = Level::ALL.map(|level| (level as u32, level.name()));
-        assert_eq!(levels, [(0, "clear"), (1, "approaching"), (2, "contact"), (3, "stall"), (4, "lock")]);
+        assert_eq!(
+            levels,
+            [(0, "clear"), (1, "approaching"), (2, "contact"), (3, "stall"), (4, "lock"), (6, "obstacle")]
+        );
         let playback = PlaybackState::ALL.map(|playback| (playback as u32, playback.name()));
         assert_eq!(playback, [(0, "playing"), (1, "paused"), (2, "held"), (3, "ended")]);
         let header = |state, playback| FrameHeader { state, playback, ..Default::default() };
         assert_eq!(header(4, 3).frame_state(), Some(FrameState::Lock));
         assert_eq!(header(4, 3).playback_state(), Some(PlaybackState::Ended));
-        assert_eq!((header(6, 4).frame_state(), header(6, 4).playback_state()), (None, None));
+        assert_eq!((header(7, 4).frame_state(), header(7, 4).playback_state()), (None, None));
         let alert = |level, event| CollisionAlert { level, event, ..Default::default() };
         assert_eq!(alert(1, 2).alert_level(), Some(Level::Approaching));
         assert_eq!(alert(1, 2).event_kind(), Some(EventKind::Contact));
         assert_eq!(alert(0, 0).event_kind(), None);
-        assert_eq!((alert(5, 6).alert_level(), alert(5, 6).event_kind()), (None, None));
+        assert_eq!((alert(5, 7).alert_level(), alert(5, 7).event_kind()), (None, None));
     }
 }

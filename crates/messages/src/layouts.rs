@@ -117,8 +117,9 @@ pub struct FrameHeader {
     /// Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged after the end of the
     /// show.
     pub time_scale: f64,
-    /// Metres between the nearest two boards that share no handle, negative when they overlap; NaN if the scene
-    /// has no `[alerts]` or fewer than three benches.
+    /// Metres between the nearest two boards that share no handle, negative when they overlap; of a scene with obstacles
+    /// the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than three benches and
+    /// no obstacles.
     pub min_clearance: f64,
     /// The number of handles in this message.
     pub handles: u32,
@@ -137,9 +138,10 @@ pub struct FrameHeader {
 
 /// A change of the alert level, or a step of the countdown towards an event.
 ///
-/// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level. The fields
-/// that begin with `event` are the event the alert is about: the next contact, stall or lock while the level is clear
-/// or approaching, else the event that has happened.
+/// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level, or a board and
+/// an obstacle that are nearer. The fields that begin with `event` are the event the alert is about: the next contact,
+/// obstacle, stall or lock while the level is clear or approaching, else the event that has happened. An obstacle stands
+/// where a second bench would, by its number: the number of handles plus its place in the scene, the boundary last.
 ///
 /// Over iceoryx2 the payload of `<name>/alerts`.
 ///
@@ -177,8 +179,8 @@ pub struct CollisionAlert {
     pub event_time: f64,
     /// `event_time - sim_time`, simulated seconds; negative once it has passed; NaN if there is no event.
     pub time_to_event: f64,
-    /// Metres between the nearest two boards in that frame, negative when they overlap; NaN if there are fewer than
-    /// three benches.
+    /// Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle; negative
+    /// when they overlap; NaN if there are neither.
     pub clearance: f64,
     /// The midpoint between the nearest two boards, metres right of the centre; NaN if there are fewer than three
     /// benches.
@@ -186,8 +188,8 @@ pub struct CollisionAlert {
     /// The midpoint between the nearest two boards, metres up from the centre; NaN if there are fewer than three
     /// benches.
     pub y: f64,
-    /// The place of the event, metres right of the centre: the touching point of a contact, the rear handle of the
-    /// bench that stalls or locks; NaN if there is no event.
+    /// The place of the event, metres right of the centre: the touching point of a contact, the point of a board nearest
+    /// to an obstacle, the rear handle of the bench that stalls or locks; NaN if there is no event.
     pub event_x: f64,
     /// The place of the event, metres up from the centre; NaN if there is no event.
     pub event_y: f64,
@@ -195,14 +197,14 @@ pub struct CollisionAlert {
     pub level: u32,
     /// The first of the nearest two benches, from 0, or [`NO_BENCH`].
     pub bench_a: u32,
-    /// The second of the nearest two benches, or [`NO_BENCH`].
+    /// The second of the nearest two benches, or an obstacle's number, or [`NO_BENCH`].
     pub bench_b: u32,
     /// The kind of the event: one of [`EventKind`](crate::state::EventKind), with the number of the frame's state that
     /// it leads to; 0 if there is no event.
     pub event: u32,
-    /// The bench that stalls or locks, or the first of two that touch, or [`NO_BENCH`].
+    /// The bench that stalls, locks or reaches an obstacle, or the first of two that touch, or [`NO_BENCH`].
     pub event_bench_a: u32,
-    /// The second of two benches that touch, or [`NO_BENCH`].
+    /// The second of two benches that touch, or an obstacle's number, or [`NO_BENCH`].
     pub event_bench_b: u32,
 }
 

@@ -49,10 +49,11 @@ pub fn chase_sentence(status: &ChaseStatus) -> String {
     format!("{subject} {}{error}{distance}", state.map_or("in an unknown state", ChaseState::words))
 }
 
-/// Returns the name of a bench for people, counted from 1.
+/// Returns the name of a bench for people, counted from 1; of a number that follows the handles, an obstacle's.
 pub fn bench_name(bench: u32, benches: u32) -> String {
     let number = u64::from(bench) + 1;
     match number {
+        _ if bench > benches => format!("obstacle {}", bench - benches),
         1 => "bench 1 (the head)".to_owned(),
         _ if number == u64::from(benches) => format!("bench {number} (the tail)"),
         _ => format!("bench {number}"),
@@ -90,6 +91,10 @@ fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
     let who = names(alert.event_benches(), benches);
     let (time, place) = (alert.event_time, place(alert));
     match kind {
+        EventKind::Obstacle => {
+            let [bench, obstacle] = [alert.event_bench_a, alert.event_bench_b].map(|of| bench_name(of, benches));
+            format!("{bench} met {obstacle} at {place}, t = {time:.6} s")
+        }
         EventKind::Contact => format!("{who} touched at {place}, t = {time:.6} s"),
         EventKind::Stall => {
             format!("{who} stalled, t = {time:.6} s: from the handle at {place} on, the team was pushed backwards")

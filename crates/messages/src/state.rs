@@ -3,10 +3,10 @@
 //! Only this file has the [`Severity`] of each: colours, signs and diagnostics follow from the severity, and not from
 //! the list of states.
 //!
-//! On the wire the values of each type are numbered in their order, from 0. The constants in `msgs/msg` and in the
+//! On the wire the values of each type are numbered in their order, from 0; levels have the numbers of their states. The constants in `msgs/msg` and in the
 //! Python layouts are generated from this file, doc comments included: see [`layouts`](crate::layouts).
 
-/// The kinds of events. Their order is that in which two events at one time are listed.
+/// The kinds of events. Two events at one time are listed in this order, those that end a motion last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EventKind {
     /// Two boards that share no handle first touch.
@@ -17,6 +17,8 @@ pub enum EventKind {
     Lock,
     /// The head reaches the end of the path.
     PathEnd,
+    /// A board reaches the keep-out of an obstacle, or leaves the boundary by its keep-out.
+    Obstacle,
 }
 
 impl EventKind {
@@ -24,6 +26,7 @@ impl EventKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Contact => "contact",
+            Self::Obstacle => "obstacle",
             Self::Stall => "stall",
             Self::Lock => "lock",
             Self::PathEnd => "path_end",
@@ -68,11 +71,14 @@ pub enum FrameState {
     Lock,
     /// The head has reached the end of the path.
     PathEnd,
+    /// A board has reached the keep-out of an obstacle, or has left the boundary by its keep-out.
+    Obstacle,
 }
 
 impl FrameState {
     /// Every state, in the order of their numbers on the wire.
-    pub const ALL: [Self; 6] = [Self::Moving, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::PathEnd];
+    pub const ALL: [Self; 7] =
+        [Self::Moving, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::PathEnd, Self::Obstacle];
 
     /// Returns the event that led to this state; `None` if no event has happened.
     pub fn event(self) -> Option<EventKind> {
@@ -82,6 +88,7 @@ impl FrameState {
             Self::Stall => Some(EventKind::Stall),
             Self::Lock => Some(EventKind::Lock),
             Self::PathEnd => Some(EventKind::PathEnd),
+            Self::Obstacle => Some(EventKind::Obstacle),
         }
     }
 
@@ -90,7 +97,7 @@ impl FrameState {
         match self {
             Self::Moving | Self::PathEnd => Severity::Ok,
             Self::Approaching => Severity::Warning,
-            Self::Contact | Self::Stall | Self::Lock => Severity::Error,
+            Self::Contact | Self::Stall | Self::Lock | Self::Obstacle => Severity::Error,
         }
     }
 
@@ -103,6 +110,7 @@ impl FrameState {
             Self::Stall => EventKind::Stall.name(),
             Self::Lock => EventKind::Lock.name(),
             Self::PathEnd => EventKind::PathEnd.name(),
+            Self::Obstacle => EventKind::Obstacle.name(),
         }
     }
 }
@@ -111,6 +119,7 @@ impl From<EventKind> for FrameState {
     fn from(kind: EventKind) -> Self {
         match kind {
             EventKind::Contact => Self::Contact,
+            EventKind::Obstacle => Self::Obstacle,
             EventKind::Stall => Self::Stall,
             EventKind::Lock => Self::Lock,
             EventKind::PathEnd => Self::PathEnd,
@@ -126,6 +135,7 @@ impl From<Level> for FrameState {
             Level::Contact => Self::Contact,
             Level::Stall => Self::Stall,
             Level::Lock => Self::Lock,
+            Level::Obstacle => Self::Obstacle,
         }
     }
 }
@@ -143,16 +153,19 @@ pub enum Level {
     Stall,
     /// A link is in a singular configuration: the motion cannot continue.
     Lock,
+    /// A board has reached the keep-out of an obstacle, or has left the boundary by its keep-out.
+    Obstacle = 6,
 }
 
 impl Level {
-    /// Every level, in the order of their numbers on the wire.
-    pub const ALL: [Self; 5] = [Self::Clear, Self::Approaching, Self::Contact, Self::Stall, Self::Lock];
+    /// Every level, in the order of their numbers on the wire, which are those of the states: 5 is no level.
+    pub const ALL: [Self; 6] = [Self::Clear, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::Obstacle];
 
     /// Returns the level that an event raises; `None` for the end of the path, which raises none.
     pub fn of(kind: EventKind) -> Option<Self> {
         match kind {
             EventKind::Contact => Some(Self::Contact),
+            EventKind::Obstacle => Some(Self::Obstacle),
             EventKind::Stall => Some(Self::Stall),
             EventKind::Lock => Some(Self::Lock),
             EventKind::PathEnd => None,

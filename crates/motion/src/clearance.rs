@@ -9,6 +9,7 @@ mod cells;
 mod grid;
 mod lists;
 mod moving;
+mod obstacles;
 mod search;
 #[cfg(test)]
 mod tests;
@@ -22,6 +23,7 @@ use crate::model::team::Team;
 use crate::solve::Chain;
 use crate::solve::table::FollowerTable;
 use bounds::BoundTable;
+pub use obstacles::ObstacleMonitor;
 use search::{CarriedBounds, ClearanceSearch};
 
 /// The nearest two boards that share no handle.

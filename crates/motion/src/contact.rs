@@ -47,6 +47,7 @@
 mod broad_phase;
 mod configuration;
 mod displacement;
+mod ground;
 mod reach;
 mod search;
 
@@ -57,7 +58,9 @@ use crate::model::root::golden_section_min;
 use crate::model::team::Team;
 
 use super::event::{Budget, Event};
+use super::ground::Ground;
 use configuration::Configuration;
+pub use ground::{ObstacleClearance, Touch};
 
 /// The result of a search, and how far it came.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,6 +133,36 @@ impl<'a> ConservativeAdvancement<'a> {
         budget: &mut Budget,
     ) -> Result<Found<LeastClearance>, NoFollower> {
         search::least_clearance(self, from, to, budget)
+    }
+
+    /// Finds the first touch of each obstacle of a ground, in the path's own coordinates, while the head goes from one
+    /// place to another: the first place, to the last digits, at which its clearance is 0 or less. Returns them in the
+    /// order of the obstacles, and the metres of travel up to which that is proved.
+    ///
+    /// # Errors
+    /// [`NoFollower`] if a configuration strictly inside the motion cannot be solved.
+    pub fn first_touches(
+        &self,
+        ground: &Ground,
+        from: f64,
+        to: f64,
+        budget: &mut Budget,
+    ) -> Result<(Vec<Option<Touch>>, f64), NoFollower> {
+        ground::first_touches(self, ground, (from, to), budget)
+    }
+
+    /// Finds the least clearance of each obstacle of a ground as [`first_touches`](Self::first_touches).
+    ///
+    /// # Errors
+    /// [`NoFollower`] if a configuration strictly inside the motion cannot be solved.
+    pub fn obstacle_clearances(
+        &self,
+        ground: &Ground,
+        from: f64,
+        to: f64,
+        budget: &mut Budget,
+    ) -> Result<(Vec<Option<ObstacleClearance>>, f64), NoFollower> {
+        ground::least_clearances(self, ground, (from, to), budget)
     }
 
     /// Returns the least clearance of one pair within a bracket that holds one minimum, and the head's place there.

@@ -26,11 +26,14 @@ pub struct Event {
     pub kind: EventKind,
     /// Metres that the head has travelled along the path since the scene's start.
     pub travelled: f64,
-    /// The first bench concerned: of two that touch, the bench nearer the head; else the bench that stalls or locks.
+    /// The first bench concerned: of two that touch, the bench nearer the head; else the bench that stalls, locks or
+    /// reaches an obstacle.
     pub bench_a: Option<u32>,
-    /// The second of two benches that touch.
+    /// The second of two benches that touch. An obstacle stands here by its number: the number of handles plus its place
+    /// on the ground.
     pub bench_b: Option<u32>,
-    /// The touching point, or the rear handle of a stall or lock. `None` for the path's end.
+    /// The touching point, the point of the board nearest to an obstacle, or the rear handle of a stall or lock. `None`
+    /// for the path's end.
     pub place: Option<Point>,
 }
 

@@ -8,6 +8,7 @@
 pub mod clearance;
 pub mod contact;
 pub mod event;
+pub mod ground;
 pub mod linkage;
 pub mod model;
 pub mod placement;
@@ -28,12 +29,13 @@ use crate::solve::selection::{self, Selection};
 use crate::solve::table::{FollowerTable, Instructions};
 use crate::solve::{Solver, Velocities};
 
-use clearance::ClearanceMonitor;
-use contact::{ConservativeAdvancement, LeastClearance};
+use clearance::{ClearanceMonitor, ObstacleMonitor};
+use contact::{ConservativeAdvancement, LeastClearance, Touch};
 use event::{Budget, Event};
+use ground::{Ground, Obstacle};
 use placement::{Placed, Placement};
 use singularities::Singularities;
-use timeline::{TimedClearance, TimedEvent, Timeline};
+use timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
 
 /// The choice of the solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,6 +110,8 @@ pub struct Motion {
     method: Method,
     instructions: Instructions,
     placement: Placement,
+    /// In stage coordinates.
+    ground: Ground,
 }
 
 /// Units of work after which the search for stall and lock gives up: about ten seconds.
@@ -154,7 +158,8 @@ impl Motion {
             return Err(MotionError::PaperElsewhere);
         }
         let instructions = Instructions::fastest(team.handles());
-        Ok(Self { description, path, team, head_speed, method, instructions, placement: Placement::IDENTITY })
+        let (placement, ground) = (Placement::IDENTITY, Ground::default());
+        Ok(Self { description, path, team, head_speed, method, instructions, placement, ground })
     }
 
     /// Returns the same motion at another place of the stage.
@@ -162,9 +167,20 @@ impl Motion {
         Self { placement, ..self }
     }
 
+    /// Returns the same motion on a stage with these obstacles, which are in stage coordinates.
+    pub fn on_ground(self, ground: Ground) -> Self {
+        Self { ground, ..self }
+    }
+
+    /// Returns the obstacles, in stage coordinates.
+    pub fn ground(&self) -> &Ground {
+        &self.ground
+    }
+
     /// Returns the same motion in the path's own coordinates: its chains are those of [`Motion::path`].
     pub fn in_own_frame(&self) -> Self {
-        self.clone().placed(Placement::IDENTITY)
+        let ground = self.ground.in_own_frame(&self.placement);
+        Self { ground, ..self.clone().placed(Placement::IDENTITY) }
     }
 
     /// Returns the mapping of the path's own coordinates to the stage.
@@ -203,7 +219,8 @@ impl Motion {
     /// [`MotionError::PaperElsewhere`]
     pub fn with_method(&self, method: Method) -> Result<Self, MotionError> {
         let other = Self::new(self.description.clone(), self.team, self.head_speed, method)?;
-        Ok(Self { instructions: self.instructions, placement: self.placement, ..other })
+        let Self { instructions, placement, ref ground, .. } = *self;
+        Ok(Self { instructions, placement, ground: ground.clone(), ..other })
     }
 
     /// Returns the instructions that read a table: the fastest of this processor, unless others were requested.
@@ -309,6 +326,13 @@ impl Motion {
         }
     }
 
+    /// Makes the monitor of the clearance of the obstacles in this motion's frames, in the path's own coordinates; `None`
+    /// without obstacles. `choice` is as in [`Motion::clearance_monitor`].
+    pub fn obstacle_monitor(&self, choice: &Choice) -> Option<ObstacleMonitor> {
+        let ground = self.ground.in_own_frame(&self.placement);
+        (!ground.is_empty()).then(|| ObstacleMonitor::new(self.team, ground, choice.table.as_ref()))
+    }
+
     /// Returns the greatest error of a link, metres, beyond rounding. The paper's bisection stops at an angle, and
     /// along an arc of radius r a chord changes by at most r per radian.
     pub(crate) fn link_error(&self) -> f64 {
@@ -352,8 +376,9 @@ impl Motion {
         let end = self.end(&found);
         let mut searched_until = found.searched_until;
         let mut events: Vec<Event> = found.stall.into_iter().chain([end]).collect();
-        let mut progress = |share: f64| progress(0.1 + 0.9 * share);
-        let mut budget = Budget::new(CONTACT_BUDGET, &mut progress);
+        let part = if self.ground.is_empty() { 0.9 } else { 0.5 };
+        let mut of_contact = |share: f64| progress(0.1 + part * share);
+        let mut budget = Budget::new(CONTACT_BUDGET, &mut of_contact);
         let until = end.travelled.min(searched_until);
         match self.advancement(&found).first_contact(0.0, until, &mut budget) {
             Ok(contact) => {
@@ -365,7 +390,39 @@ impl Motion {
                 searched_until = 0.0;
             }
         }
+        if !self.ground.is_empty() {
+            let (touches, reached) = self.touches(&found, until, &mut |share| progress(0.6 + 0.4 * share));
+            searched_until = searched_until.min(reached);
+            events.extend(touches);
+        }
         self.timed(events, searched_until)
+    }
+
+    /// Returns the first touch of each obstacle up to a place of the head, and how far the search came.
+    fn touches(&self, found: &Singularities, until: f64, progress: &mut dyn FnMut(f64)) -> (Vec<Event>, f64) {
+        let ground = self.ground.in_own_frame(&self.placement);
+        let mut budget = Budget::new(CONTACT_BUDGET, progress);
+        match self.advancement(found).first_touches(&ground, 0.0, until, &mut budget) {
+            Ok((touches, reached)) => {
+                let reached = if reached < until { reached } else { f64::INFINITY };
+                (touches.into_iter().flatten().map(|touch| self.touch_event(touch)).collect(), reached)
+            }
+            Err(stuck) => {
+                log::warn!("the search for obstacles stopped at a place without a solution: {stuck}");
+                (Vec::new(), 0.0)
+            }
+        }
+    }
+
+    fn touch_event(&self, Touch { obstacle, travelled, bench, place }: Touch) -> Event {
+        let bench_b = Some(self.obstacle_number(obstacle));
+        Event { kind: EventKind::Obstacle, travelled, bench_a: Some(bench), bench_b, place: Some(place) }
+    }
+
+    /// Returns the number that stands for an obstacle of the ground where a second bench would: obstacles follow the
+    /// handles.
+    pub fn obstacle_number(&self, obstacle: usize) -> u32 {
+        (self.team.handles() + obstacle) as u32
     }
 
     /// Returns the events without the contact, which costs a search.
@@ -398,6 +455,37 @@ impl Motion {
             time: self.time_at(travelled),
             searched_until: (least.searched_until < to).then(|| self.time_at(least.searched_until)),
         })
+    }
+
+    /// Returns the least clearance of each obstacle from the start until the show ends at `freeze`. `progress` is called
+    /// as by [`Motion::timeline`]. The list is empty without obstacles, and if a place inside the motion has no solution.
+    pub fn obstacle_clearances(
+        &self,
+        freeze: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Vec<TimedObstacleClearance> {
+        if self.ground.is_empty() {
+            return Vec::new();
+        }
+        let found = self.singularities(&mut |_| ());
+        let to = freeze.event.travelled;
+        let mut budget = Budget::new(CONTACT_BUDGET, progress);
+        let ground = self.ground.in_own_frame(&self.placement);
+        let Ok((least, reached)) = self.advancement(&found).obstacle_clearances(&ground, 0.0, to, &mut budget) else {
+            return Vec::new();
+        };
+        let searched_until = (reached < to).then(|| self.time_at(reached));
+        let timed = least.into_iter().enumerate().filter_map(|(obstacle, least)| {
+            let least = least?;
+            Some(TimedObstacleClearance { obstacle, least, time: self.time_at(least.travelled), searched_until })
+        });
+        timed.collect()
+    }
+
+    /// Returns the obstacle that an event of this motion reaches; `None` for other kinds.
+    pub fn obstacle_of(&self, event: &Event) -> Option<&Obstacle> {
+        let number = event.bench_b.filter(|_| event.kind == EventKind::Obstacle)?;
+        self.ground.obstacles().get((number as usize).checked_sub(self.team.handles())?)
     }
 
     /// Searches for stall, lock and the turns of the handles.

@@ -115,6 +115,13 @@ impl Placement {
         Point::from(self.vector(point.coords) + self.origin)
     }
 
+    /// Returns the point in the path's own coordinates of a stage point.
+    pub fn own_point(&self, point: Point) -> Point {
+        let moved = point.coords - self.origin;
+        let Some(Turn { sine, cosine, side, .. }) = self.turn else { return moved.into() };
+        Point::new(cosine * moved.x + sine * moved.y, side * (cosine * moved.y - sine * moved.x))
+    }
+
     /// Returns the stage vector of a vector in the path's own coordinates.
     pub fn vector(&self, vector: Vector) -> Vector {
         self.turn.map_or(vector, |turn| <[f64; 2]>::from(turn.vector(vector.x, vector.y)).into())
@@ -204,6 +211,7 @@ mod tests {
             assert!(turned.min(TAU - turned) < 1e-15 && chain.heading[k] > -PI && chain.heading[k] <= PI);
             let point = placement.point(Point::new(before.x[k], before.y[k]));
             assert_eq!((point.x, point.y), (chain.x[k], chain.y[k]));
+            assert!((placement.own_point(point) - Point::new(before.x[k], before.y[k])).norm() < 1e-14);
         }
         assert_eq!(chain.speed, before.speed);
     }

@@ -1,7 +1,7 @@
 //! The events of a motion with their times. [`super::Motion`] makes a timeline; the show, `events`, `solve` and `draw`
 //! use it.
 
-use super::contact::LeastClearance;
+use super::contact::{LeastClearance, ObstacleClearance};
 use super::event::Event;
 use bench_dragon_messages::state::EventKind;
 
@@ -25,7 +25,20 @@ pub struct TimedClearance {
     pub searched_until: Option<f64>,
 }
 
-/// The first event of each kind that happens, in order of time; the last one ends the motion.
+/// The least clearance of an obstacle over a show, and its time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedObstacleClearance {
+    /// The obstacle's number on its ground.
+    pub obstacle: usize,
+    /// The clearance, its bench, and the place of the head.
+    pub least: ObstacleClearance,
+    /// Simulated seconds since the start of the scene.
+    pub time: f64,
+    /// Simulated seconds up to which the search is complete, if it gave up before its end.
+    pub searched_until: Option<f64>,
+}
+
+/// The first event of each kind that happens, and of each obstacle, in order of time; the last one ends the motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
     events: Vec<TimedEvent>,
@@ -37,7 +50,11 @@ impl Timeline {
     /// time at which a search gave up before the motion's end.
     pub fn new(mut events: Vec<TimedEvent>, searched_until: Option<f64>) -> Self {
         // At one time, in the order of the kinds.
-        events.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.event.kind.cmp(&b.event.kind)));
+        let ends = |timed: &TimedEvent| matches!(timed.event.kind, EventKind::Lock | EventKind::PathEnd);
+        events.sort_by(|a, b| {
+            let by_time = a.time.total_cmp(&b.time).then(a.event.kind.cmp(&b.event.kind));
+            ends(a).cmp(&ends(b)).then(by_time).then(a.event.bench_b.cmp(&b.event.bench_b))
+        });
         Self { events, searched_until }
     }
 
@@ -58,7 +75,7 @@ impl Timeline {
         self.searched_until
     }
 
-    /// Returns the event of a kind, if there is one.
+    /// Returns the first event of a kind, if there is one.
     pub fn find(&self, kind: EventKind) -> Option<&TimedEvent> {
         self.events.iter().find(|timed| timed.event.kind == kind)
     }
@@ -69,21 +86,24 @@ impl Timeline {
         &self.events[self.events.len() - 1]
     }
 
-    /// Returns the event at which a show ends: the contact if it stops there, else the motion's end.
+    /// Returns the event at which a show ends: the first contact or obstacle if it stops there, else the motion's end.
     pub fn freeze(&self, stops_at_contact: bool) -> &TimedEvent {
-        self.find(EventKind::Contact).filter(|_| stops_at_contact).unwrap_or(self.end())
+        let touches = |timed: &&TimedEvent| matches!(timed.event.kind, EventKind::Contact | EventKind::Obstacle);
+        self.events.iter().find(touches).filter(|_| stops_at_contact).unwrap_or(self.end())
     }
 
-    /// Makes room for one more event, so that [`Timeline::record_contact`] does not allocate.
-    pub fn reserve_contact(&mut self) {
+    /// Makes room for one more event, so that [`Timeline::record_touch`] does not allocate.
+    pub fn reserve_touch(&mut self) {
         self.events.reserve(1);
     }
 
-    /// Replaces the predicted contact by a measured one.
-    pub fn record_contact(&mut self, contact: TimedEvent) {
-        self.events.retain(|timed| timed.event.kind != EventKind::Contact);
-        let at = self.events.partition_point(|timed| timed.time <= contact.time).min(self.events.len() - 1);
-        self.events.insert(at, contact);
+    /// Replaces the predicted contact, or the predicted touch of the same obstacle, by a measured one.
+    pub fn record_touch(&mut self, touch: TimedEvent) {
+        let (kind, obstacle) = (touch.event.kind, touch.event.bench_b);
+        let is_other = |of: &Event| of.kind != kind || (kind == EventKind::Obstacle && of.bench_b != obstacle);
+        self.events.retain(|timed| is_other(&timed.event));
+        let at = self.events.partition_point(|timed| timed.time <= touch.time).min(self.events.len() - 1);
+        self.events.insert(at, touch);
     }
 
     /// Returns the latest event at or before a time.
@@ -91,7 +111,7 @@ impl Timeline {
         self.events.iter().rev().find(|timed| timed.time <= sim_time)
     }
 
-    /// Returns the next contact, stall or lock after a time.
+    /// Returns the next contact, obstacle, stall or lock after a time.
     pub fn next_alertable(&self, sim_time: f64) -> Option<&TimedEvent> {
         self.events.iter().find(|timed| timed.time > sim_time && timed.event.kind != EventKind::PathEnd)
     }

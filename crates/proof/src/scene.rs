@@ -45,6 +45,7 @@ struct Text {
     team: TeamText,
     path: PathText,
     motion: MotionText,
+    stage: Option<serde::de::IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -132,6 +133,9 @@ impl Scene {
         };
         if text.motion.solver.as_deref() == Some("paper") {
             return Err("the scene names the solver \"paper\", whose motion is not the exact one".to_owned());
+        }
+        if text.stage.is_some() {
+            return Err("the scene has a table [stage], of which no proof knows".to_owned());
         }
         let head_speed = positive("motion.head_speed", text.motion.head_speed)?;
         Ok(Self { team, path, head_speed })

@@ -224,7 +224,7 @@ impl ShowBridge {
                     open.topics.status(status);
                 }
             }
-            FeedEvent::Silent => (),
+            FeedEvent::Chase(_) | FeedEvent::Silent => (),
             FeedEvent::Gone => {
                 self.close();
                 *self = Self { counters: self.counters, ..Self::new(self.name.clone(), self.settings.clone()) };

@@ -12,9 +12,9 @@ use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
 use bench_dragon_messages::state::Level;
 
-/// The greatest number of alerts of one frame: contact, stall and lock, all passed in one step. Approaching and clear
-/// are alone.
-pub const MOST_PER_FRAME: usize = 3;
+/// The greatest number of alerts of one frame: contact, stall and lock, all passed in one step, and obstacles before,
+/// between and behind them. Approaching and clear are alone.
+pub const MOST_PER_FRAME: usize = 7;
 
 /// Clearance at which the level may be released, as a multiple of the clearance that raised it. Without this
 /// hysteresis, a clearance that oscillates about the threshold would make the level flicker.
@@ -30,10 +30,10 @@ const RELEASE_HOLD: f64 = 0.1;
 pub struct Alert {
     /// The level.
     pub level: Level,
-    /// The event of the alert. While the level is clear or approaching: the next contact, stall or lock, if any. Else:
+    /// The event of the alert. While the level is clear or approaching: the next contact, obstacle, stall or lock, if any. Else:
     /// the latest event that has happened.
     pub event: Option<TimedEvent>,
-    /// The nearest two boards in the frame; `None` with fewer than three benches.
+    /// The nearest two boards in the frame, or a board and an obstacle; `None` with neither.
     pub nearest: Option<PairClearance>,
 }
 

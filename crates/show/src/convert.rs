@@ -226,9 +226,13 @@ pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], mot
         segments += 1;
     }
     let mut timeline = [StageEvent::default(); MOST_EVENTS];
-    let events = show.timeline().events();
-    for (slot, timed) in timeline.iter_mut().zip(events) {
-        let TimedEvent { time, event: Event { kind, travelled: _, bench_a: _, bench_b: _, place: _ } } = *timed;
+    // Of several obstacles the first event only.
+    let all = show.timeline().events();
+    let is_first =
+        |timed: &&TimedEvent| show.timeline().find(timed.event.kind).is_some_and(|first| std::ptr::eq(first, *timed));
+    let events: Vec<&TimedEvent> = all.iter().filter(is_first).collect();
+    for (slot, timed) in timeline.iter_mut().zip(&events) {
+        let TimedEvent { time, event: Event { kind, travelled: _, bench_a: _, bench_b: _, place: _ } } = **timed;
         *slot = StageEvent { time, state: FrameState::from(kind) as u32, reserved: 0 };
     }
     let mut cue_list = [StageCue::default(); MOST_CUES];

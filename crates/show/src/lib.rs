@@ -16,7 +16,7 @@ use std::sync::Arc;
 use crate::scene::cue::CueAction;
 use crate::scene::{OnContact, Scene};
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::clearance::{ClearanceMonitor, PairClearance};
+use bench_dragon_motion::clearance::{ClearanceMonitor, ObstacleMonitor, PairClearance};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::linkage::NoFollower;
 use bench_dragon_motion::placement::Placement;
@@ -45,7 +45,8 @@ pub struct Frame {
     pub playback: PlaybackState,
     /// The pose of every handle.
     pub chain: Chain,
-    /// Metres between the nearest two boards that share no handle; NaN if it is not computed.
+    /// The least clearance, metres: of two boards that share no handle, or of a board and an obstacle; NaN if it is not
+    /// computed.
     pub min_clearance: f64,
     /// The alerts that go with this frame, in order. Its capacity is reserved in advance.
     pub alerts: Vec<Alert>,
@@ -59,7 +60,8 @@ pub struct Frame {
     pub commands: Vec<CommandRecord>,
     /// Number of times that the show has ended and started again.
     pub shows_played: u64,
-    /// Number of contacts that no search had found: boards that overlapped before the next contact of the timeline.
+    /// Number of contacts that no search had found: boards that overlapped each other, or the keep-out of an obstacle,
+    /// before the timeline's event.
     pub unforeseen_contacts: u64,
     /// Number of frames without a solution: the previous chain was kept.
     pub unsolved_frames: u64,
@@ -130,6 +132,7 @@ pub struct Show {
     metres_per_second: f64,
     timeline: Timeline,
     clearance: Option<ClearanceMonitor>,
+    obstacles: Option<ObstacleMonitor>,
     level: Option<LevelTracker>,
     /// Greatest overlap in metres that rounding explains before a contact; `None` if the solver does not follow the
     /// searched motion.
@@ -137,6 +140,8 @@ pub struct Show {
     /// The time requested for the chain, and true if the chain moves then.
     solved: Option<(f64, bool)>,
     /// The nearest two boards of the solution.
+    nearest_boards: Option<PairClearance>,
+    /// The nearest two boards of the solution, or a board that is nearer to an obstacle.
     closest: Option<PairClearance>,
     placement: Placement,
     /// The cues in the order of their times.
@@ -163,7 +168,7 @@ impl Show {
             return Err(StartError { start: playback.start, end: end.time, kind: end.event.kind });
         }
         let mut timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
-        timeline.reserve_contact();
+        timeline.reserve_touch();
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         let freeze_time = timeline.freeze(stops).time;
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
@@ -171,6 +176,7 @@ impl Show {
         let own = scene.motion.in_own_frame();
         let choice = own.solver(scene.velocities);
         let clearance = scene.alerts.map(|_| own.clearance_monitor(&choice));
+        let obstacles = scene.alerts.and_then(|_| own.obstacle_monitor(&choice));
         let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + choice.clearance_error(scene.team());
         let Choice { solver, reason, .. } = choice;
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
@@ -185,9 +191,11 @@ impl Show {
             metres_per_second: scene.motion.travelled_at(1.0),
             timeline,
             clearance,
+            obstacles,
             level,
             overlap_tolerance: exact.then_some(rounding),
             solved: None,
+            nearest_boards: None,
             closest: None,
             placement: *scene.motion.placement(),
             cues,
@@ -287,7 +295,10 @@ impl Show {
         (frame.tick, frame.sim_time, frame.time_scale, frame.playback) = (tick, sim_time, time_scale, playback);
         (frame.epoch, frame.shows_played, frame.cue) = (epoch, shows_played, cues_passed as u32);
         self.solve(sim_time);
-        self.record_unforeseen_contact(self.closest);
+        self.record_unforeseen_touch(self.nearest_boards);
+        if self.obstacles.is_some() {
+            self.record_unforeseen_touch(self.closest);
+        }
         self.update_state(jumped, self.closest);
         &self.frame
     }
@@ -302,7 +313,7 @@ impl Show {
         self.solved = Some((sim_time, moves));
         match solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain) {
             Ok(solved_at) => {
-                self.closest = self.measure_clearance(solved_at);
+                self.measure_clearance(solved_at);
                 self.placement.chain(&mut self.frame.chain);
             }
             Err(_) => self.frame.unsolved_frames += 1,
@@ -313,34 +324,47 @@ impl Show {
         }
     }
 
-    fn measure_clearance(&mut self, solved_at: f64) -> Option<PairClearance> {
+    fn measure_clearance(&mut self, solved_at: f64) {
         let travelled = self.metres_per_second * solved_at;
-        let least = self.clearance.as_mut()?.least_clearance(&self.frame.chain, travelled);
-        self.frame.min_clearance = least.map_or(f64::NAN, |least| least.value);
-        least.map(|pair| PairClearance {
+        let Some(clearance) = &mut self.clearance else { return };
+        let placed = |pair: PairClearance| PairClearance {
             point_a: self.placement.point(pair.point_a),
             point_b: self.placement.point(pair.point_b),
             ..pair
-        })
+        };
+        let boards = clearance.least_clearance(&self.frame.chain, travelled);
+        self.nearest_boards = boards.map(placed);
+        self.closest = self.nearest_boards;
+        if let Some(obstacles) = &mut self.obstacles {
+            let limit = boards.map_or(f64::INFINITY, |boards| boards.value);
+            let nearer = obstacles.nearest(&self.frame.chain, travelled, limit);
+            self.closest = nearer.map(placed).or(self.closest);
+        }
+        self.frame.min_clearance = self.closest.map_or(f64::NAN, |least| least.value);
     }
 
-    /// Records a contact if boards overlap although no contact has happened: the searches missed it.
-    fn record_unforeseen_contact(&mut self, closest: Option<PairClearance>) {
+    /// Records a contact, or the touch of an obstacle, if boards overlap although none has happened: the searches
+    /// missed it.
+    fn record_unforeseen_touch(&mut self, closest: Option<PairClearance>) {
         let (Some(tolerance), Some(closest)) = (self.overlap_tolerance, closest) else { return };
         let time = self.frame.sim_time;
-        let happened = self.timeline.find(EventKind::Contact).is_some_and(|contact| contact.time <= time);
+        let bench_b = closest.bench_b as u32;
+        let is_obstacle = closest.bench_b >= self.frame.chain.handles();
+        let kind = if is_obstacle { EventKind::Obstacle } else { EventKind::Contact };
+        let is_same = |event: &Event| event.kind == kind && (!is_obstacle || event.bench_b == Some(bench_b));
+        let happened = self.timeline.events().iter().any(|timed| timed.time <= time && is_same(&timed.event));
         if closest.value >= -tolerance || happened {
             return;
         }
         self.frame.unforeseen_contacts += 1;
         let event = Event {
-            kind: EventKind::Contact,
+            kind,
             travelled: f64::NAN,
             bench_a: Some(closest.bench_a as u32),
-            bench_b: Some(closest.bench_b as u32),
+            bench_b: Some(bench_b),
             place: Some(nalgebra::center(&closest.point_a, &closest.point_b)),
         };
-        self.timeline.record_contact(TimedEvent { event, time });
+        self.timeline.record_touch(TimedEvent { event, time });
     }
 
     fn update_state(&mut self, jumped: bool, closest: Option<PairClearance>) {

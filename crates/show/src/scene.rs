@@ -8,6 +8,7 @@ pub mod cue;
 pub mod path;
 pub mod precision;
 pub mod ros2;
+mod stage;
 mod text;
 
 use std::path::Path as FilePath;
@@ -21,6 +22,7 @@ use self::path::RawPath;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::RawRos2;
+use self::stage::RawStage;
 pub use self::text::{SceneText, printable};
 use bench_dragon_motion::model::Vector;
 use bench_dragon_motion::model::description::PathDescription;
@@ -240,6 +242,7 @@ struct RawScene {
     team: RawTeam,
     path: RawPath,
     placement: Option<RawPlacement>,
+    stage: Option<RawStage>,
     motion: RawMotion,
     alerts: Option<RawAlerts>,
     #[serde(default)]
@@ -330,6 +333,10 @@ impl RawScene {
         let placement = self.placement.as_ref().map(|placement| placement.validated(source)).transpose()?;
         let start = self.path.start(source)?;
         let motion = motion.placed(placement.unwrap_or(Placement::IDENTITY).after_moving_by(start));
+        let motion = match &self.stage {
+            Some(stage) => motion.on_ground(stage.validated(source)?),
+            None => motion,
+        };
         let name = match &self.name {
             None => stem.to_owned(),
             Some(name) if name.get_ref().trim().is_empty() => {

@@ -88,7 +88,10 @@ impl Kind {
 
 fn states(source: &Source, name: &str, item: &Enumeration) -> String {
     let mut text = format!("{}{name} = (\n", comment(&plain(source, None, &item.docs), ""));
+    let mut next = 0;
     for variant in &item.variants {
+        (next..variant.number).for_each(|_| text += "    # No value has this number.\n    None,\n");
+        next = variant.number + 1;
         text += &comment(&plain(source, None, &variant.docs), "    ");
         text += &format!("    \"{}\",\n", variant.name);
     }

@@ -173,11 +173,27 @@ fn docs(attributes: &[Attribute]) -> Docs {
 
 fn enumeration(item: &Item) -> Option<Enumeration> {
     let Item::Enum(ItemEnum { ident, attrs, variants, .. }) = item else { return None };
-    let variants = variants.iter().enumerate().map(|(number, variant)| {
-        assert!(variant.discriminant.is_none(), "{ident} is numbered in order, from 0");
-        Variant { name: snake_case(&variant.ident.to_string()), number: number as u64, docs: docs(&variant.attrs) }
+    let mut next = 0;
+    let variants = variants.iter().map(|variant| {
+        // Numbers may be left out, but they grow.
+        let given = variant.discriminant.as_ref().map(|(_, given)| number(given));
+        let number = given.unwrap_or(next);
+        assert!(number >= next, "{ident} is not in the order of its numbers");
+        next = number + 1;
+        Variant { name: snake_case(&variant.ident.to_string()), number, docs: docs(&variant.attrs) }
     });
     Some(Enumeration { name: ident.to_string(), docs: docs(attrs), variants: variants.collect() })
+}
+
+/// Returns the value of a literal integer.
+fn number(of: &Expr) -> u64 {
+    match of {
+        Expr::Lit(literal) => match &literal.lit {
+            Lit::Int(number) => number.base10_parse().unwrap(),
+            _ => panic!("a discriminant is not an integer"),
+        },
+        _ => panic!("a discriminant is not a literal"),
+    }
 }
 
 fn snake_case(name: &str) -> String {

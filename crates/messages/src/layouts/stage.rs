@@ -60,7 +60,7 @@ impl StageSegment {
     }
 }
 
-/// The most events of a motion: one of each kind.
+/// The most events of a motion: the first of each kind.
 pub const MOST_EVENTS: usize = 4;
 /// The most cues that a [`Stage`] has room for.
 pub const MOST_CUES: usize = 32;

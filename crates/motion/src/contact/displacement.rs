@@ -192,8 +192,23 @@ impl Displacements {
         self.handles[bench].run == self.handles[bench + 1].run && places.iter().all(|place| place.segment == segment)
     }
 
+    /// Returns the signed curvature of the line or circle on which a board stays while it goes one way; `None` if it is
+    /// not on one.
+    pub fn one_curve(
+        &self,
+        chain: &ConservativeAdvancement,
+        (before, after): (&Configuration, &Configuration),
+        bench: usize,
+    ) -> Option<f64> {
+        let curvature = chain.path.segment(before.places[bench]).constant_curvature()?;
+        let places = [before.places[bench], before.places[bench + 1], after.places[bench], after.places[bench + 1]];
+        let curve = chain.curves[places[0].segment];
+        let stays = places.iter().all(|place| chain.curves[place.segment] == curve);
+        (stays && self.handles[bench].run == self.handles[bench + 1].run).then_some(curvature)
+    }
+
     /// Returns an upper bound of the displacement of a board's points on the stage, metres.
-    fn on_stage(&self, chain: &ConservativeAdvancement, bench: usize, weights: Weights) -> f64 {
+    pub fn on_stage(&self, chain: &ConservativeAdvancement, bench: usize, weights: Weights) -> f64 {
         weights.board(chain.team, bench, self.handles[bench].length, self.handles[bench + 1].length)
     }
 }

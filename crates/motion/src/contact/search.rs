@@ -17,10 +17,10 @@ use super::{ConservativeAdvancement, Found, LeastClearance};
 
 /// Within this share of the shortest link, the clearance of one pair is assumed to have one minimum: the only part of
 /// the least clearance without proof.
-const UNIMODAL_SHARE: f64 = 1e-2;
+pub(super) const UNIMODAL_SHARE: f64 = 1e-2;
 
 /// Greatest number of configurations for a first guess of the least clearance.
-const MOST_GUESSES: f64 = 1000.0;
+pub(super) const MOST_GUESSES: f64 = 1000.0;
 
 /// See [`ConservativeAdvancement::first_contact`].
 pub(super) fn first_contact(
@@ -102,7 +102,8 @@ impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
             let place = overlap_centre(&start.boards[a], &start.boards[b]);
             return Ok(Some(contact_event(from, (a, b), place)));
         }
-        let to = self.last_solvable(from, to)?;
+        let (to, rounding_from) = last_solvable(self.chain, self.budget, from, to)?;
+        self.rounding_from = rounding_from;
         self.sweep(start, to)
     }
 
@@ -113,7 +114,8 @@ impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
         self.set_quiet_place(&start);
         let pairs = self.candidates(&mut start, None)?;
         self.consider(&start, &pairs);
-        let to = self.last_solvable(from, to)?;
+        let (to, rounding_from) = last_solvable(self.chain, self.budget, from, to)?;
+        self.rounding_from = rounding_from;
         // First a guess, then the proof that no clearance is below it, or a lower clearance.
         self.guess(&start, to)?;
         self.sweep(start, to).map(|_| ())
@@ -135,22 +137,6 @@ impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
 
     pub(super) fn solve(&mut self, configuration: &mut Configuration, benches: usize) -> Result<(), Halt> {
         configuration.solve_to(benches, self.chain.path, self.chain.team, self.budget)
-    }
-
-    /// Returns the last place up to `to` at which the whole team can be solved.
-    fn last_solvable(&mut self, from: f64, to: f64) -> Result<f64, Halt> {
-        let size = to.abs() + self.chain.team.longest_link();
-        self.rounding_from = to - 1e-9 * size;
-        let rounding_from = self.rounding_from;
-        let mut solve =
-            |travelled| self.solve(&mut Configuration::new(self.chain.path, travelled), self.chain.team.benches);
-        match solve(to) {
-            Err(Halt::NoFollower) if to > from => {}
-            outcome => return outcome.map(|()| to),
-        }
-        let last = bisect_predicate(|travelled| solve(travelled).is_err(), from, to).next_down();
-        solve(last)?;
-        if last >= rounding_from { Ok(last) } else { Err(Halt::NoFollower) }
     }
 
     /// Returns the clearance from which a pair matters: 0, or less than the least one by more than the rounding of two
@@ -261,7 +247,7 @@ impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
         pairs: Vec<Pair>,
     ) -> Result<Option<Event>, Halt> {
         let Some(benches) = pairs.iter().map(|&(_, b)| b + 1).max() else { return Ok(None) };
-        let Some(middle) = self.middle(before, after, benches)? else {
+        let Some(middle) = middle(self.chain, self.budget, (before, after), benches, self.rounding_from)? else {
             self.consider(after, &pairs);
             return Ok(self.touching(after, &pairs));
         };
@@ -280,25 +266,6 @@ impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
             }
         }
         Ok(None)
-    }
-
-    /// Returns the configuration half way; `None` if the doubles are exhausted, or rounding prevents it at the motion's
-    /// end.
-    fn middle(
-        &mut self,
-        before: &Configuration,
-        after: &Configuration,
-        benches: usize,
-    ) -> Result<Option<Configuration>, Halt> {
-        let travelled = before.travelled + 0.5 * (after.travelled - before.travelled);
-        if travelled <= before.travelled || travelled >= after.travelled {
-            return Ok(None);
-        }
-        let mut middle = Configuration::new(self.chain.path, travelled);
-        match self.solve(&mut middle, benches) {
-            Err(Halt::NoFollower) if travelled >= self.rounding_from => Ok(None),
-            outcome => outcome.map(|()| Some(middle)),
-        }
     }
 
     /// Drops the pairs whose minimum is in the other half, if the step is so short that each pair's clearance has one
@@ -323,6 +290,45 @@ impl<'s, 'a, 'b> AdvancementSearch<'s, 'a, 'b> {
         let (_, (a, b)) = at.deepest(pairs).filter(|(value, _)| self.goal == Goal::Contact && *value <= 0.0)?;
         let (on_a, on_b) = closest_points_board_board(&at.boards[a], &at.boards[b]);
         Some(contact_event(at.travelled, (a, b), center(&on_a, &on_b)))
+    }
+}
+
+/// Returns the last place up to `to` at which the whole team can be solved, and the metres of travel from which on
+/// rounding may prevent a solution.
+pub(super) fn last_solvable(
+    chain: &ConservativeAdvancement,
+    budget: &mut Budget,
+    from: f64,
+    to: f64,
+) -> Result<(f64, f64), Halt> {
+    let (path, team) = (chain.path, chain.team);
+    let rounding_from = to - 1e-9 * (to.abs() + team.longest_link());
+    let mut solve = |travelled| Configuration::new(path, travelled).solve_to(team.benches, path, team, budget);
+    match solve(to) {
+        Err(Halt::NoFollower) if to > from => {}
+        outcome => return outcome.map(|()| (to, rounding_from)),
+    }
+    let last = bisect_predicate(|travelled| solve(travelled).is_err(), from, to).next_down();
+    solve(last)?;
+    if last >= rounding_from { Ok((last, rounding_from)) } else { Err(Halt::NoFollower) }
+}
+
+/// Returns the configuration half way; `None` if the doubles are exhausted, or rounding prevents it at the motion's end.
+pub(super) fn middle(
+    chain: &ConservativeAdvancement,
+    budget: &mut Budget,
+    (before, after): (&Configuration, &Configuration),
+    benches: usize,
+    rounding_from: f64,
+) -> Result<Option<Configuration>, Halt> {
+    let travelled = before.travelled + 0.5 * (after.travelled - before.travelled);
+    if travelled <= before.travelled || travelled >= after.travelled {
+        return Ok(None);
+    }
+    let mut middle = Configuration::new(chain.path, travelled);
+    match middle.solve_to(benches, chain.path, chain.team, budget) {
+        Err(Halt::NoFollower) if travelled >= rounding_from => Ok(None),
+        outcome => outcome.map(|()| Some(middle)),
     }
 }
 

@@ -7,6 +7,8 @@ use crate::model::Point;
 use crate::model::curve::Side;
 use crate::singularities::Singularities;
 
+mod ground;
+
 const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
 
 /// Returns the results of the searches for a whole motion: the contact, the least clearance up to `freeze`, the

@@ -271,7 +271,7 @@ impl Families<'_> {
     fn of_alert(&self, alert: &CollisionAlert) -> Family {
         self.gauge(
             "bench_dragon_alert_level",
-            "The level of the latest alert: 0 clear, 1 approaching, 2 contact, 3 stall, 4 lock.",
+            "The level of the latest alert: 0 clear, 1 approaching, 2 contact, 3 stall, 4 lock, 6 obstacle.",
             f64::from(alert.level),
         )
     }

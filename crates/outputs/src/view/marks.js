@@ -9,7 +9,8 @@ const ROUNDING = 1e-6;
 const SEARCH_INTERVAL = 200;
 const SMALL = 500;
 
-const benchesOf = (...benches) => benches.filter((bench) => bench !== null && bench !== undefined);
+/** The benches among these numbers: those of obstacles follow the handles. */
+const benchesOf = (stage, ...numbers) => numbers.filter((number) => number !== null && number !== undefined && number < stage.benches);
 
 /** The deepest overlap of a stream of pictures, searched only if the publisher reports one. */
 export class Overlap {
@@ -35,7 +36,7 @@ export class Overlap {
 export function marksOf({ state, alert, stage, places, overlap }) {
   if (state.severity === "ok" || !alert) return [];
   if (!state.happened) {
-    const event = benchesOf(alert.event_bench_a, alert.event_bench_b), now = benchesOf(alert.bench_a, alert.bench_b);
+    const event = benchesOf(stage, alert.event_bench_a, alert.event_bench_b), now = benchesOf(stage, alert.bench_a, alert.bench_b);
     const marks = [];
     if (now.length === 2 && Math.max(...now) < places.length / STRIDE - 1) marks.push({ kind: "now", pair: now, place: nearest(stage, places, ...now), ink: "warning", dashes: [7, 5] });
     if (alert.event_x !== null) marks.push({ kind: "coming", pair: event, place: { x: alert.event_x, y: alert.event_y }, ink: "danger", ghost: true });
@@ -43,7 +44,10 @@ export function marksOf({ state, alert, stage, places, overlap }) {
   }
   const marks = [];
   if (overlap) marks.push({ kind: "overlap", pair: overlap.pair, place: overlap.place, ink: "danger" });
-  if (state.name !== "contact" && alert.event_bench_a !== null) {
+  if (state.name === "obstacle") {
+    // The point of the board that met the obstacle, as it was then.
+    if (alert.event_x !== null) marks.push({ kind: "link", pair: benchesOf(stage, alert.event_bench_a), place: { x: alert.event_x, y: alert.event_y }, ink: "danger" });
+  } else if (state.name !== "contact" && alert.event_bench_a !== null) {
     // A link that stalls or locks is marked at the present place of its rear handle.
     const rear = STRIDE * (alert.event_bench_a + 1);
     if (rear < places.length) marks.push({ kind: "link", pair: [alert.event_bench_a], place: { x: places[rear], y: places[rear + 1] }, ink: "danger" });

@@ -40,6 +40,7 @@ const WORDS = {
   stall: ["stall", "死点"],
   lock: ["lock", "锁死"],
   path_end: ["path end", "路径终点"],
+  obstacle: ["obstacle", "障碍物"],
   unknown: ["unknown", "未知"],
 
   // Proofs of certificates.
@@ -250,11 +251,13 @@ export function sentenceOf(state, alert, count) {
   }
   if (state.sentence) return "龙头已到达路径终点。";
   if (state.severity === "ok" || alert.level !== state.name) return "";
-  const name = (bench) => `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
+  // The numbers of obstacles follow the handles.
+  const name = (bench) => bench > count ? `第 ${bench - count} 个障碍物` : `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
   const both = (...pair) => pair.filter((bench) => bench !== null).map(name).join("与");
   const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)},\u00a0${alert.event_y.toFixed(3)})\u00a0m`;
   if (state.happened) {
     const at = `t\u00a0=\u00a0${alert.event_time?.toFixed(6)}\u00a0s`;
+    if (alert.event === "obstacle") return `${event}于 ${place} 处相遇，${at}（编号从 1 起）。`;
     if (alert.event === "contact") return `${event}于 ${place} 处相触，${at}（编号从 1 起）。`;
     if (alert.event === "stall") return `${event}到达死点，${at}：自 ${place} 处的把手起，其后的队伍被向后推（编号从 1 起）。`;
     return `${event}锁死，其后把手位于 ${place}，${at}：无法继续行进（编号从 1 起）。`;

@@ -262,3 +262,12 @@ fn a_scene_of_the_papers_rules_is_refused() {
     lines[0]["scene"] = json!(SCENE.replace("head_speed", "solver = \"paper\"\nhead_speed"));
     assert!(check(&lines).is_err());
 }
+
+#[test]
+fn a_scene_with_obstacles_is_refused() {
+    let mut lines = certificate();
+    lines[0]["scene"] = json!(format!("{SCENE}[stage]\n"));
+    let refused = check(&lines).unwrap_err();
+    assert!(matches!(&refused, Refused::Form { problem, .. } if problem.contains("[stage]")), "{refused:?}");
+    assert!(check(&certificate()).is_ok());
+}

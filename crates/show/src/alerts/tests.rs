@@ -219,7 +219,7 @@ fn without_pairs_only_events_raise_the_level() {
 fn a_contact_recorded_while_the_show_plays_is_announced_in_that_frame() {
     let mut run = Run::new(60.0, &[(EventKind::Contact, 500.0)]);
     assert_eq!(run.levels(0, 100.0, 0.01), [Level::Approaching]);
-    run.timeline.record_contact(timed(EventKind::Contact, 100.5));
+    run.timeline.record_touch(timed(EventKind::Contact, 100.5));
     assert_eq!(run.levels(30, 100.5, -0.1), [Level::Contact]);
     assert_eq!(run.levels(31, 100.6, WIDE), []);
 }

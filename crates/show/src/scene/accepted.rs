@@ -30,6 +30,10 @@ impl Accepted {
     pub const HEADING: Self = Self { least: -1.0, greatest: 1.0, unit: "turns" };
     /// A coordinate on the stage.
     pub const PLACE: Self = Self { least: -1e9, greatest: 1e9, unit: "metres" };
+    /// The radius of an obstacle.
+    pub const RADIUS: Self = Self { least: 1e-3, greatest: 1e9, unit: "metres" };
+    /// The distance that boards keep from an obstacle.
+    pub const KEEP_OUT: Self = Self { least: 0.0, greatest: 1e6, unit: "metres" };
     /// The rotation of a path on the stage.
     pub const ROTATION: Self = Self { least: -1e3, greatest: 1e3, unit: "turns" };
     /// Speed of the head.

@@ -66,6 +66,7 @@ impl Cue {
 #[serde(rename_all = "snake_case")]
 enum CueEvent {
     Contact,
+    Obstacle,
     Stall,
     Lock,
     PathEnd,
@@ -119,11 +120,12 @@ impl RawCue {
     fn before_event(&self, before: &Spanned<CueEvent>, source: &Source, alerts: bool) -> Result<CueMoment, SceneError> {
         let event = match before.get_ref() {
             CueEvent::Contact => EventKind::Contact,
+            CueEvent::Obstacle => EventKind::Obstacle,
             CueEvent::Stall => EventKind::Stall,
             CueEvent::Lock => EventKind::Lock,
             CueEvent::PathEnd => EventKind::PathEnd,
         };
-        if !alerts && matches!(event, EventKind::Contact | EventKind::Stall) {
+        if !alerts && matches!(event, EventKind::Contact | EventKind::Obstacle | EventKind::Stall) {
             let sentence = format!(
                 "cues.before is \"{}\", which a scene without [alerts] does not compute, expected such a table",
                 event.name()

@@ -1,0 +1,94 @@
+//! The obstacles and the boundary of a stage, with their keep-outs and names. Called by the drawings only.
+
+use svg::node::element::{Circle, Group, Path, Title};
+
+use super::camera::{Camera, StageBox};
+use super::palette::Palette;
+use super::{metres, sheet, text};
+use bench_dragon_motion::ground::{Ground, Obstacle};
+use bench_dragon_motion::model::shape::{Shape, ShapeKind};
+use bench_dragon_motion::model::{Point, Vector};
+
+/// Adds the obstacles and the boundary to the content of a picture.
+pub fn include(ground: &Ground, shown: &mut StageBox) {
+    for Obstacle { shape, keep_out, .. } in ground.obstacles() {
+        let beyond = shape.radius() + if shape.kind() == ShapeKind::Boundary { 0.0 } else { *keep_out };
+        for point in shape.points() {
+            shown.include(point - Vector::repeat(beyond));
+            shown.include(point + Vector::repeat(beyond));
+        }
+    }
+}
+
+/// Returns the obstacles, in metres: first all keep-outs, then all shapes, each titled with its name.
+pub fn group(ground: &Ground, camera: &Camera, palette: &Palette) -> Group {
+    let (mut keep_outs, mut shapes) = (Group::new(), Group::new().set("stroke-linejoin", "round"));
+    for Obstacle { name, shape, keep_out } in ground.obstacles() {
+        // Half of a round stroke lies on either side of an outline.
+        let around = metres(2.0 * keep_out);
+        let round = |path: Path| path.set("stroke-linejoin", "round").set("stroke-linecap", "round");
+        if *keep_out > 0.0 {
+            keep_outs = match shape.kind() {
+                ShapeKind::Circle => keep_outs.add(disc(shape, keep_out + shape.radius())),
+                _ => keep_outs.add(round(outline(shape)).set("stroke", palette.line).set("stroke-width", around)),
+            };
+        }
+        let title = Title::new(text(name));
+        shapes = match shape.kind() {
+            ShapeKind::Circle => shapes.add(disc(shape, shape.radius()).set("fill", palette.still).add(title)),
+            ShapeKind::Polygon => shapes.add(outline(shape).set("fill", palette.still).add(title)),
+            ShapeKind::Line | ShapeKind::Boundary => {
+                let thin = outline(shape).set("stroke", palette.quiet).set("stroke-width", camera.metres(2.0));
+                shapes.add(thin.add(title))
+            }
+        };
+    }
+    let keep_outs = keep_outs.set("id", "keep-outs").set("fill", palette.line);
+    Group::new().set("id", "ground").add(keep_outs).add(shapes.set("id", "obstacles"))
+}
+
+/// Returns the names of the obstacles, each at a point of its shape, for those in the picture.
+pub fn labels(ground: &Ground, camera: &Camera, palette: &Palette) -> Group {
+    let named = ground.obstacles().iter().filter(|obstacle| obstacle.shape.kind() != ShapeKind::Boundary);
+    let placed = named.map(|obstacle| (obstacle, middle(&obstacle.shape)));
+    let seen = placed.filter(|(_, place)| camera.view().contains(*place));
+    seen.fold(Group::new().set("id", "obstacle-names"), |group, (obstacle, place)| {
+        group.add(label(&text(&obstacle.name), camera.sheet(place), camera, palette))
+    })
+}
+
+/// Returns a name with a rim in the background's colour, within the viewport.
+fn label(name: &str, (x, y): (f64, f64), camera: &Camera, palette: &Palette) -> Group {
+    let half = 0.5 * sheet::width_of(name, 16.0) + 6.0;
+    let viewport = camera.viewport;
+    let x = x.min(viewport.right() - half).max(viewport.left + half);
+    let y = y.min(viewport.bottom() - 10.0).max(viewport.top + 20.0);
+    let place =
+        |colour| sheet::words(name, (x, y + 5.0), 16, colour).set("text-anchor", "middle").set("font-weight", 600);
+    let rim = place(palette.ground).set("stroke", palette.ground).set("stroke-width", 5);
+    Group::new().add(rim.set("stroke-linejoin", "round")).add(place(palette.quiet))
+}
+
+/// Returns a point of a shape for its name: the middle of the corners, of a line the middle one.
+fn middle(shape: &Shape) -> Point {
+    let points = shape.points();
+    match shape.kind() {
+        ShapeKind::Line => {
+            points[points.len() / 2 - 1] + 0.5 * (points[points.len() / 2] - points[points.len() / 2 - 1])
+        }
+        _ => Point::from(points.iter().map(|point| point.coords).sum::<Vector>() / points.len() as f64),
+    }
+}
+
+fn disc(shape: &Shape, radius: f64) -> Circle {
+    let centre = shape.points()[0];
+    Circle::new().set("cx", metres(centre.x)).set("cy", metres(centre.y)).set("r", metres(radius))
+}
+
+fn outline(shape: &Shape) -> Path {
+    let corners: Vec<String> =
+        shape.points().iter().map(|corner| format!("{} {}", metres(corner.x), metres(corner.y))).collect();
+    let close = if shape.kind() == ShapeKind::Line { "" } else { "Z" };
+    let fill = if shape.kind() == ShapeKind::Polygon { "inherit" } else { "none" };
+    Path::new().set("d", format!("M{}{close}", corners.join("L"))).set("fill", fill)
+}

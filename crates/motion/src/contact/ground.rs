@@ -1,0 +1,445 @@
+//! First touches of the obstacles of a ground and the least clearance of each, by the steps of [`super`].
+//!
+//! **Why nothing is skipped.** An obstacle stands still, so the proof in [`super`] holds with B = C of the board: if its
+//! distance d from the shape is at most x >= 0 at some time of a step, take the nearest points P of the board and Q of
+//! the shape then, or a common point. At both ends of the step P is at least as far from Q as the distances d_start and
+//! d_end, and P goes along a path no longer than C. So d_start + d_end <= 2 x + C. Where the clearance sought is an
+//! overlap, d < 0, the displacements that are additive take C's place. This is a proof for a convex shape; out of a
+//! corner of another shape the least translation may jump.
+//!
+//! **Along a straight line** a board only moves by a vector D, and its distance from a side of a shape is a convex
+//! function of the way. Its slopes at both ends of the step bound it from below: along a wall nothing is lost. **Along a
+//! circle** the board and the circle's centre keep their distance: a round obstacle moves past the board by the turn
+//! times the distance of the two centres.
+//!
+//! **Which boards.** A body board is where board 1 is when handle 1 is at the front handle's place. So boards behind
+//! board 1 matter only in steps in which handle 2 is somewhere behind the first place of handle 1, as in [`super`].
+
+use crate::event::Budget;
+use crate::ground::{Ground, Obstacle};
+use crate::linkage::NoFollower;
+use crate::model::board::Board;
+use crate::model::curve::Curve;
+use crate::model::path::Param;
+use crate::model::root::golden_section_min;
+use crate::model::shape::ShapeKind;
+use crate::model::{Point, Vector};
+
+use super::ConservativeAdvancement;
+use super::configuration::{Configuration, Halt};
+use super::displacement::{Displacements, Weights, progress};
+use super::search::{MOST_GUESSES, UNIMODAL_SHARE, last_solvable, middle};
+
+/// The first touch of an obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// The obstacle's number on its ground.
+    pub obstacle: usize,
+    /// Metres that the head has travelled.
+    pub travelled: f64,
+    /// The bench that touches, counted from 0; of several the one deepest within the keep-out.
+    pub bench: u32,
+    /// The point of its board that is nearest to the obstacle.
+    pub place: Point,
+}
+
+/// The least clearance of an obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObstacleClearance {
+    /// Metres; negative if a board is within the keep-out.
+    pub value: f64,
+    /// Metres that the head has travelled.
+    pub travelled: f64,
+    /// The bench, counted from 0.
+    pub bench: u32,
+}
+
+/// A bench and an obstacle.
+type Meeting = (usize, usize);
+
+/// The goal of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Goal {
+    Touch,
+    Least,
+}
+
+/// Rounding of a clearance that no search resolves, as a share of the coordinates.
+const RESOLUTION: f64 = 1e-13;
+
+/// Coarse tests that cost as much as one unit of work.
+const COARSE_TESTS_PER_UNIT: usize = 16;
+
+struct GroundSearch<'s, 'a, 'b> {
+    chain: &'s ConservativeAdvancement<'a>,
+    obstacles: &'s [Obstacle],
+    goal: Goal,
+    budget: &'s mut Budget<'b>,
+    /// By obstacle: its first touch.
+    touches: Vec<Option<Touch>>,
+    /// By obstacle: the least clearance so far.
+    best: Vec<Option<ObstacleClearance>>,
+    /// Place of handle 1 at the beginning.
+    second_handle: Param,
+    /// Metres of travel from which on rounding may prevent a solution.
+    rounding_from: f64,
+    searched_until: f64,
+}
+
+/// The results of a search and how far it came, metres of travel.
+type Results<T> = Result<(Vec<Option<T>>, f64), NoFollower>;
+
+/// See [`ConservativeAdvancement::first_touches`].
+pub(super) fn first_touches(
+    chain: &ConservativeAdvancement,
+    ground: &Ground,
+    (from, to): (f64, f64),
+    budget: &mut Budget,
+) -> Results<Touch> {
+    let mut search = GroundSearch::new(chain, ground, Goal::Touch, budget);
+    let until = search.run(from, to)?;
+    Ok((search.touches, until))
+}
+
+/// See [`ConservativeAdvancement::obstacle_clearances`].
+pub(super) fn least_clearances(
+    chain: &ConservativeAdvancement,
+    ground: &Ground,
+    (from, to): (f64, f64),
+    budget: &mut Budget,
+) -> Results<ObstacleClearance> {
+    let mut search = GroundSearch::new(chain, ground, Goal::Least, budget);
+    let until = search.run(from, to)?;
+    Ok((search.best, until))
+}
+
+impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
+    fn new(chain: &'s ConservativeAdvancement<'a>, ground: &'s Ground, goal: Goal, budget: &'s mut Budget<'b>) -> Self {
+        let obstacles = ground.obstacles();
+        Self {
+            chain,
+            obstacles,
+            goal,
+            budget,
+            touches: vec![None; obstacles.len()],
+            best: vec![None; obstacles.len()],
+            second_handle: chain.path.param_at(0.0),
+            rounding_from: f64::INFINITY,
+            searched_until: f64::NEG_INFINITY,
+        }
+    }
+
+    /// Searches, and returns how far the search came.
+    fn run(&mut self, from: f64, to: f64) -> Result<f64, NoFollower> {
+        match self.search(from, to) {
+            Ok(()) => Ok(to),
+            Err(Halt::Spent) => Ok(self.searched_until),
+            Err(Halt::NoFollower) => Err(NoFollower),
+        }
+    }
+
+    fn search(&mut self, from: f64, to: f64) -> Result<(), Halt> {
+        self.searched_until = from;
+        let mut start = Configuration::new(self.chain.path, from);
+        let benches = self.chain.team.benches;
+        self.solve(&mut start, benches)?;
+        self.second_handle = start.places[1];
+        self.consider(&start, self.all_meetings(benches))?;
+        let (to, rounding_from) = last_solvable(self.chain, self.budget, from, to)?;
+        self.rounding_from = rounding_from;
+        if self.goal == Goal::Least {
+            self.guess(from, to)?;
+        }
+        self.sweep(start, to)
+    }
+
+    fn solve(&mut self, configuration: &mut Configuration, benches: usize) -> Result<(), Halt> {
+        configuration.solve_to(benches, self.chain.path, self.chain.team, self.budget)
+    }
+
+    /// Returns the clearance of an obstacle from which a board matters; `None` if none does.
+    fn limit(&self, obstacle: usize, at: &Board) -> Option<f64> {
+        match (self.goal, self.best[obstacle]) {
+            (Goal::Touch, _) => self.touches[obstacle].is_none().then_some(0.0),
+            (Goal::Least, Some(best)) if best.value == f64::NEG_INFINITY => None,
+            (Goal::Least, Some(best)) => {
+                let size = self.chain.team.longest_link() + at.centre.coords.norm() + best.value.abs();
+                Some(best.value - RESOLUTION * size)
+            }
+            (Goal::Least, None) => Some(f64::INFINITY),
+        }
+    }
+
+    /// Returns each of the foremost benches with each obstacle.
+    fn all_meetings(&self, benches: usize) -> impl Iterator<Item = Meeting> + use<> {
+        let obstacles = self.obstacles.len();
+        (0..benches).flat_map(move |bench| (0..obstacles).map(move |j| (bench, j)))
+    }
+
+    /// Records the clearances of a configuration: a touch at 0 or less, or a lower least clearance.
+    fn consider(&mut self, at: &Configuration, meetings: impl IntoIterator<Item = Meeting>) -> Result<(), Halt> {
+        for (bench, j) in meetings {
+            let (board, obstacle) = (&at.boards[bench], &self.obstacles[j]);
+            let least = self.best[j].map_or(f64::INFINITY, |best| best.value);
+            let limit = if self.goal == Goal::Touch { least.min(0.0) } else { least };
+            if obstacle.coarse_clearance(board) > limit {
+                continue;
+            }
+            if !self.budget.spend(1) {
+                return Err(Halt::Spent);
+            }
+            let value = obstacle.clearance(board);
+            if value < least && (self.goal == Goal::Least || value <= 0.0) {
+                let (travelled, bench) = (at.travelled, bench as u32);
+                self.best[j] = Some(ObstacleClearance { value, travelled, bench });
+            }
+        }
+        if self.goal == Goal::Touch {
+            for (j, best) in self.best.iter_mut().enumerate() {
+                if let (Some(ObstacleClearance { travelled, bench, .. }), None) = (best.take(), self.touches[j]) {
+                    let place = self.obstacles[j].shape.nearest_points(&at.boards[bench as usize]).0;
+                    self.touches[j] = Some(Touch { obstacle: j, travelled, bench, place });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Guesses the least clearances from places of the head at least the shortest link apart, and refines them.
+    fn guess(&mut self, from: f64, to: f64) -> Result<(), Halt> {
+        let count = ((to - from) / self.chain.team.shortest_link()).ceil().min(MOST_GUESSES);
+        let spacing = (to - from) / count;
+        let benches = self.chain.team.benches.min(2);
+        for k in 1..=count as usize {
+            let mut configuration = Configuration::new(self.chain.path, (from + k as f64 * spacing).min(to));
+            self.solve(&mut configuration, benches)?;
+            self.consider(&configuration, self.all_meetings(benches))?;
+            self.budget.report(0.3 * k as f64 / count);
+        }
+        for j in 0..self.obstacles.len() {
+            let Some(ObstacleClearance { travelled, bench, .. }) = self.best[j] else { continue };
+            let bench = bench as usize;
+            let clearance = |travelled: f64| {
+                let mut unreported = |_| {};
+                let mut configuration = Configuration::new(self.chain.path, travelled);
+                let mut budget = Budget::new(u64::MAX, &mut unreported);
+                let solved = configuration.solve_to(bench + 1, self.chain.path, self.chain.team, &mut budget);
+                solved.map_or(f64::INFINITY, |()| self.obstacles[j].clearance(&configuration.boards[bench]))
+            };
+            let near = ((travelled - spacing).max(from), (travelled + spacing).min(to));
+            let (_, travelled) = golden_section_min(clearance, near.0, near.1);
+            let mut configuration = Configuration::new(self.chain.path, travelled);
+            self.solve(&mut configuration, bench + 1)?;
+            // A constant clearance is not refined for its last digits.
+            let board = &configuration.boards[bench];
+            if self.limit(j, board).is_some_and(|limit| self.obstacles[j].clearance(board) < limit) {
+                self.consider(&configuration, [(bench, j)])?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes from `start` to `to` in steps, as [`super::search`].
+    fn sweep(&mut self, start: Configuration, to: f64) -> Result<(), Halt> {
+        let (from, shortest) = (start.travelled, self.chain.team.shortest_link());
+        let mut step = 0.25 * shortest;
+        let mut before = start;
+        while before.travelled < to && (self.goal == Goal::Least || self.touches.iter().any(Option::is_none)) {
+            self.searched_until = before.travelled;
+            let share = (before.travelled - from) / (to - from);
+            self.budget.report(if self.goal == Goal::Least { 0.3 + 0.7 * share } else { share });
+            let next = (before.travelled + step).max(before.travelled.next_up());
+            let next = if next >= self.rounding_from { to } else { next.min(to) };
+            let mut after = Configuration::new(self.chain.path, next);
+            let meetings = self.candidates(&mut before, &mut after)?;
+            if meetings.is_empty() {
+                step *= 2.0;
+            } else {
+                self.narrow(&before, &after, meetings)?;
+                step = (0.7 * step).max(1e-3 * shortest);
+            }
+            before = after;
+        }
+        self.searched_until = to;
+        Ok(())
+    }
+
+    /// Returns the boards that may come to the limit of an obstacle in a step.
+    fn candidates(&mut self, before: &mut Configuration, after: &mut Configuration) -> Result<Vec<Meeting>, Halt> {
+        let all_benches = self.chain.team.benches;
+        let mut benches = all_benches.min(2);
+        let mut step = Displacements::default();
+        self.extend(before, after, &mut step, benches)?;
+        if all_benches > 2 {
+            let excursion = step.excursion();
+            let behind = |at: Param| {
+                if excursion == 0.0 {
+                    progress(self.chain.path, at, self.second_handle) > 0.0
+                } else {
+                    self.chain.path.arc_length(at, self.second_handle) > -excursion
+                }
+            };
+            if behind(before.places[2]) || behind(after.places[2]) {
+                benches = all_benches;
+                self.extend(before, after, &mut step, benches)?;
+            }
+        }
+        if !self.budget.spend((benches * self.obstacles.len() / COARSE_TESTS_PER_UNIT) as u64) {
+            return Err(Halt::Spent);
+        }
+        let near = |meeting: &Meeting| self.coarse_limit(&step, (before, after), *meeting).is_some();
+        let mut meetings: Vec<Meeting> = self.all_meetings(benches).filter(near).collect();
+        self.retain_uncertain(&step, (before, after), &mut meetings)?;
+        Ok(meetings)
+    }
+
+    fn extend(
+        &mut self,
+        before: &mut Configuration,
+        after: &mut Configuration,
+        step: &mut Displacements,
+        benches: usize,
+    ) -> Result<(), Halt> {
+        self.solve(before, benches)?;
+        self.solve(after, benches)?;
+        step.extend_to(benches + 1, self.chain, (before, after), self.budget)
+    }
+
+    /// Returns the limit of a meeting, and the greatest sum of the clearances at both ends of a step with which it may
+    /// be reached; `None` if the circles about the board exclude that.
+    fn coarse_limit(
+        &self,
+        step: &Displacements,
+        (before, after): (&Configuration, &Configuration),
+        (bench, j): Meeting,
+    ) -> Option<(f64, f64)> {
+        let (obstacle, first, last) = (&self.obstacles[j], &before.boards[bench], &after.boards[bench]);
+        let limit = self.limit(j, first)?;
+        let weights = Weights::for_limit(limit + obstacle.keep_out);
+        let most = 2.0 * limit + step.on_stage(self.chain, bench, weights);
+        let is_near = obstacle.coarse_clearance(first) + obstacle.coarse_clearance(last) <= most;
+        is_near.then_some((limit, most))
+    }
+
+    /// Keeps the boards that may come to the limit of an obstacle somewhere in a step.
+    fn retain_uncertain(
+        &mut self,
+        step: &Displacements,
+        ends: (&Configuration, &Configuration),
+        meetings: &mut Vec<Meeting>,
+    ) -> Result<(), Halt> {
+        let mut tested = 0;
+        meetings.retain(|&(bench, j)| {
+            let (before, after) = (&ends.0.boards[bench], &ends.1.boards[bench]);
+            let Some((limit, most)) = self.coarse_limit(step, ends, (bench, j)) else { return false };
+            let obstacle = &self.obstacles[j];
+            tested += 1;
+            let (first, last) = (obstacle.clearance(before), obstacle.clearance(after));
+            if first.min(last) <= limit {
+                return true;
+            }
+            first + last <= most && !self.is_far_on_one_curve(step, ends, (bench, j), limit)
+        });
+        if self.budget.spend(tested) { Ok(()) } else { Err(Halt::Spent) }
+    }
+
+    /// Returns true if a board that stays on one line or circle is proved to stay above the limit, which its clearance
+    /// exceeds at both ends.
+    fn is_far_on_one_curve(
+        &self,
+        step: &Displacements,
+        ends: (&Configuration, &Configuration),
+        (bench, j): Meeting,
+        limit: f64,
+    ) -> bool {
+        let Some(curvature) = step.one_curve(self.chain, ends, bench) else { return false };
+        let (before, after) = (&ends.0.boards[bench], &ends.1.boards[bench]);
+        let obstacle = &self.obstacles[j];
+        if limit + obstacle.keep_out < 0.0 {
+            return false;
+        }
+        if curvature == 0.0 {
+            let way = after.centre - before.centre;
+            let sides = obstacle.shape.side_distances(before).zip(obstacle.shape.side_distances(after));
+            return sides.into_iter().all(|(first, last)| {
+                first.0 > 0.0 && last.0 > 0.0 && convex_bound(first, last, way) - obstacle.keep_out > limit
+            });
+        }
+        if obstacle.shape.kind() != ShapeKind::Circle {
+            return false;
+        }
+        let (path, front) = (self.chain.path, ends.0.places[bench]);
+        let tangent = path.tangent(front);
+        let centre = path.point(front) + Vector::new(-tangent.y, tangent.x) / curvature;
+        let turned = path.segment(front).length_bound(front.at, ends.1.places[bench].at);
+        let turned =
+            if ends.1.places[bench].segment == front.segment { turned * curvature.abs() } else { return false };
+        let most = 2.0 * limit + turned * (obstacle.shape.points()[0] - centre).norm();
+        obstacle.clearance(before) + obstacle.clearance(after) > most
+    }
+
+    /// Halves a step until its uncertain meetings are certain or the doubles are exhausted.
+    fn narrow(&mut self, before: &Configuration, after: &Configuration, meetings: Vec<Meeting>) -> Result<(), Halt> {
+        let meetings: Vec<Meeting> =
+            meetings.into_iter().filter(|(bench, j)| self.limit(*j, &before.boards[*bench]).is_some()).collect();
+        let Some(benches) = meetings.iter().map(|&(bench, _)| bench + 1).max() else { return Ok(()) };
+        let Some(middle) = middle(self.chain, self.budget, (before, after), benches, self.rounding_from)? else {
+            return self.consider(after, meetings.iter().copied());
+        };
+        if self.goal == Goal::Least {
+            self.consider(&middle, meetings.iter().copied())?;
+        }
+        for ends in [(before, &middle), (&middle, after)] {
+            self.searched_until = self.searched_until.max(ends.0.travelled);
+            let mut uncertain = meetings.clone();
+            if self.goal == Goal::Least {
+                self.retain_possible_minima(ends, [before, &middle, after], &mut uncertain);
+            }
+            let mut step = Displacements::default();
+            step.extend_to(benches + 1, self.chain, ends, self.budget)?;
+            self.retain_uncertain(&step, ends, &mut uncertain)?;
+            self.narrow(ends.0, ends.1, uncertain)?;
+        }
+        if self.goal == Goal::Least {
+            self.consider(after, meetings.iter().copied())?;
+        }
+        Ok(())
+    }
+
+    /// Drops the meetings whose minimum is in the other half, if the step is so short that each clearance has one
+    /// minimum.
+    fn retain_possible_minima(
+        &self,
+        half: (&Configuration, &Configuration),
+        [before, middle, after]: [&Configuration; 3],
+        meetings: &mut Vec<Meeting>,
+    ) {
+        if after.travelled - before.travelled > UNIMODAL_SHARE * self.chain.team.shortest_link() {
+            return;
+        }
+        let first_half = half.0.travelled == before.travelled;
+        meetings.retain(|&(bench, j)| {
+            let [first, least, last] = [before, middle, after].map(|at| self.obstacles[j].clearance(&at.boards[bench]));
+            (least < first && least < last) || first_half == (first <= last)
+        });
+    }
+}
+
+/// Returns a lower bound of a convex function of the share of a way, given at both ends the distance and the points that
+/// are nearest: from its slopes there.
+fn convex_bound(first: (f64, Point, Point), last: (f64, Point, Point), way: Vector) -> f64 {
+    let slope = |(_, on_board, on_side): (f64, Point, Point)| {
+        let outward = on_board - on_side;
+        outward.dot(&way) / outward.norm()
+    };
+    let (falls, rises) = (slope(first), slope(last));
+    if falls >= 0.0 {
+        first.0
+    } else if rises <= 0.0 {
+        last.0
+    } else {
+        // Where the two tangents meet.
+        let share = (last.0 - rises - first.0) / (falls - rises);
+        first.0 + falls * share.clamp(0.0, 1.0)
+    }
+}

@@ -1,0 +1,151 @@
+//! `[stage]`: first touches and least clearances against shapely, and a sentence for each wrong table.
+
+use std::io::Write;
+use std::process::{Command, Output};
+
+use tempfile::NamedTempFile;
+
+use crate::harness::{can_run, long, python, python_modules, text};
+
+#[test]
+fn obstacles_are_met_where_shapely_meets_them() {
+    if !can_run(python_modules(&["shapely"])) {
+        return;
+    }
+    let count = if long() { "400" } else { "12" };
+    for arguments in [vec!["config/square.toml"], vec!["--random", "1", count]] {
+        let mut peer = python();
+        peer.args(["tests/python/ground.py", env!("CARGO_BIN_EXE_bench-dragon")]);
+        let output = peer.args(&arguments).output().unwrap();
+        let printed = text(&output.stdout);
+        assert!(output.status.success(), "{arguments:?}: {printed}{}", text(&output.stderr));
+        assert!(printed.contains("least"), "{printed}");
+    }
+}
+
+/// Returns a scene of the paper's team with this `[stage]`.
+fn scene(stage: &str) -> NamedTempFile {
+    let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    writeln!(file, "{}\n[stage]\n{stage}", include_str!("../../config/paper.toml")).unwrap();
+    file
+}
+
+fn run(scene: &NamedTempFile, arguments: &[&str]) -> Output {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    program.args(arguments).arg("--scene").arg(scene.path()).output().unwrap()
+}
+
+/// Returns the sentence that refuses a scene.
+fn refusal(scene: &NamedTempFile, arguments: &[&str]) -> String {
+    let output = run(scene, arguments);
+    let printed = text(&output.stderr);
+    assert_eq!((output.status.code(), printed.lines().count()), (Some(2), 1), "{printed}");
+    assert!(output.stdout.is_empty() && !printed.contains("panicked"), "{printed}");
+    printed
+}
+
+#[test]
+fn a_wrong_stage_is_refused_in_one_sentence() {
+    let obstacle = |rest: &str| format!("[[stage.obstacles]]\nname = \"lamp\"\n{rest}\n");
+    let circle = "circle = { center = [1.0, 2.0], radius = 0.5 }";
+    let many = |count: usize| -> String {
+        (0..count).map(|k| format!("[[stage.obstacles]]\nname = \"lamp {k}\"\n{circle}\n")).collect()
+    };
+    let corners = |count: usize| -> String { (0..count).map(|k| format!("[{}.0, {}.0],", k, k * k)).collect() };
+    let cases = [
+        (
+            obstacle("circle = { center = [1.0, 2.0], radius = 0.0 }"),
+            "circle.radius of obstacle \"lamp\" is 0, expected",
+        ),
+        (obstacle("circle = { center = [1e300, 2.0], radius = 1.0 }"), "circle.center of obstacle \"lamp\" is 1e300"),
+        (obstacle(&format!("{circle}\nkeep_out = -1.0")), "keep_out of obstacle \"lamp\" is -1, expected"),
+        (obstacle(&format!("{circle}\nkeep_out = nan")), "keep_out of obstacle \"lamp\" is NaN, expected"),
+        (obstacle(""), "one of circle, polygon and line"),
+        (obstacle(&format!("{circle}\nline = [[0, 0], [1, 1]]")), "one of circle, polygon and line"),
+        (obstacle("polygon = [[0.0, 0.0], [1.0, 0.0]]"), "has 2 corners, expected 3 to 64"),
+        (obstacle(&format!("line = [{}]", corners(65))), "has 65 corners, expected 2 to 64"),
+        (
+            obstacle("line = [[0.0, 0.0], [0.0, 0.0], [1.0, 1.0]]"),
+            "corners 1 and 2 of line of obstacle \"lamp\" are equal",
+        ),
+        (obstacle("polygon = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]]"), "corners 4 and 1 of polygon"),
+        (obstacle("polygon = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]]"), "sides 1 and 3 of polygon"),
+        (obstacle("polygon = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [0.0, 2.0]]"), "sides 1 and 2 of polygon"),
+        (
+            obstacle("polygon = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 0.0], [0.0, 4.0]]"),
+            "meet, expected a polygon",
+        ),
+        (obstacle("squircle = 1"), "unknown field `squircle`"),
+        (format!("{}{}", obstacle(circle), obstacle(circle)), "obstacle \"lamp\" is given twice"),
+        (obstacle(circle).replace("lamp", " "), "stage.obstacles.name is empty"),
+        (obstacle(circle).replace("lamp", "boundary"), "the name of stage.boundary"),
+        (obstacle(circle).replace("lamp", &"x".repeat(65)), "65 bytes, expected at most 64"),
+        (many(65), "stage.obstacles has 65 entries, expected at most 64"),
+        (
+            "boundary = { polygon = [[0, 0], [9, 9], [9, 0], [0, 9]] }".to_owned(),
+            "sides 1 and 3 of stage.boundary.polygon",
+        ),
+        ("boundary = { keep_out = 1.0 }".to_owned(), "missing field `polygon`"),
+        ("wall = 1".to_owned(), "unknown field `wall`"),
+    ];
+    for (stage, expected) in cases {
+        let scene = scene(&stage);
+        let printed = refusal(&scene, &["check"]);
+        assert!(printed.contains(expected) && printed.contains(", line "), "{stage}: {printed}");
+    }
+    assert!(run(&scene(&many(64)), &["check"]).status.success());
+}
+
+#[test]
+fn what_no_proof_knows_is_refused() {
+    let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("certificate");
+    for arguments in [vec!["events", "--certify", file.to_str().unwrap()], vec!["check", "--prove"]] {
+        assert!(refusal(&scene, &arguments).contains("no proof knows yet"), "{arguments:?}");
+    }
+    assert!(!file.exists());
+}
+
+#[test]
+fn a_team_that_starts_within_a_keep_out_meets_it_at_once_with_a_warning() {
+    let scene =
+        scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [8.0, 2.0], radius = 0.5 }\nkeep_out = 1.0");
+    let output = run(&scene, &["check"]);
+    assert!(
+        text(&output.stderr).contains("within the keep-out of an obstacle at the start"),
+        "{}",
+        text(&output.stderr)
+    );
+    let events = text(&run(&scene, &["events"]).stdout);
+    assert!(events.starts_with(" obstacle  t = 0 s: bench "), "{events}");
+    assert!(events.contains("is at the lamp from the start"), "{events}");
+    // Here the show stops, so that the boards never touch in it.
+    assert!(text(&output.stdout).contains("The least clearance of the lamp beyond its keep-out of 1 m is -"));
+}
+
+#[test]
+fn a_picture_has_every_obstacle_at_its_place_with_its_keep_out() {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let output = program.args(["--scene", "config/square.toml", "draw", "--at", "46"]).output().unwrap();
+    let svg = text(&output.stdout);
+    let picture = roxmltree::Document::parse(&svg).unwrap();
+    let group = |id: &str| picture.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
+    let titled = |name: &str| {
+        let title = group("obstacles").descendants().find(|node| node.text() == Some(name)).unwrap();
+        title.parent_element().unwrap()
+    };
+    let lamp = titled("stone lamp");
+    assert_eq!(["cx", "cy", "r"].map(|key| lamp.attribute(key).unwrap()), ["4", "3.5", "0.4"]);
+    let around = group("keep-outs").children().find(|node| node.attribute("r") == Some("0.9")).unwrap();
+    assert_eq!(["cx", "cy"].map(|key| around.attribute(key).unwrap()), ["4", "3.5"]);
+    let outline = |name: &str| titled(name).attribute("d").unwrap().to_owned();
+    assert_eq!(outline("well house"), "M2 8L6 8L6 14L4 12L2 14Z");
+    assert_eq!(outline("northern spectators"), "M-4 22L18 22");
+    assert_eq!(outline("boundary"), "M-30 -20L30 -20L30 25L-30 25Z");
+    let wide: Vec<_> = group("keep-outs").children().filter_map(|node| node.attribute("stroke-width")).collect();
+    assert_eq!(wide, ["3", "3", "2", "2"]);
+    assert!(picture.descendants().any(|node| node.attribute("id") == Some("obstacle-names")));
+    let without = Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["draw", "--at", "46"]).output().unwrap();
+    assert!(!text(&without.stdout).contains("ground\""), "a scene without obstacles has no ground");
+}
