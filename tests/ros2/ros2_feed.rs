@@ -192,7 +192,8 @@ fn one_process_publishes_two_shows_and_follows_each_through_its_death() {
     let [gold, silver] = ["two_gold", "two_silver"];
     let start = |name: &str| Process::start(program(name).args(["run", "--json", "--start", "300"]));
     let bridge = Process::start(program(gold).args(["--name", &unique(silver), "send", "ros2", "--json"]));
-    let (_of_gold, gold_lines) = peer(gold, &["handles"]);
+    let stage = "stage:reliable:transient_local";
+    let (_of_gold, gold_lines) = peer(gold, &["handles", stage]);
     let (_of_silver, silver_lines) = peer(silver, &["handles"]);
     // The process waits for shows.
     let (first, other) = (start(gold), start(silver));
@@ -201,9 +202,14 @@ fn one_process_publishes_two_shows_and_follows_each_through_its_death() {
     first.signal(SIGKILL);
     first.output_within(60);
     let second = start(gold);
-    let mut latest = gold_run;
-    while latest == gold_run {
-        latest = run_of(&next(&gold_lines, "handles"));
+    // The next run has frames and a stage of its own.
+    let (mut of_frames, mut of_stage) = (gold_run, gold_run);
+    let restarted = Instant::now();
+    while of_frames == gold_run || of_stage != of_frames {
+        let line: Value = serde_json::from_str(&gold_lines.until("\"topic\"", 60)).unwrap();
+        let run = run_of(&line["message"]);
+        assert!(restarted.elapsed().as_secs() < 30, "no frames and stage of another run within 30 s");
+        if line["topic"] == stage { of_stage = run } else { of_frames = run }
     }
     let tick = control(silver, &["state"]).1["tick"].as_u64().unwrap();
     loop {

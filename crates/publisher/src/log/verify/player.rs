@@ -334,7 +334,10 @@ fn listed(lines: &[Line]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::accuracy_of;
     use super::*;
+    use bench_dragon_motion::solve::{Chain, Velocities};
+    use bench_dragon_show::solve_at_or_just_before;
 
     /// Handles of a head that another arithmetic has rounded to the next place, up to the lock, where they run away
     /// from every rounding.
@@ -364,7 +367,7 @@ mod tests {
                 handles: sampled(40).map(|handle| (handle as u32, chain.x[handle] + moved, chain.y[handle])).collect(),
             };
             assert_eq!(reference.compare(&line(0.0), time), Ok(()), "{before} s before the lock");
-            furthest = furthest.max(reference.worst.unwrap().0);
+            furthest = furthest.max(reference.worst().unwrap().0);
             assert!(reference.compare(&line(1e-4), time).is_err(), "{before} s before the lock");
         }
         assert!(furthest > 1e-11, "the last moments are no harder than others: {furthest:.1e} m");
