@@ -124,7 +124,8 @@ def send_ltc(arguments, started, jump_at):
             timecode = Timecode(hours=0, mins=frame // fps // 60, secs=frame // fps % 60, frame=frame % fps)
             libltc.ltc_encoder_set_timecode(encoder, ctypes.byref(timecode))
             libltc.ltc_encoder_encode_frame(encoder)
-            sound += buffer.raw[: libltc.ltc_encoder_copy_buffer(encoder, buffer)]
+            length = libltc.ltc_encoder_copy_buffer(encoder, buffer)
+            sound += buffer.raw[:length]
             k += 1
         piece, sound = sound[: rate // 50], sound[rate // 50 :]
         sent += len(piece)

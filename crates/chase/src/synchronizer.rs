@@ -246,3 +246,86 @@ impl Synchronizer {
 pub fn wrapped(difference: f64, day: f64) -> f64 {
     difference - day * (difference / day).round()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME_NS: u64 = 40_000_000;
+
+    fn reading(position: f64, at_ns: u64) -> Reading {
+        Reading { position, at_ns, day: 86_400.0 }
+    }
+
+    /// A source at 25 frames per second that has run for some frames from 100 s on.
+    fn locked(frames: u64) -> Synchronizer {
+        let mut synchronizer = Synchronizer::new(Options { freewheel: 2.0, readings_to_lock: 3 });
+        (0..frames).for_each(|k| synchronizer.read(reading(100.0 + 0.04 * k as f64, FRAME_NS * k)));
+        synchronizer
+    }
+
+    fn position(synchronizer: &mut Synchronizer, now_ns: u64) -> f64 {
+        match synchronizer.motion(now_ns) {
+            Motion::Locked { position, .. } | Motion::Freewheeling { position, .. } => position,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn three_readings_in_order_lock() {
+        for (frames, expected) in [(0, Motion::Silent), (1, Motion::Locking), (2, Motion::Locking)] {
+            assert_eq!(locked(frames).motion(FRAME_NS * 2), expected);
+        }
+        assert!(matches!(locked(3).motion(FRAME_NS * 2), Motion::Locked { .. }));
+        // Labels in the reverse order, or at one moment, do not.
+        let mut reverse = Synchronizer::new(Options { freewheel: 2.0, readings_to_lock: 3 });
+        (0..3).for_each(|k| reverse.read(reading(100.0 - 0.04 * k as f64, FRAME_NS * k)));
+        assert!(!matches!(reverse.motion(FRAME_NS * 2), Motion::Locked { .. }));
+        let mut burst = Synchronizer::new(Options { freewheel: 2.0, readings_to_lock: 3 });
+        (0..9).for_each(|k| burst.read(reading(100.0 + 0.04 * k as f64, FRAME_NS)));
+        assert_eq!(burst.motion(FRAME_NS), Motion::Locking);
+    }
+
+    #[test]
+    fn stray_repeated_and_late_labels_change_nothing() {
+        let mut synchronizer = locked(50);
+        let stray = [(7.0, 0), (102.0, 1), (102.0, 2), (101.5, 3), (80_000.0, 4), (102.08, 5)];
+        for (label, milliseconds) in stray {
+            synchronizer.read(reading(label, 50 * FRAME_NS + milliseconds * 1_000_000));
+        }
+        // The last of these is 3 ms early by its label, which a single reading corrects by little.
+        assert!((position(&mut synchronizer, 52 * FRAME_NS) - 102.08).abs() < 0.01);
+        assert_eq!(synchronizer.jumps(), 0);
+    }
+
+    #[test]
+    fn a_label_that_is_repeated_stands() {
+        let mut synchronizer = locked(50);
+        (0..10).for_each(|k| synchronizer.read(reading(101.96, (50 + k) * FRAME_NS)));
+        assert_eq!(synchronizer.motion(60 * FRAME_NS), Motion::Standing(101.96));
+    }
+
+    #[test]
+    fn a_player_of_another_speed_is_followed() {
+        let mut synchronizer = locked(100);
+        let mut worst = 0.0f64;
+        for k in 0..500u64 {
+            let (at_ns, place) = (100 * FRAME_NS + k * 38_095_238, 104.0 + 0.04 * k as f64);
+            synchronizer.read(reading(place, at_ns));
+            if k > 150 {
+                worst = worst.max((position(&mut synchronizer, at_ns) - place).abs());
+            }
+        }
+        assert!(worst < 0.02, "5 % faster: {worst} s");
+    }
+
+    #[test]
+    fn positions_go_on_over_midnight() {
+        let mut synchronizer = Synchronizer::new(Options { freewheel: 2.0, readings_to_lock: 3 });
+        for k in 0..100u64 {
+            synchronizer.read(reading((86_398.0 + 0.04 * k as f64) % 86_400.0, FRAME_NS * k));
+        }
+        assert!((wrapped(position(&mut synchronizer, 100 * FRAME_NS) - 2.0, 86_400.0)).abs() < 0.001);
+        assert_eq!(synchronizer.jumps(), 0);
+    }
+}

@@ -192,7 +192,7 @@ mod tests {
             assert_eq!(FrameRate::Drop2997.label(frame), label(text), "{frame}");
         }
         assert_eq!(FrameRate::Drop2997.frames_per_day(), 2_589_408);
-        assert!((FrameRate::Drop2997.seconds(2_589_408.0) - 86_399.9136).abs() < 1e-9);
+        assert!((FrameRate::Drop2997.seconds(2_589_408.0) - 86_399.913_6).abs() < 1e-9);
     }
 
     /// Counts through all labels of a day, as a clock does, without a formula.
