@@ -51,9 +51,10 @@ fn subscriber(name: &str, topic: &str, arguments: &[&str]) -> Command {
     peer(&[&["subscribe", &format!("{}/{topic}", unique(name)), kind], arguments].concat())
 }
 
-/// Returns a ROS 2 domain that other tests do not use meanwhile.
+/// Returns a ROS 2 domain that the tests of the services do not use. Ports of domains above 101 are those that Linux
+/// gives to any socket.
 fn domain() -> u16 {
-    100 + (std::process::id() % 80) as u16
+    20 + ((std::process::id() + 40) % 80) as u16
 }
 
 /// Starts a show and returns when it answers over shared memory.
