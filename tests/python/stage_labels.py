@@ -80,7 +80,7 @@ def labels_point_at_their_boards():
                 count += len(found)
                 bare += sum(label["end"] is None for label, *_ in found)
                 lines += [numpy.hypot(label["x"] - label["end"]["x"], label["y"] - label["end"]["y"]) for label, *_ in found if label["end"]]
-                lines_are_drawn(page, found)
+            lines_are_drawn(page, found)
         print(f"{count} labels, {bare} without a line; the ends of lines are {numpy.mean(lines):.0f} px from the words on average, at most {max(lines):.0f}")
         assert count >= 150, f"only {count} labels were measured"
         assert not complaints, complaints
