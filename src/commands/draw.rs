@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bench_dragon::drawing::swept::SweptArea;
-use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Surroundings, Theme, mean_speeds};
+use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Style, Surroundings, Theme, mean_speeds};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
@@ -64,6 +64,9 @@ struct LookArguments {
     /// The point in the middle of the picture and its width, metres, as in 1.5,2,4
     #[arg(long, value_name = "X,Y,METRES", value_parser = view, allow_hyphen_values = true)]
     view: Option<Framing>,
+    /// plan, or lanterns: the stage at night in the light of the dragon's lanterns
+    #[arg(long, value_name = "LOOK", default_value = "plan", value_parser = style, conflicts_with = "animated")]
+    look: Style,
     /// light, dark, or auto: light, and dark if a browser prefers that
     #[arg(long, value_name = "THEME", default_value = "light", value_parser = theme)]
     theme: Theme,
@@ -308,8 +311,17 @@ impl LookArguments {
             (None, Some(view)) => view,
             (None, None) => Framing::Everything,
         };
-        let surroundings = if self.no_axes { Surroundings::Nothing } else { Surroundings::Words };
-        Ok(Look { theme: self.theme, framing, surroundings, width: self.width, height: self.height })
+        let is_bare = self.no_axes || self.look == Style::Lanterns;
+        let surroundings = if is_bare { Surroundings::Nothing } else { Surroundings::Words };
+        Ok(Look { style: self.look, theme: self.theme, framing, surroundings, width: self.width, height: self.height })
+    }
+}
+
+fn style(text: &str) -> Result<Style, String> {
+    match text {
+        "plan" => Ok(Style::Plan),
+        "lanterns" => Ok(Style::Lanterns),
+        _ => Err("expected plan or lanterns".to_owned()),
     }
 }
 

@@ -30,6 +30,6 @@ fn labels_move_with_their_boards() {
 }
 
 #[test]
-fn boards_keep_their_colour_in_a_turn() {
-    run_scenario("tests/python/stage_colours.py", "boards_keep_their_colour_in_a_turn");
+fn turns_keep_the_colours_of_boards() {
+    run_scenario("tests/python/stage_colours.py", "turns_keep_the_colours_of_boards");
 }

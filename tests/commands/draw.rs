@@ -3,6 +3,7 @@
 
 mod colours;
 mod labels;
+mod lanterns;
 mod moving;
 use crate::harness;
 

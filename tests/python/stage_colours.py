@@ -43,7 +43,7 @@ def reversals(shades, least=4):
     return turns
 
 
-def boards_keep_their_colour_in_a_turn():
+def turns_keep_the_colours_of_boards():
     """Through the turnaround's turn no board changes its colour to and fro; `draw` has the page's colours."""
     assert reversals([0, 9, 0, 9, 8, 9]) == 2 and reversals([5, 4, 5, 6, 5]) == 0 and reversals([0, 3, 6, 9]) == 0
     taken = frames(120, 145, 0.1)
@@ -70,4 +70,4 @@ def drawn_alike(shades, colours, moment):
 
 
 if __name__ == "__main__":
-    play(boards_keep_their_colour_in_a_turn)
+    play(turns_keep_the_colours_of_boards)

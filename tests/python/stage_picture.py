@@ -151,7 +151,7 @@ def boards_are_where_the_truth_has_them():
         places = random.uniform(-9, 9, (20000, 2))
         away = outside_of_boards(places, handles) > 3 / scale
         for end in [handles[0], handles[-1]]:
-            away &= numpy.linalg.norm(places - end, axis=1) > 100 / scale
+            away &= numpy.linalg.norm(places - end, axis=1) > 170 / scale
         at = to_pixel(places[away])
         inside = (at >= 0).all(axis=1) & (at[:, 0] < pixels.shape[1] - 200) & (at[:, 1] < pixels.shape[0])
         at = at[inside]

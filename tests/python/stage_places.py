@@ -11,6 +11,7 @@ import pathlib
 import re
 import tempfile
 import threading
+import time
 
 import numpy
 
@@ -171,6 +172,9 @@ def five_thousand_boards_are_drawn():
             page.goto("about:blank")
             page.goto(f"{url}#{address}")
             undimmed(page)
+            if address:
+                until(page, "picture.life === 1", "lanterns that are all lit", 60)
+                time.sleep(0.5)
             pixels, to_pixel = shot(page), projection(page)
             ground = luminance(pixels[3, -3])
             # A quarter of a link from the handles, away from the lanterns. A turn is some five pixels wide: the

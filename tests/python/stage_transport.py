@@ -42,10 +42,10 @@ def shows(page, word, detail=""):
 def header_says_what_the_show_does():
     """The countdown stands while the show does, and each change is spoken once."""
     with cued_scene() as scene, server() as url, browser(viewport={"width": 1280, "height": 720}) as (page, complaints):
-        with started("run", "--quiet", "--json", "--scene", scene, "--start", "299.5", "--time-scale", "0.5", "--loop"):
+        with started("run", "--quiet", "--json", "--scene", scene, "--start", "296", "--time-scale", "0.5", "--loop"):
             page.goto(url)
-            shows(page, "▶ PLAYING", "× 0.5")
             listen(page)
+            shows(page, "▶ PLAYING", "× 0.5")
             # The cue's whole name stays while the show waits, and lies beside the picture.
             shows(page, "GO?", "^cue 1 · the coil closes and the drums begin · waits 0:0[3-9]")
             assert page.evaluate("document.title[0]") == "▷", page.title()

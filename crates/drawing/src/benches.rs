@@ -87,6 +87,11 @@ pub fn handles(team: &Team, chain: &Chain, camera: &Camera, palette: &Palette) -
     group
 }
 
+/// Returns the rectangle of a board, without a colour.
+pub fn polygon(board: &Board) -> Polygon {
+    Polygon::new().set("points", corners(board))
+}
+
 /// Returns the outline of a board, `units` wide, or thinner on a board that is hardly wider.
 pub fn outline(board: &Board, colour: &str, units: f64, camera: &Camera) -> Polygon {
     let units = units.min(units * 0.3 * board.half_width * camera.scale).max(0.4 * units);

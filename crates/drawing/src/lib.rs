@@ -11,6 +11,7 @@ mod benches;
 pub mod camera;
 mod ground;
 mod labels;
+mod lanterns;
 mod look;
 mod marks;
 pub mod palette;
@@ -30,7 +31,7 @@ use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 use camera::{Camera, StageBox, Viewport};
 use labels::Name;
-pub use look::{Framing, Length, Look, Surroundings, Theme};
+pub use look::{Framing, Length, Look, Style, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
 pub use scale::mean_speeds;
@@ -91,7 +92,11 @@ impl<'a> Drawing<'a> {
             Framing::Everything => {
                 let mut boards = extent.boards;
                 ground::include(motion.ground(), &mut boards);
-                boards.padded(0.04 * boards.width().max(boards.height()) + motion.team().width)
+                let margin = match look.style {
+                    Style::Plan => 0.04 * boards.width().max(boards.height()) + motion.team().width,
+                    Style::Lanterns => lanterns::MARGIN,
+                };
+                boards.padded(margin)
             }
             Framing::Radius(radius) => StageBox::around(Point::origin(), 2.0 * radius, 2.0 * radius),
             // Only the width is given: the height follows from the viewport.
@@ -128,6 +133,13 @@ impl<'a> Drawing<'a> {
 
     /// Returns the SVG of a chain at a time.
     pub fn svg(&self, time: f64, chain: &Chain) -> String {
+        match self.look.style {
+            Style::Plan => self.plan(time, chain),
+            Style::Lanterns => self.lanterns(time, chain),
+        }
+    }
+
+    fn plan(&self, time: f64, chain: &Chain) -> String {
         let palette = self.look.theme.palette();
         let happened = marks::happened(self.timeline, time);
         let boards = benches::seen(self.motion.team(), chain, &self.camera.view());

@@ -26,6 +26,15 @@ impl Theme {
     }
 }
 
+/// The manner in which the stage is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// Boards in the colours of their speeds.
+    Plan,
+    /// The stage at night in the light of the dragon's lanterns, without theme, surroundings and animation.
+    Lanterns,
+}
+
 /// The part of the stage to show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Framing {
@@ -77,6 +86,8 @@ impl Length {
 /// The look of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
+    /// The manner of drawing.
+    pub style: Style,
     /// The colours.
     pub theme: Theme,
     /// The part of the stage.
