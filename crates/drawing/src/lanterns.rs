@@ -57,7 +57,8 @@ impl Drawing<'_> {
         let mut document = self.document(time, chain, &super::palette::DARK).add(definitions());
         let black = Rectangle::new().set("width", WIDTH).set("height", rounded(self.height, 4)).set("fill", "#000000");
         document = document.add(black);
-        let mut stage = self.stage().add(ground(&boards, &view, exposure(team.benches, chain)));
+        let stage = self.stage().add(ground(&boards, &view, exposure(team.benches, chain)));
+        let mut stage = self.with_obstacles(stage, &super::palette::DARK);
         let mut wood = Group::new().set("id", "benches");
         for (bench, board) in boards.iter().rev() {
             let outer = benches::polygon(board).set("id", format!("bench-{bench}")).set("fill", "#7a3518");

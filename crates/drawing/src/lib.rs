@@ -147,7 +147,7 @@ impl<'a> Drawing<'a> {
         let (outlined, what) = outlined(&happened, &overlaps);
         let outlined: Vec<usize> =
             outlined.into_iter().filter(|bench| boards.iter().any(|(seen, _)| seen == bench)).collect();
-        let mut stage = self.stage(palette);
+        let mut stage = self.with_obstacles(self.stage(), palette);
         if let Some(area) = self.ground {
             stage = stage.add(covered(area, palette));
         }
@@ -237,9 +237,13 @@ impl<'a> Drawing<'a> {
             .add(ground.set("fill", palette.ground))
     }
 
-    /// Returns the group of the stage, in metres, with the obstacles.
-    fn stage(&self, palette: &Palette) -> Group {
-        let stage = Group::new().set("id", "stage").set("transform", self.camera.transform());
+    /// Returns the group of the stage, in metres.
+    fn stage(&self) -> Group {
+        Group::new().set("id", "stage").set("transform", self.camera.transform())
+    }
+
+    /// Returns the group of the stage with the obstacles.
+    fn with_obstacles(&self, stage: Group, palette: &Palette) -> Group {
         let ground = self.motion.ground();
         if ground.is_empty() { stage } else { stage.add(ground::group(ground, &self.camera, palette)) }
     }
