@@ -22,7 +22,6 @@ use bench_dragon::messages::chase::{ChaseSource, ChaseState};
 use bench_dragon::messages::json::ChaseObject;
 use bench_dragon::messages::sentence::chase_sentence;
 use bench_dragon::outputs::send::axes::Axes;
-use bench_dragon::outputs::send::network::destination;
 use bench_dragon::proof::scene_hash;
 
 use super::{CommandError, Common, Output, expect_exact_motion, stop_on_signals, wall_seconds};
@@ -108,7 +107,8 @@ fn usual_group() -> SocketAddrV4 {
 }
 
 fn group(text: &str) -> Result<SocketAddrV4, String> {
-    destination(text, Some(USUAL_GROUP.1))
+    let address = text.parse().or_else(|_| text.parse().map(|address| SocketAddrV4::new(address, USUAL_GROUP.1)));
+    address.map_err(|_| "expected an IPv4 address such as 236.10.10.10 or 127.0.0.1:56565".to_owned())
 }
 
 fn speed(text: &str) -> Result<f64, String> {

@@ -197,6 +197,7 @@ fn bad_options_are_refused_with_one_sentence() {
         (&["ltc", "Cargo.toml"], "RIFF WAVE"),
         (&["psn", "--tracker", "0"], "1..=65535"),
         (&["psn", "--axes", "x,y"], "once each"),
+        (&["psn", "--group", "desk.local"], "an IPv4 address"),
     ] {
         let mut command = program(name);
         command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("chase").args(arguments);

@@ -35,8 +35,8 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
         }
         FeedEvent::Silent => seen.push(Seen::Silent),
         FeedEvent::Gone => seen.push(Seen::Gone),
-        FeedEvent::Stage(_) | FeedEvent::Scene { .. } => (),
-        FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) | FeedEvent::Chase(_) => (),
+        FeedEvent::Stage(_) | FeedEvent::Scene { .. } => {}
+        FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) | FeedEvent::Chase(_) => {}
     });
     polled.unwrap();
 }
