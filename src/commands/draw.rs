@@ -65,7 +65,7 @@ struct LookArguments {
     #[arg(long, value_name = "X,Y,METRES", value_parser = view, allow_hyphen_values = true)]
     view: Option<Framing>,
     /// plan, or lanterns: the stage at night in the light of the dragon's lanterns
-    #[arg(long, value_name = "LOOK", default_value = "plan", value_parser = style, conflicts_with = "animated")]
+    #[arg(long, value_name = "STYLE", default_value = "plan", value_parser = style, conflicts_with = "animated")]
     look: Style,
     /// light, dark, or auto: light, and dark if a browser prefers that
     #[arg(long, value_name = "THEME", default_value = "light", value_parser = theme)]
