@@ -90,7 +90,6 @@ impl Observer {
             FeedEvent::Alert(_) => self.seen.alerts += 1,
             FeedEvent::Status(status) => self.status(status),
             FeedEvent::Scene { .. } | FeedEvent::Cue(_) | FeedEvent::Chase(_) | FeedEvent::Silent | FeedEvent::Gone => {
-                ()
             }
         }
     }
