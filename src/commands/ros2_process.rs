@@ -89,6 +89,7 @@ impl Ros2Request {
 
 /// The facts of a show that ROS 2 is told of.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "a program without ROS 2 refuses before it reads them"))]
 pub struct Ros2Show {
     /// Frames per second of the loop.
     pub loop_rate: f64,

@@ -78,7 +78,7 @@ impl Track {
         self.distance
     }
 
-    /// Returns the place on the path that is nearest to a point of the stage, within [`WINDOW`] metres of a place.
+    /// Returns the place on the path that is nearest to a point of the stage, within `WINDOW` metres of a place.
     pub fn project(&self, point: Point, near: f64) -> Projection {
         let (path, placement) = (self.motion.path(), self.motion.placement());
         let (first, last) = ((near - WINDOW).max(0.0), (near + WINDOW).min(path.length()));

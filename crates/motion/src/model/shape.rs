@@ -2,7 +2,7 @@
 //! team, path and keep-out.
 //!
 //! The signed distance is positive apart, in metres: the Euclidean distance. It is negative where the board and the
-//! shape overlap: minus the least translation that frees the board ([`escape`]). The shape of a boundary is the plane
+//! shape overlap: minus the least translation that frees the board (`escape`). The shape of a boundary is the plane
 //! outside its polygon.
 //!
 //! Corners are first taken to the board's frame. So the error is a few units in the last place of the board's size, of
