@@ -15,7 +15,7 @@ const HANDLE: usize = 40;
 
 /// Returns exit code, line and error of `verify --json`.
 fn verify(file: &Path) -> (i32, Value, String) {
-    let output = program("verify").args(["--json", "verify"]).arg(file).output().unwrap();
+    let output = program("verify_recording").args(["--json", "verify"]).arg(file).output().unwrap();
     (output.status.code().unwrap(), json_lines(&output).pop().unwrap_or(Value::Null), text(&output.stderr))
 }
 

@@ -7,8 +7,6 @@ pub type Line = (&'static str, &'static str);
 /// Commands that are not run.
 pub const NOT_HERE: &[Line] = &[
     (".venv/bin/python benches/", "measures for minutes"),
-    ("apt install ros-", "needs ROS 2"),
-    ("arecord", "needs a sound card: tests/processes/chase.rs pipes the sound of libltc"),
     ("apt-get install", "changes the machine"),
     ("bench-dragon chase ltc show.wav", "the reader's own recording"),
     ("bench-dragon chase mtc /dev/snd/", "needs a MIDI device: tests/processes/chase.rs pipes the bytes of mido"),
@@ -18,7 +16,6 @@ pub const NOT_HERE: &[Line] = &[
     ("cargo deny check", "needs cargo-deny and the network"),
     ("cargo install --path", "builds for minutes: tests/newcomer/debian.sh installs the program"),
     ("cargo install", "builds another program for minutes"),
-    ("cargo run --release --no-default-features", "builds for minutes: tests/run checks this way"),
     ("cd / && /tmp/installed/bin/bench-dragon", "needs the cargo install before it: tests/newcomer/debian.sh has both"),
     ("chromium --kiosk", "needs a screen: tests/browser/view.rs opens the pages without one"),
     ("colcon build", "needs ROS 2"),
