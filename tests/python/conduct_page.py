@@ -174,11 +174,11 @@ def keyboard(page):
     page.get_by_label("Speed").select_option("1 ×")
     seek(page, 149.8)
     page.get_by_role("button", name="Play").click()
-    until(lambda: "cue 1 · lamps" in page.inner_text("#playback-detail"), "the cue's name")
+    until(lambda: "cue 1 · lamps" in "".join(page.locator("#playback-detail").all_inner_texts()), "the cue's name")
     seek(page, 299.9)
     # The second cue pauses: Play continues from there.
     until(lambda: (now := state())["playback"] == "paused" and now["sim_time"] == 300.0, "the cue that pauses")
-    until(lambda: page.inner_text("#playback-detail").startswith("cue 2 · coil · waits 0:0"), "its name")
+    until(lambda: "".join(page.locator("#playback-detail").all_inner_texts()).startswith("cue 2 · coil · waits 0:0"), "its name")
     page.get_by_role("button", name="Play").click()
     until(lambda: state()["playback"] == "playing", "on from the cue")
 
