@@ -1,7 +1,7 @@
 // The words after # in the page's address, for a screen without a keyboard: #show,transparent or #dark&follow=12.
 
 /** Words without a value, and words with numbers (as many as named) or a word after `=`. */
-const ALONE = ["show", "moon", "hands", "desk", "tell", "transparent", "nolabels", "dark", "light", "sound"];
+const ALONE = ["show", "moon", "hands", "desk", "tell", "transparent", "nolabels", "keys", "dark", "light", "sound"];
 const WITH = { follow: /^[1-9]\d*$/, bench: /^[1-9]\d*$/, rotate: /^-?\d+(\.\d+)?$/, view: /^-?[\d.]+,-?[\d.]+,[\d.]+$/, lang: /^(en|zh)$/ };
 
 /** The decoded text of an address; the text itself if it cannot be decoded. */
