@@ -175,6 +175,11 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let most = around.max(NEAR * self.given.team.shortest_link());
         let try_at = |search: &mut Self, far: f64| {
             let mut point = search.grid_point(event.travelled + far);
+            // An event beyond the path's end is none of the scene.
+            let length = search.given.path.length();
+            if search.chain.exact.travelled(point.head).hi > length - LEAST * (1.0 + length) {
+                return None;
+            }
             let result = shown(search, &mut point)?;
             Some((point, result))
         };
