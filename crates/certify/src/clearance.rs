@@ -462,7 +462,8 @@ impl<'a, 'w> Descent<'a, 'w> {
         let spans: Vec<Span> = listed.handles[1..].iter().map(|handle| handle.span).collect();
         let Span(from, to) = listed.handles[0].span;
         let (apart, at) = if looks { (Some(self.threshold()), places) } else { (None, Vec::new()) };
-        let step = Step { links: self.links, from, to, moving: false, clear: false, spans, apart, at };
+        let step =
+            Step { links: self.links, from, to, moving: false, clear: false, spans, free: Vec::new(), apart, at };
         Ok(ShownStep { step, body_forward: listed.body_forward })
     }
 }
