@@ -103,14 +103,18 @@ pub fn scene_hash(text: &str) -> [u8; 32] {
     *blake3::hash(text.as_bytes()).as_bytes()
 }
 
-/// Returns the text of a certificate's scene from the first line. The rest is not checked.
+/// Returns the text of a scene from the first line of the certificate of its events. The rest is not checked.
 ///
 /// # Errors
-/// [`Refused::Form`] for a line that is not the first of a certificate.
+/// [`Refused::Form`] for a line that is not the first of a certificate of events.
 pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
     let form = |problem: String| Refused::Form { line: 1, problem };
     let parsed = serde_json::from_slice(first_line).map_err(|error| form(error.to_string()))?;
-    Ok(Checker::begin(parsed).map_err(form)?.proved.scene)
+    let Checker { about, proved, .. } = Checker::begin(parsed).map_err(form)?;
+    if about == About::Events {
+        return Ok(proved.scene);
+    }
+    Err(form("it is a certificate of another question, expected one of events (events --certify)".to_owned()))
 }
 
 /// Checks a certificate. `progress` receives the number of bytes read.
