@@ -82,6 +82,9 @@ fn scene(index: usize, random: &mut Rng) -> String {
     tight_route(random)
 }
 
+/// Most lines of a certificate that are left out, one at a time.
+const MOST_LEFT_OUT: usize = 30;
+
 /// Of this many scenes one is tried for its clearance and its greatest speed; in the long run each is.
 const STRIDE: usize = 2;
 
@@ -108,13 +111,18 @@ fn certified_in(text: &str, most_steps: u64) -> Option<Vec<Status>> {
 /// # Panics
 /// The checker refuses them.
 fn accepted(text: &str, search: impl FnOnce(&mut dyn FnMut(&CertificateLine) -> io::Result<()>)) -> Proved {
+    verify(written(search).as_slice(), &mut |_| ()).unwrap_or_else(|refused| panic!("{refused}\n{text}"))
+}
+
+/// Returns the lines that a search writes.
+fn written(search: impl FnOnce(&mut dyn FnMut(&CertificateLine) -> io::Result<()>)) -> Vec<u8> {
     let mut lines = Vec::new();
     search(&mut |line| {
         serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
         lines.push(b'\n');
         Ok(())
     });
-    verify(lines.as_slice(), &mut |_| ()).unwrap_or_else(|refused| panic!("{refused}\n{text}"))
+    lines
 }
 
 /// Writes the certificate of a show's least clearance and has it checked. Returns the end of the stretch that is proved;
@@ -248,5 +256,59 @@ fn certificates_that_were_refused_are_accepted() {
         let text = std::fs::read_to_string(format!("tests/scenes/{name}.toml")).unwrap();
         let results = certified(&text).unwrap();
         assert!(!results.contains(&Status::Undecided), "{name}: {results:?}");
+    }
+}
+
+/// A certificate of the least clearance, the greatest speed or the least pitch is refused without any one of its lines,
+/// and with a result that claims a little more.
+#[test]
+fn changed_certificates_of_other_questions_are_refused() {
+    let team = "[team]\nbenches = 5\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\
+                [motion]\nhead_speed = 1.0\n";
+    let route = format!(
+        "{team}[path]\nkind = \"pieces\"\npieces = [{{ kind = \"line\", length = 2.0 }}, \
+         {{ kind = \"arc\", radius = 2.5, side = \"left\", turns = 0.6 }}, {{ kind = \"line\", length = 1.0 }}]\n"
+    );
+    let spiral = "[team]\nbenches = 40\nhead_length = 5.0\nbody_length = 1.0\nwidth = 0.1\nhole_inset = 0.1\n\
+                  [path]\nkind = \"spiral\"\npitch = 0.6\nstart_turn = 12.0\n[motion]\nhead_speed = 1.0\n";
+    let scene = Scene::parse(&route, "route", "route").unwrap();
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let freeze = timeline.freeze(scene.stops_at_contact());
+    let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ()).unwrap().least;
+    let clearance = written(|write| {
+        certify_least_clearance(&scene.motion, freeze, &hint, &route, MOST_STEPS, write, &mut |_| ()).unwrap().unwrap();
+    });
+    let speed = written(|write| {
+        certify_greatest_speed(&scene, &timeline, 2.0, &route, 50_000, write, &mut |_| ()).unwrap().unwrap();
+    });
+    let on_spiral = Scene::parse(spiral, "spiral", "spiral").unwrap();
+    let pitch = written(|write| {
+        certify_least_pitch(on_spiral.team(), 1.5, spiral, write, &mut |_| ()).unwrap().unwrap();
+    });
+    // Each field of a result with the change that makes the claim stronger.
+    let fields: [(_, &[(&str, f64)]); 3] = [
+        (clearance, &[("lo", 1e-6), ("hi", -1e-6)]),
+        (
+            speed,
+            &[("value_lo", 1e-6), ("value_hi", -1e-6), ("ratio_lo", 1e-6), ("ratio_hi", -1e-6), ("time_until", 1.0)],
+        ),
+        (pitch, &[("value_lo", 1e-6), ("value_hi", -1e-6), ("radius", -0.1), ("from", -1e-3)]),
+    ];
+    for (lines, fields) in fields {
+        let lines = String::from_utf8(lines).unwrap();
+        verify(lines.as_bytes(), &mut |_| ()).unwrap();
+        let lines: Vec<&str> = lines.lines().collect();
+        let is_refused = |lines: &[&str]| verify(lines.join("\n").as_bytes(), &mut |_| ()).is_err();
+        for left_out in (0..lines.len()).rev().step_by(1 + lines.len() / MOST_LEFT_OUT) {
+            let rest = [&lines[..left_out], &lines[left_out + 1..]].concat();
+            assert!(is_refused(&rest), "without line {}: {}", left_out + 1, lines[left_out]);
+        }
+        let (result, before) = lines.split_last().unwrap();
+        for (field, more) in fields {
+            let mut changed: serde_json::Value = serde_json::from_str(result).unwrap();
+            changed[*field] = (changed[*field].as_f64().unwrap() + more).into();
+            let changed = changed.to_string();
+            assert!(is_refused(&[before, &[changed.as_str()]].concat()), "{field}: {changed}");
+        }
     }
 }
