@@ -82,7 +82,6 @@ fn lines(peer: Process, kind: &str, seconds: u64) -> Vec<Value> {
 /// A Fast DDS client sends its first request before RustDDS knows it, in half of all cases. Fast DDS repeats the request
 /// only after its heartbeat period, here an hour: an answer proves that the publisher requests it again.
 #[test]
-#[ignore = "3 of 100 had no answer beside other tests, for a reason not found yet: run it alone"]
 fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
     if !can_run(peer_program().map(drop)) {
         return;
@@ -96,7 +95,7 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
     // A process for each client: Fast DDS at times dies when many participants of one process leave at once. That does
     // not concern the answer, which is printed before.
     let client = || {
-        let call = ["call", &service, &request, &response, "00", "--heartbeat", "3600", "--timeout", "30"];
+        let call = ["call", &service, &request, &response, "00", "--heartbeat", "3600", "--timeout", "60"];
         Process::start(peer(&call).args(["--clients", "1"]))
     };
     let rate_of_one = Value::from(hex(&1.0_f64.to_le_bytes()));
@@ -105,6 +104,7 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
         let side_by_side: Vec<Process> = (0..4).map(|_| client()).collect();
         answers.extend(side_by_side.into_iter().flat_map(|process| json_lines(&process.output_within(120))));
     }
+    // Times depend on the machine's load: they are printed.
     let within = |seconds: f64| answers.iter().filter(|line| line["answered_s"].as_f64().unwrap() < seconds).count();
     println!("{} of {} within 0.1 s, {} within 0.5 s", within(0.1), answers.len(), within(0.5));
     assert_eq!(answers.len(), 100);

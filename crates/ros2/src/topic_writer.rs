@@ -109,6 +109,8 @@ pub(super) trait Serviced {
     /// Sends the held message to new subscribers, and drops the history after the last subscriber has left. Must be
     /// called often.
     fn service(&mut self, matches: &Matches, node: &mut Node);
+    /// Returns true if there is a subscriber.
+    fn is_read(&self, matches: &Matches) -> bool;
 }
 
 impl<Message: Serialize> Serviced for TopicWriter<Message> {
@@ -134,11 +136,19 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
         // A subscriber that matches this publisher later requests the message when it does.
         self.write(latest);
     }
+
+    fn is_read(&self, matches: &Matches) -> bool {
+        matches.readers(self.publisher.guid()).any()
+    }
 }
 
 impl<Message: Serialize> Serviced for Stream<Message> {
     fn service(&mut self, matches: &Matches, node: &mut Node) {
         self.port.service(matches, node);
+    }
+
+    fn is_read(&self, matches: &Matches) -> bool {
+        self.port.is_read(matches)
     }
 }
 
