@@ -4,7 +4,9 @@
 //! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first; with
 //! Fast DDS also a volatile one, since RustDDS does not read the durability of a subscriber. So a message without
 //! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. A
-//! subscriber that joins others still gets all that RustDDS keeps, the latest last.
+//! subscriber that joins others still gets all that RustDDS keeps, the latest last. To end that, RustDDS would have to
+//! send a GAP to a new subscriber that is volatile; it does so only if the writer is volatile. A second, volatile writer
+//! is no remedy: a volatile subscriber matches both, and a transient-local one would report the second as incompatible.
 
 use std::sync::Arc;
 
