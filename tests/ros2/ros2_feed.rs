@@ -273,7 +273,9 @@ fn the_diagnostics_tell_of_a_chase_and_of_its_end() {
     let chase = Process::start(program(name).args(["chase", "artnet", "--listen", &port.to_string()]));
     let subject = format!("{}: chase", unique(name));
     // The topic is that of all shows of the domain.
-    let until = |is_it: &dyn Fn(&Value, &dyn Fn(&str) -> String) -> bool| {
+    /// A test of a status of the chase, with a function that returns its figures.
+    type Test = dyn Fn(&Value, &dyn Fn(&str) -> String) -> bool;
+    let until = |is_it: &Test| {
         let began = Instant::now();
         while began.elapsed().as_secs() < 90 {
             let message = next(&lines, "diagnostics");
