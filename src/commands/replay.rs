@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
-use bench_dragon::messages::Stage;
 use bench_dragon::messages::sentence::rounded;
+use bench_dragon::messages::{Roster, Stage};
 use bench_dragon::publisher::live::End;
 use bench_dragon::publisher::run::{Hooks, Publishing};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
@@ -92,7 +92,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let of = prepared.contents().scene.clone().unwrap_or_else(stem);
     let (transports, doors) = open_transports(&config(common, &scene, &prepared, run_id))?;
     let start = start_lines(&shown, &of, &prepared);
-    let benches = prepared.contents().stage.benches;
+    let roster = Roster::team(prepared.contents().stage.benches);
     let (mut frames, reading) = prepared.begin()?;
     let process = ros2.as_ref().map(Ros2Process::start).transpose()?;
     let publishing = Publishing {
@@ -117,7 +117,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         sample: Box::new(|_| ()),
         ended: Box::new(|_| ()),
     };
-    let mut published = publish(common, benches, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
+    let mut published = publish(common, &roster, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
     published.deliveries.extend(process.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
     let (waited, failure) = reading.finish();
     if waited > 0 {

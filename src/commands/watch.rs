@@ -16,7 +16,7 @@ use bench_dragon::messages::json::{AlertObject, ChaseObject, CueObject};
 use bench_dragon::messages::sentence::{Figures, alert_sentence, chase_sentence, cue_sentence, rounded, time_until};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState, Severity};
-use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus};
+use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus, Roster};
 use bench_dragon::outputs::monitor::{IntervalReport, Latency, Monitor, Presence};
 use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
@@ -310,7 +310,8 @@ impl Screen<'_> {
     fn alert_line(&self, alert: &CollisionAlert) -> String {
         let level = alert.alert_level().unwrap_or(Level::Clear);
         let style = self.style(level.severity());
-        let sentence = alert_sentence(alert, self.benches, Figures::Shown { time_scale: self.time_scale });
+        let sentence =
+            alert_sentence(alert, &Roster::team(self.benches), Figures::Shown { time_scale: self.time_scale });
         format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name())
     }
 

@@ -9,10 +9,12 @@ pub mod chase;
 pub mod control;
 pub mod json;
 pub mod layouts;
+mod roster;
 pub mod sentence;
 pub mod state;
 
 pub use layouts::*;
+pub use roster::Roster;
 
 /// The bytes that one queue of frames, or one topic's history, takes by default at most: 64 MB.
 pub const QUEUE_BYTES: usize = 64_000_000;

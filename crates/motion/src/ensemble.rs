@@ -14,6 +14,7 @@ use crate::event::{Budget, Event};
 use crate::ground::{Ground, Obstacle};
 use crate::linkage::NoFollower;
 use crate::singularities::Singularities;
+use crate::solve::table::Instructions;
 use crate::solve::{Chain, Solver, Velocities};
 use crate::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
 use crate::{CONTACT_BUDGET, Motion};
@@ -68,6 +69,17 @@ impl Ensemble {
             first_handles.push(next);
         }
         Self { dragons, first_handles }
+    }
+
+    /// Returns the same dragons, whose tables are read with these instructions, one set for each dragon, or `None` if
+    /// this processor lacks them.
+    pub fn with_instructions(&self, sets: &[Instructions]) -> Option<Self> {
+        let of = |(dragon, set): (&Dragon, &Instructions)| {
+            let motion = dragon.motion.clone().with_instructions(*set)?;
+            Some(Dragon { motion, ..dragon.clone() })
+        };
+        let dragons: Option<Vec<Dragon>> = self.dragons.iter().zip(sets).map(of).collect();
+        dragons.filter(|dragons| dragons.len() == self.dragons.len()).map(Self::new)
     }
 
     /// Returns the dragons in the order of the scene.

@@ -40,7 +40,7 @@ impl<'a> TransportConfig<'a> {
     pub fn of(name: &'a str, scene: &'a Scene, stage: Stage) -> Self {
         Self {
             name,
-            handles: scene.team().handles(),
+            handles: scene.handles(),
             alerts: scene.alerts.is_some(),
             cues: scene.cues.len(),
             single_precision: scene.single_precision,

@@ -4,9 +4,9 @@
 use serde::Serialize;
 
 use super::{HasStamp, Header, Pose, Time, Xyz, level_of};
-use bench_dragon_messages::sentence::{Figures, alert_sentence, bench_name, state_sentence};
+use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Severity};
-use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Roster, Stage};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 
@@ -240,7 +240,7 @@ impl MarkerArray {
         put(sentence, stamp, above.filter(|_| !sentence.text.is_empty()));
         for (k, marker) in numbers.iter_mut().enumerate() {
             let bench = named.get(k);
-            marker.text = bench.map_or_else(String::new, |(bench, _)| bench_name(*bench, stage.benches));
+            marker.text = bench.map_or_else(String::new, |(bench, _)| Roster::team(stage.benches).bench(*bench));
             let at = bench.and_then(|(bench, _)| benches.get(*bench as usize)).map(|marker| &marker.pose.position);
             put(marker, stamp, at.map(|place| (place.x, place.y)));
         }
@@ -285,7 +285,7 @@ fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> 
     let of = |alert: &CollisionAlert| {
         // Alerts come once a second, frames more often.
         let now = CollisionAlert { time_to_event: alert.event_time - frame.sim_time, ..*alert };
-        alert_sentence(&now, stage.benches, Figures::Shown { time_scale: frame.time_scale })
+        alert_sentence(&now, &Roster::team(stage.benches), Figures::Shown { time_scale: frame.time_scale })
     };
     state.map(str::to_owned).or_else(|| alert.map(of))
 }

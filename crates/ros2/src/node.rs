@@ -13,7 +13,7 @@ use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFact
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon_messages::state::Severity;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Roster, Stage};
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
@@ -162,7 +162,7 @@ impl Topics {
         self.latest_alert = Some(alert);
         if let Some(level) = alert.alert_level() {
             let figures = Figures::Shown { time_scale: self.time_scale };
-            let sentence = alert_sentence(&alert, self.stage.benches, figures);
+            let sentence = alert_sentence(&alert, &Roster::team(self.stage.benches), figures);
             self.rosout.tell(level.severity(), format!("{}: {sentence}", level.name()));
         }
         if let Some(port) = &mut self.alerts {

@@ -27,7 +27,7 @@ pub use self::precision::SinglePrecision;
 use self::ros2::RawRos2;
 use self::stage::RawStage;
 pub use self::text::{SceneText, printable};
-use bench_dragon_messages::sentence::bench_name;
+use bench_dragon_messages::Roster;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::ground::{Ground, Obstacle};
@@ -195,6 +195,11 @@ impl Scene {
         self.motion.team()
     }
 
+    /// Returns the number of benches of all dragons.
+    pub fn benches(&self) -> usize {
+        self.ensemble.as_ref().map_or(self.motion.team().benches, Ensemble::benches)
+    }
+
     /// Returns the number of handles of a frame: those of all dragons.
     pub fn handles(&self) -> usize {
         self.ensemble.as_ref().map_or(self.motion.team().handles(), Ensemble::handles)
@@ -210,16 +215,22 @@ impl Scene {
         self.ensemble.as_ref().map_or_else(|| self.motion.obstacle_of(event), |all| all.obstacle_of(event))
     }
 
+    /// Returns the names of the benches and obstacles, for people.
+    pub fn roster(&self) -> Roster {
+        let obstacles = self.ground().obstacles().iter().map(|obstacle| obstacle.name.clone()).collect();
+        let dragons = match &self.ensemble {
+            Some(ensemble) => {
+                let of = |dragon: &Dragon| (dragon.name.clone(), dragon.motion.team().benches as u32);
+                ensemble.dragons().iter().map(of).collect()
+            }
+            None => vec![(String::new(), self.team().benches as u32)],
+        };
+        Roster::new(dragons, obstacles)
+    }
+
     /// Returns a bench's name for people, counted from 1 within its dragon.
     pub fn bench_name(&self, bench: u32) -> String {
-        let Some(ensemble) = &self.ensemble else { return bench_name(bench, self.team().benches as u32) };
-        match ensemble.owner(bench as usize) {
-            Some((dragon, own)) => {
-                let Dragon { name, motion, .. } = &ensemble.dragons()[dragon];
-                format!("{} of {name}", bench_name(own as u32, motion.team().benches as u32))
-            }
-            None => bench_name(bench, ensemble.handles() as u32 - 1),
-        }
+        self.roster().bench(bench)
     }
 
     /// Returns all events of the scene, as [`Motion::timeline`].

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bench_dragon::messages::Roster;
 use bench_dragon::messages::sentence::{Figures, alert_sentence};
 use bench_dragon::motion::Method;
 use bench_dragon::motion::model::curve::Side;
@@ -144,7 +145,7 @@ fn play(scene: &Scene) {
         let header = frame_header(frame, Stamps { run_id: 1, sequence: tick, stamp_ns: 0, deadline_ns: 0 });
         let figures = Figures::Shown { time_scale: frame.time_scale };
         for alert in &frame.alerts {
-            let sentence = alert_sentence(&collision_alert(&header, alert), stage.benches, figures);
+            let sentence = alert_sentence(&collision_alert(&header, alert), &Roster::team(stage.benches), figures);
             assert!(!sentence.contains("NaN") && !sentence.contains("inf"), "{sentence}");
         }
     }

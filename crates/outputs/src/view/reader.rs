@@ -9,7 +9,7 @@ use tokio::sync::watch;
 
 use super::{Picture, Proofs, SceneHash, wire};
 use bench_dragon_client::feed::{Feed, FeedEvent};
-use bench_dragon_messages::{LoopStatus, Stage};
+use bench_dragon_messages::{LoopStatus, Roster, Stage};
 use bench_dragon_proof::ProvedEvent;
 
 /// The interval of polls: some browsers draw 240 times a second, none needs more. Waking this thread at each frame
@@ -83,7 +83,7 @@ impl Reader<'_> {
             }
             FeedEvent::Alert(alert) => {
                 let benches = self.stage.map_or(0, |stage| stage.benches);
-                self.picture.alert = wire::alert(alert, benches).into();
+                self.picture.alert = wire::alert(alert, &Roster::team(benches)).into();
             }
             FeedEvent::Cue(cue) => {
                 self.cues += 1;

@@ -27,7 +27,7 @@ use serde_json::{Value, json};
 use bench_dragon_messages::json::{AlertObject, CueObject, Exact, StageObject};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Level, Severity};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Roster, Stage};
 use bench_dragon_proof::ProvedEvent;
 
 const VERSION: u8 = 3;
@@ -83,9 +83,9 @@ fn state(state: FrameState) -> Value {
         "sentence": state_sentence(state)})
 }
 
-/// Returns an alert with its severity and its sentence, in a team of `benches` benches; the page shows the figures
+/// Returns an alert with its severity and its sentence, with the names of `roster`; the page shows the figures
 /// beside it.
-pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
+pub(super) fn alert(alert: &CollisionAlert, roster: &Roster) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
         #[serde(flatten)]
@@ -99,7 +99,7 @@ pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
         alert: alert.into(),
         severity: level.map_or(Severity::Ok, Level::severity).name(),
         happened: level.is_some_and(Level::has_happened),
-        sentence: alert_sentence(alert, benches, Figures::Omitted),
+        sentence: alert_sentence(alert, roster, Figures::Omitted),
     };
     json!(message).to_string()
 }

@@ -87,7 +87,7 @@ impl RawSeveral {
             }
             dragons.push(dragon);
         }
-        for travelled in self.cues.iter().filter_map(RawCue::travelled) {
+        if let Some(travelled) = self.cues.iter().find_map(RawCue::travelled) {
             let sentence =
                 "cues.travelled names no dragon, expected cues.at or cues.before in a show of several dragons";
             return Err(source.field_error(travelled, sentence));
