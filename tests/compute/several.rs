@@ -1,5 +1,5 @@
-//! Several dragons in one show: first contacts against a brute force that shares no code with the search, cases by hand,
-//! frames against the solvers of each dragon, and bad input.
+//! Several dragons in one show: first contacts against a brute force that shares no code with the search, cases by
+//! hand, frames against the solvers of each dragon, and bad input.
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::{least_clearance_all_pairs, nearest_between_all_pairs};
@@ -15,7 +15,8 @@ use fastrand::Rng;
 /// A dragon of `benches` benches with head and body boards of 2.2 m.
 fn dragon(name: &str, benches: usize, placement: &str, speed: f64, delay: f64, path: &str) -> String {
     format!(
-        "[[dragons]]\nname = \"{name}\"\nplacement = {placement}\ndelay = {delay:?}\n[dragons.team]\nbenches = {benches}\n\
+        "[[dragons]]\nname = \"{name}\"\nplacement = {placement}\ndelay = {delay:?}\n[dragons.team]\n\
+         benches = {benches}\n\
          head_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n[dragons.path]\n{path}\n\
          [dragons.motion]\nhead_speed = {speed:?}\n"
     )

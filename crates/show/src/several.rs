@@ -1,7 +1,7 @@
 //! The frames of a scene with several dragons: one chain of all, and the nearest boards of any two.
 //!
-//! In: the scene and a time of the show. Out: the chain on the stage, the handles of all dragons one after the other, and
-//! its clearance. The show calls it in place of its one solver.
+//! In: the scene and a time of the show. Out: the chain on the stage, the handles of all dragons one after the other,
+//! and its clearance. The show calls it in place of its one solver.
 
 use std::ops::Range;
 

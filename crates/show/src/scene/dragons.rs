@@ -63,8 +63,8 @@ impl RawSeveral {
         for (table, given) in tables {
             if let Some(given) = given {
                 let sentence = format!(
-                    "[{table}] stands beside [[dragons]], expected [{table}] for one dragon or [dragons.{table}] in each \
-                     of several"
+                    "[{table}] stands beside [[dragons]], expected [{table}] for one dragon or [dragons.{table}] in \
+                     each of several"
                 );
                 return Err(source.field_error(given, &sentence));
             }
@@ -116,8 +116,8 @@ impl RawDragon {
         }
         let paper = self.motion.solver.as_ref();
         if let Some(solver) = paper.filter(|solver| *solver.get_ref() == SolverName::Paper) {
-            let sentence = "motion.solver is \"paper\", which a show of several dragons does not have, expected another \
-                            solver or motion.accuracy";
+            let sentence = "motion.solver is \"paper\", which a show of several dragons does not have, expected \
+                            another solver or motion.accuracy";
             return Err(within.field_error(solver, sentence));
         }
         let delay = self.delay.as_ref().map_or(Ok(0.0), |delay| within.check("delay", delay, Accepted::CUE))?;
