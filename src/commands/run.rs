@@ -80,7 +80,7 @@ pub struct RunArguments {
 pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let text = common.scene_text()?;
-    let mut scene = text.parse()?;
+    let mut scene = text.parse_any()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
     }
@@ -141,9 +141,9 @@ impl RunSession<'_> {
     /// Opens the transports, publishes, and prints the summary.
     fn run(&self, show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
         let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
-        let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
+        let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, self.scene, &show);
         let config =
-            TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, stage) };
+            TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, &stage) };
         let (mut transports, doors) = open_transports(&config)?;
         // The last transport, so that the log has only published frames.
         let log = self.open_log()?.map(|(transport, outcome)| {

@@ -1,5 +1,6 @@
 //! The names of benches for people: counted from 1, within the dragon with several.
 
+use crate::layouts::{Stage, StageDragon, StageObstacle};
 use crate::sentence::bench_name;
 
 /// The dragons and obstacles of a show, as far as their names need them.
@@ -14,6 +15,13 @@ impl Roster {
     /// Creates the roster of a show with one dragon and obstacles without names.
     pub fn team(benches: u32) -> Self {
         Self::new(vec![(String::new(), benches)], Vec::new())
+    }
+
+    /// Creates the roster of a show from its stage.
+    pub fn of(stage: &Stage) -> Self {
+        let dragon = |of: &StageDragon| (of.name.as_str().to_owned(), of.benches);
+        let obstacle = |of: &StageObstacle| of.name.as_str().to_owned();
+        Self::new(stage.dragons.iter().map(dragon).collect(), stage.obstacles.iter().map(obstacle).collect())
     }
 
     /// Creates the roster of dragons with their benches, in the order of their handles, and of obstacles.
@@ -36,6 +44,10 @@ impl Roster {
     /// assert_eq!(Roster::team(223).bench(8), "bench 9");
     /// ```
     pub fn bench(&self, number: u32) -> String {
+        if self.dragons.is_empty() {
+            // The stage has not come.
+            return format!("bench {}", u64::from(number) + 1);
+        }
         let mut first = 0;
         for (name, benches) in &self.dragons {
             if number <= first + benches {

@@ -9,7 +9,7 @@ mod dragons;
 pub mod path;
 pub mod precision;
 pub mod ros2;
-mod stage;
+pub(crate) mod stage;
 mod text;
 
 use std::path::Path as FilePath;
