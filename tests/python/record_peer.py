@@ -23,6 +23,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "
 import bench_dragon_messages as messages
 
 KINDS = {
+    "stage": messages.Stage,
     "alerts": messages.CollisionAlert,
     "cues": messages.Cue,
     "status": messages.LoopStatus,
@@ -39,7 +40,7 @@ def subscribe(name, kept):
     services, ports, got = {}, {}, defaultdict(list)
 
     def open_all():
-        for kind in ["poses", "stage", *KINDS]:
+        for kind in ["poses", *KINDS]:
             if kind in ports:
                 continue
             builder = node.service_builder(iox2.ServiceName.new(f"{name}/{kind}"))
@@ -140,6 +141,9 @@ class Comparison:
         ]
         self.by_stamp = {header.stamp_ns: (header, handles) for header, handles in self.frames}
         self.events = {kind: [of.from_buffer_copy(raw) for raw in kept.get(kind, [])] for kind, of in KINDS.items()}
+        segments = [raw[ctypes.sizeof(messages.Stage) :] for raw in kept.get("stage", [])]
+        count = [len(raw) // ctypes.sizeof(messages.StageSegment) for raw in segments]
+        self.segments = [(messages.StageSegment * n).from_buffer_copy(raw) for n, raw in zip(count, segments)]
         self.seen, self.counts, self.first = defaultdict(list), Counter(), None
 
     def message(self, topic, stamp_ns, sequence, message):
@@ -157,6 +161,8 @@ class Comparison:
             assert stamp_ns == expected.stamp_ns, where
             stamped(message, stamp_ns, where)
             same(message, expected, where)
+            if kind == "stage":
+                equal(message.segments, self.segments[index], f"{where}.segments")
         elif kind in ("/diagnostics", "path"):
             getattr(self, kind.strip("/"))(message, index, stamp_ns, where)
         else:
@@ -244,7 +250,8 @@ def compare(name, kept, recordings):
             attached = json.loads(attachments["bench_dragon.json"])
             scene_hash = bytes(comparison.events["stage"][0].scene_hash)
             assert blake3(attachments["scene.toml"]).digest() == scene_hash, "another scene than the show's"
-            assert attached["name"] == name and attached["stage"]["dragons"][0]["benches"] == comparison.events["stage"][0].dragons[0].benches
+            dragon = comparison.events["stage"][0].dragons[0]
+            assert attached["name"] == name and attached["stage"]["dragons"][0]["benches"] == dragon.benches
             assert int(attached["run_id"]) == comparison.frames[0][0].run_id
             assert min(times) >= comparison.first, "a time before all frames"
             sizes.append(len(times))
