@@ -240,21 +240,29 @@ struct OneDragon<'a, H> {
     handler: &'a mut H,
     stop: &'a AtomicBool,
     names: &'a [String],
+    /// By publisher: true if its show is known to have one dragon. Other events wait for that.
+    known: Vec<bool>,
     /// The reason to stop.
     refused: Option<String>,
 }
 
 impl<H: Handler> Handler for OneDragon<'_, H> {
     fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
+        let Some(known) = self.known.get_mut(publisher) else { return };
+        match &event {
+            FeedEvent::Stage { stage, .. } => *known = stage.dragons.len() <= 1,
+            FeedEvent::Gone => *known = false,
+            _ => {}
+        }
         if let FeedEvent::Stage { stage, .. } = &event
-            && stage.dragons.len() > 1
+            && !*known
         {
             let name = self.names.get(publisher).map_or("", String::as_str);
             let dragons = stage.dragons.len();
             self.refused = Some(format!("\"{name}\" has {dragons} dragons, which this command does not know"));
             self.stop.store(true, Ordering::Relaxed);
         }
-        if self.refused.is_none() {
+        if self.refused.is_none() && (*known || !matches!(event, FeedEvent::Frame { .. })) {
             self.handler.handle(publisher, event);
         }
     }
@@ -273,7 +281,7 @@ impl<H: Handler> Handler for OneDragon<'_, H> {
 /// # Errors
 /// As [`poll_until`]; and a show of several dragons.
 fn poll_one_dragon(stop: &AtomicBool, names: &[String], handler: &mut impl Handler) -> Result<(), CommandError> {
-    let mut one = OneDragon { handler, stop, names, refused: None };
+    let mut one = OneDragon { handler, stop, names, known: vec![false; names.len()], refused: None };
     poll_until(stop, names, Delivery::Newest, &mut one)?;
     one.refused.map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
 }
