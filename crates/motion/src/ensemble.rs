@@ -9,7 +9,7 @@ use std::ops::Range;
 use bench_dragon_messages::state::EventKind;
 
 use crate::contact::LeastClearance;
-use crate::contact::between::{self, Meeting, Mover};
+use crate::contact::between::{self, Meeting, MovingDragon};
 use crate::event::{Budget, Event};
 use crate::ground::{Ground, Obstacle};
 use crate::linkage::NoFollower;
@@ -181,11 +181,11 @@ impl Ensemble {
     /// Returns the first contact of boards of two dragons up to a time, and how far the search came.
     fn contact_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Result<(Option<TimedEvent>, f64), NoFollower> {
         let found = self.singularities();
-        let movers = self.movers(&found)?;
+        let moving = self.moving(&found)?;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
         let (mut first, mut to, mut until): (Option<(Meeting, [usize; 2])>, _, _) = (None, to, f64::INFINITY);
-        for pair in pairs(movers.len()) {
-            let contact = between::first_contact(pair.map(|k| &movers[k]), (0.0, to), &mut budget)?;
+        for pair in pairs(moving.len()) {
+            let contact = between::first_contact(pair.map(|k| &moving[k]), (0.0, to), &mut budget)?;
             if contact.searched_until < to && contact.value.is_none() {
                 until = until.min(contact.searched_until);
             }
@@ -218,12 +218,12 @@ impl Ensemble {
         self.dragons.iter().map(|dragon| dragon.motion.singularities(&mut |_| ())).collect()
     }
 
-    fn movers<'a>(&'a self, found: &'a [Singularities]) -> Result<Vec<Mover<'a>>, NoFollower> {
-        let mover = |(Dragon { delay, motion, .. }, found): (&'a Dragon, &'a Singularities)| {
+    fn moving<'a>(&'a self, found: &'a [Singularities]) -> Result<Vec<MovingDragon<'a>>, NoFollower> {
+        let one = |(Dragon { delay, motion, .. }, found): (&'a Dragon, &'a Singularities)| {
             let end = found.end.map_or(motion.path().length(), |end| end.travelled);
-            Mover::new(motion.advancement(found), *motion.placement(), (*delay, motion.head_speed(), end))
+            MovingDragon::new(motion.advancement(found), *motion.placement(), (*delay, motion.head_speed(), end))
         };
-        self.dragons.iter().zip(found).map(mover).collect()
+        self.dragons.iter().zip(found).map(one).collect()
     }
 
     /// Returns the least clearance of any two boards that share no handle, from the start until the show ends at
@@ -243,13 +243,13 @@ impl Ensemble {
             best = Some(nearer(best, own));
         }
         let found = self.singularities();
-        let movers = self.movers(&found).ok()?;
+        let moving = self.moving(&found).ok()?;
         let mut of_between = |part: f64| progress(0.5 + 0.5 * part);
         let mut budget = Budget::new(CONTACT_BUDGET, &mut of_between);
-        for pair in pairs(movers.len()) {
+        for pair in pairs(moving.len()) {
             let below = best.map(|best| best.least.value);
             let span = (0.0, freeze.time);
-            let found = between::least_clearance(pair.map(|k| &movers[k]), span, below, &mut budget).ok()?;
+            let found = between::least_clearance(pair.map(|k| &moving[k]), span, below, &mut budget).ok()?;
             let searched_until = (found.searched_until < freeze.time).then_some(found.searched_until);
             let Some(meeting) = found.value else {
                 best = best.map(|best| TimedClearance {

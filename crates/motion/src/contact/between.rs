@@ -25,7 +25,7 @@ use super::search::{MOST_GUESSES, UNIMODAL_SHARE, last_solvable};
 use super::{ConservativeAdvancement, Found};
 
 /// A dragon on the stage, as a function of the show's time.
-pub struct Mover<'a> {
+pub struct MovingDragon<'a> {
     chain: ConservativeAdvancement<'a>,
     placement: Placement,
     delay: f64,
@@ -35,7 +35,7 @@ pub struct Mover<'a> {
     rounding_from: f64,
 }
 
-impl<'a> Mover<'a> {
+impl<'a> MovingDragon<'a> {
     /// Creates a dragon whose head begins to move at `delay` seconds with `head_speed` metres per second, and stands
     /// or ends at `end` metres of travel.
     ///
@@ -79,8 +79,12 @@ pub struct Meeting {
 ///
 /// # Errors
 /// [`NoFollower`] if a configuration inside the motion cannot be solved.
-pub fn first_contact(movers: [&Mover; 2], span: (f64, f64), budget: &mut Budget) -> Result<Found<Meeting>, NoFollower> {
-    Search::new(movers, Goal::Contact, budget).run(span)
+pub fn first_contact(
+    moving: [&MovingDragon; 2],
+    span: (f64, f64),
+    budget: &mut Budget,
+) -> Result<Found<Meeting>, NoFollower> {
+    Search::new(moving, Goal::Contact, budget).run(span)
 }
 
 /// Finds the least clearance of two dragons between two times, below that of `best`, if it is given.
@@ -88,12 +92,12 @@ pub fn first_contact(movers: [&Mover; 2], span: (f64, f64), budget: &mut Budget)
 /// # Errors
 /// [`NoFollower`] if a configuration inside the motion cannot be solved.
 pub fn least_clearance(
-    movers: [&Mover; 2],
+    moving: [&MovingDragon; 2],
     span: (f64, f64),
     best: Option<f64>,
     budget: &mut Budget,
 ) -> Result<Found<Meeting>, NoFollower> {
-    let mut search = Search::new(movers, Goal::Least, budget);
+    let mut search = Search::new(moving, Goal::Least, budget);
     search.limit = best.unwrap_or(f64::INFINITY);
     search.run(span)
 }
@@ -155,7 +159,7 @@ impl Snapshot {
 }
 
 struct Search<'s, 'a, 'b> {
-    movers: [&'s Mover<'a>; 2],
+    moving: [&'s MovingDragon<'a>; 2],
     goal: Goal,
     budget: &'s mut Budget<'b>,
     /// The clearance from which a pair matters: 0, or the least so far.
@@ -165,8 +169,8 @@ struct Search<'s, 'a, 'b> {
 }
 
 impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
-    fn new(movers: [&'s Mover<'a>; 2], goal: Goal, budget: &'s mut Budget<'b>) -> Self {
-        Self { movers, goal, budget, limit: 0.0, best: None, searched_until: f64::NEG_INFINITY }
+    fn new(moving: [&'s MovingDragon<'a>; 2], goal: Goal, budget: &'s mut Budget<'b>) -> Self {
+        Self { moving, goal, budget, limit: 0.0, best: None, searched_until: f64::NEG_INFINITY }
     }
 
     fn run(&mut self, (from, to): (f64, f64)) -> Result<Found<Meeting>, NoFollower> {
@@ -214,21 +218,21 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         benches: [usize; 2],
     ) -> Result<Option<Snapshot>, Halt> {
         let mut own: [Configuration; 2] = [0, 1].map(|k| {
-            let travelled = self.movers[k].travelled(time);
+            let travelled = self.moving[k].travelled(time);
             match before {
                 Some(before) if before.own[k].travelled == travelled => before.own[k].clone(),
-                _ => Configuration::new(self.movers[k].chain.path, travelled),
+                _ => Configuration::new(self.moving[k].chain.path, travelled),
             }
         });
         for (k, own) in own.iter_mut().enumerate() {
-            let Mover { chain, rounding_from, .. } = self.movers[k];
+            let MovingDragon { chain, rounding_from, .. } = self.moving[k];
             match own.solve_to(benches[k], chain.path, chain.team, self.budget) {
                 Err(Halt::NoFollower) if own.travelled >= *rounding_from => return Ok(None),
                 outcome => outcome?,
             }
         }
         let placed = |k: usize| {
-            let placement = &self.movers[k].placement;
+            let placement = &self.moving[k].placement;
             let on_stage = |board: &Board| Board {
                 centre: placement.point(board.centre),
                 axis: placement.vector(board.axis),
@@ -241,7 +245,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
     }
 
     fn solved(&mut self, time: f64, before: Option<&Snapshot>) -> Result<Snapshot, Halt> {
-        let all = self.movers.map(Mover::benches);
+        let all = self.moving.map(MovingDragon::benches);
         self.snapshot(time, before, all)?.ok_or(Halt::NoFollower)
     }
 
@@ -272,7 +276,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
 
     /// Returns the seconds in which the faster head travels the shortest link.
     fn time_per_link(&self) -> f64 {
-        let [a, b] = self.movers;
+        let [a, b] = self.moving;
         let shortest = a.chain.team.shortest_link().min(b.chain.team.shortest_link());
         shortest / a.head_speed.max(b.head_speed)
     }
@@ -284,7 +288,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
             return Ok(());
         }
         let (from, unit) = (start.time, self.time_per_link());
-        let [a, b] = self.movers.map(|mover| [mover.delay, mover.delay + mover.end / mover.head_speed]);
+        let [a, b] = self.moving.map(|dragon| [dragon.delay, dragon.delay + dragon.end / dragon.head_speed]);
         let breaks = [a[0], a[1], b[0], b[1]];
         let mut step = 0.25 * unit;
         let mut before = start;
@@ -295,7 +299,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
             let next = (before.time + step).max(before.time.next_up());
             let ahead = breaks.into_iter().filter(|time| *time > before.time);
             let next = ahead.fold(next, f64::min).min(to);
-            let all = self.movers.map(Mover::benches);
+            let all = self.moving.map(MovingDragon::benches);
             let after = match self.snapshot(next, Some(&before), all)? {
                 Some(after) => after,
                 None => self.solved(to, Some(&before))?,
@@ -349,7 +353,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
     fn displacements(&mut self, ends: (&Snapshot, &Snapshot), benches: [usize; 2]) -> Result<[Displacements; 2], Halt> {
         let mut steps = [Displacements::default(), Displacements::default()];
         for (k, step) in steps.iter_mut().enumerate() {
-            step.extend_to(benches[k] + 1, &self.movers[k].chain, (&ends.0.own[k], &ends.1.own[k]), self.budget)?;
+            step.extend_to(benches[k] + 1, &self.moving[k].chain, (&ends.0.own[k], &ends.1.own[k]), self.budget)?;
         }
         Ok(steps)
     }
@@ -357,9 +361,9 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
     /// Returns an upper bound of the relative motion of any two boards, metres.
     fn most_motion(&self, steps: &[Displacements; 2]) -> f64 {
         let most = |k: usize| {
-            let mover = self.movers[k];
-            let of = |bench| steps[k].on_stage(&mover.chain, bench, Weights::Additive);
-            (0..mover.benches()).map(of).fold(0.0, f64::max)
+            let dragon = self.moving[k];
+            let of = |bench| steps[k].on_stage(&dragon.chain, bench, Weights::Additive);
+            (0..dragon.benches()).map(of).fold(0.0, f64::max)
         };
         most(0) + most(1)
     }
@@ -377,12 +381,12 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
             if before.travelled == after.travelled {
                 return Some(Vector::zeros());
             }
-            let curvature = steps[k].one_curve(&self.movers[k].chain, (before, after), pair[k])?;
+            let curvature = steps[k].one_curve(&self.moving[k].chain, (before, after), pair[k])?;
             (curvature == 0.0).then(|| ends.1.boards[k][pair[k]].centre - ends.0.boards[k][pair[k]].centre)
         };
         match (translation(0), translation(1)) {
             (Some(a), Some(b)) => (a - b).norm(),
-            _ => (0..2).map(|k| steps[k].on_stage(&self.movers[k].chain, pair[k], weights)).sum(),
+            _ => (0..2).map(|k| steps[k].on_stage(&self.moving[k].chain, pair[k], weights)).sum(),
         }
     }
 
