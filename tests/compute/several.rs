@@ -268,16 +268,19 @@ fn a_frame_has_the_handles_of_all_and_the_least_clearance_of_any_two() {
     let ensemble = scene.ensemble.as_ref().unwrap();
     let teams: Vec<Team> = ensemble.dragons().iter().map(|dragon| *dragon.motion.team()).collect();
     let mut show = Show::new(&scene, scene.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
-    let mut own: Vec<Chain> = teams.iter().map(|team| Chain::new(team.handles())).collect();
+    let solvers = ensemble.dragons().iter().map(|dragon| dragon.motion.solver(Velocities::Computed).solver);
+    let chains = teams.iter().map(|team| Chain::new(team.handles()));
+    let mut own: Vec<_> = solvers.zip(chains).collect();
     for tick in (0..6000).step_by(7) {
         let frame = show.frame(tick);
         assert_eq!((frame.chain.handles(), frame.unsolved_frames), (62, 0));
         let mut least = f64::INFINITY;
-        for (k, (Dragon { motion, delay, .. }, chain)) in ensemble.dragons().iter().zip(&mut own).enumerate() {
+        for (k, (Dragon { motion, delay, .. }, (solver, chain))) in ensemble.dragons().iter().zip(&mut own).enumerate()
+        {
             let end = motion.path().length() / motion.head_speed();
             let time = frame.sim_time - delay;
             let stands = time < 0.0 || time >= end;
-            motion.solver(Velocities::Computed).solver.solve(time.clamp(0.0, end), chain).unwrap();
+            solver.solve(time.clamp(0.0, end), chain).unwrap();
             let handles = ensemble.handles_of(k);
             assert_eq!(frame.chain.x[handles.clone()], chain.x, "{tick}");
             assert_eq!(frame.chain.heading[handles.clone()], chain.heading, "{tick}");

@@ -13,16 +13,21 @@ use super::{Nearest, PairClearance, board, circle_radius, corner_reach};
 use crate::model::board::Board;
 use crate::model::separation::{separation_board_board, signed_distance_board_board};
 use crate::model::team::Team;
+use crate::model::{Point, Vector};
 use crate::solve::Chain;
 
 /// Metres that a bound reaches beyond the limit at most, if others are near.
-const SKIN: f64 = 1.0;
+const SKIN: f64 = 0.5;
 
 /// Metres of approach after which all bounds are computed again, so that their rounding stays within its allowance.
 const MOST_MOVED: f64 = 100.0;
 
 /// Margin for rounding: metres, and as a share of the coordinates.
 const ROUNDING: (f64, f64) = (1e-9, 1e-12);
+
+/// The board of no bench.
+const NO_BOARD: Board =
+    Board { centre: Point::new(0.0, 0.0), axis: Vector::new(1.0, 0.0), half_length: 0.0, half_width: 0.0 };
 
 /// A dragon of the frame.
 #[derive(Debug, Clone)]
@@ -74,6 +79,8 @@ pub struct BetweenMonitor {
     /// By bench: a bound plus the value of `closed` when the bound was made; infinite where there is no bench.
     sums: Vec<f64>,
     grid: Grid,
+    /// By bench: its board in this frame, once the grid is filled, and the radius of the circle about it.
+    boards: Vec<(Board, f64)>,
     last_pair: Option<(usize, usize)>,
     tested: u64,
 }
@@ -100,6 +107,7 @@ impl BetweenMonitor {
             closed: f64::INFINITY,
             sums: vec![f64::INFINITY; first],
             grid: Grid::new(first),
+            boards: vec![(NO_BOARD, 0.0); first],
             last_pair: None,
             tested: 0,
             parts,
@@ -134,7 +142,7 @@ impl BetweenMonitor {
                             self.enclose_and_fill(chain, nearest.value);
                             filled = true;
                         }
-                        self.sums[a] = self.against_later(chain, &mut nearest, k, a) + self.closed;
+                        self.sums[a] = self.against_later(&mut nearest, k, a) + self.closed;
                     }
                 }
             }
@@ -174,18 +182,22 @@ impl BetweenMonitor {
         self.parts.iter_mut().for_each(|part| part.enclose(chain));
         let limit = if limit.is_finite() { limit.max(0.0) } else { 2.0 * self.beyond };
         self.grid.clear(2.0 * self.beyond + limit + SKIN);
-        for part in &self.parts[1..] {
+        for (k, part) in self.parts.iter().enumerate() {
             for bench in part.benches() {
-                let middle = |numbers: &[f64]| 0.5 * (numbers[bench] + numbers[bench + 1]);
-                self.grid.add(bench, middle(&chain.x), middle(&chain.y));
+                let board = part.board(chain, bench);
+                self.boards[bench] = (board, board.circle_radius());
+                // Only later dragons are looked up.
+                if k > 0 {
+                    self.grid.add(bench, board.centre.x, board.centre.y);
+                }
             }
         }
     }
 
     /// Tests a bench of the dragon `k` against the boards of later dragons that can be within the limit. Returns a lower
     /// bound of its distance to all of them.
-    fn against_later(&mut self, chain: &Chain, nearest: &mut Nearest, k: usize, a: usize) -> f64 {
-        let board_a = self.parts[k].board(chain, a);
+    fn against_later(&mut self, nearest: &mut Nearest, k: usize, a: usize) -> f64 {
+        let (board_a, radius_a) = self.boards[a];
         let (x, y) = (board_a.centre.x, board_a.centre.y);
         let margin = ROUNDING.0 + ROUNDING.1 * (x.abs() + y.abs());
         let later = self.parts[k + 1..].iter().map(|part| part.distance(x, y));
@@ -197,10 +209,14 @@ impl BetweenMonitor {
         let distance = 2.0 * self.beyond + limit + SKIN + margin;
         let mut bound = limit + SKIN;
         let first = self.parts[k + 1].first;
-        let Self { grid, parts, tested, .. } = self;
+        let Self { grid, boards, tested, .. } = self;
         let mut visit = |b: usize| {
-            let part = &parts[parts.partition_point(|part| part.first <= b) - 1];
-            let board_b = part.board(chain, b);
+            let (board_b, radius_b) = boards[b];
+            let apart = (board_b.centre - board_a.centre).norm() - radius_a - radius_b - margin;
+            if apart > nearest.value {
+                bound = bound.min(apart);
+                return;
+            }
             *tested += 1;
             let separation = separation_board_board(&board_a, &board_b);
             let value = if separation > nearest.value {
