@@ -91,6 +91,18 @@ SEGMENTS = (
     "outward_spiral",
 )
 
+# The values of `StageObstacle.kind`.
+OBSTACLES = (
+    # A disc.
+    "circle",
+    # A polygon with its interior.
+    "polygon",
+    # An open line: a barrier.
+    "line",
+    # The boundary: boards stay inside.
+    "boundary",
+)
+
 
 class _Message(ctypes.Structure):
     LAYOUT = 1
@@ -98,6 +110,22 @@ class _Message(ctypes.Structure):
     @classmethod
     def type_name(cls) -> str:
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+
+
+def _list(element: type, most: int) -> type:
+    """Returns the type of a list with room for `most` elements. `len()`, an index and `for` see those in use."""
+
+    class List(ctypes.Structure):
+        ELEMENT = element
+        _fields_ = [("length", ctypes.c_uint32), ("reserved", ctypes.c_uint32), ("items", element * most)]
+
+        def __len__(self) -> int:
+            return min(self.length, most)
+
+        def __getitem__(self, index):
+            return self.items[: len(self)][index]
+
+    return List
 
 
 class HandlePose(_Message):
@@ -439,9 +467,13 @@ class ControlResponse(_Message):
 
 
 class StageSegment(_Message):
-    """One segment of the path in a `Stage`."""
+    """One segment of a path, or of an obstacle's outline. A circle is an arc of a full turn; a polygon's last line ends
+    where the first begins.
 
-    LAYOUT = 3
+    Over iceoryx2 the payload of `<name>/stage` is a slice of these. Layout 6 added the pitch.
+    """
+
+    LAYOUT = 6
     _fields_ = [
         # Its beginning, metres right of the centre.
         ("x", ctypes.c_double),
@@ -460,6 +492,8 @@ class StageSegment(_Message):
         ("theta_first", ctypes.c_double),
         # Of a spiral, the polar angle at which it ends, radians; else NaN.
         ("theta_last", ctypes.c_double),
+        # Of a spiral, metres per turn; else NaN.
+        ("pitch", ctypes.c_double),
         # The kind of curve: one of `SEGMENTS`.
         ("kind", ctypes.c_uint32),
         # Always 0.
@@ -484,15 +518,73 @@ class SceneHeader(_Message):
     ]
 
 
+class StageDragon(_Message):
+    """A dragon of the show in a `Stage`.
+
+    The head's board and the other boards can differ in length. The team may stand further back than the first segment
+    begins, on the same spiral or line.
+    """
+
+    LAYOUT = 6
+    _fields_ = [
+        # Metres along the head's board.
+        ("head_length", ctypes.c_double),
+        # Metres along every other board.
+        ("body_length", ctypes.c_double),
+        # Metres across every board.
+        ("width", ctypes.c_double),
+        # Metres from the centre of a handle's hole to the nearest end of the board.
+        ("hole_inset", ctypes.c_double),
+        # Metres per turn of the spiral on which the head starts, or else of the first one; NaN if the path has none.
+        ("pitch", ctypes.c_double),
+        # The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
+        ("start_turn", ctypes.c_double),
+        # The number of its first handle. Bench i joins handles i and i + 1, so it is the head's number too.
+        ("first_handle", ctypes.c_uint32),
+        # The number of its benches; one less than the number of its handles.
+        ("benches", ctypes.c_uint32),
+        # The index of the first segment of its path in the list of segments. They are in the order of travel.
+        ("first_segment", ctypes.c_uint32),
+        # The number of segments of its path.
+        ("segments", ctypes.c_uint32),
+        # Its name; empty if it is the only dragon of the show.
+        ("name", ctypes.c_uint8 * 64),
+    ]
+
+
+class StageObstacle(_Message):
+    """An obstacle of the show in a `Stage`, or its boundary."""
+
+    LAYOUT = 6
+    _fields_ = [
+        # Metres that every board has to stay away.
+        ("keep_out", ctypes.c_double),
+        # The kind of shape: one of `OBSTACLES`.
+        ("kind", ctypes.c_uint32),
+        # The index of the first segment of its outline in the list of segments.
+        ("first_segment", ctypes.c_uint32),
+        # The number of segments of its outline.
+        ("segments", ctypes.c_uint32),
+        # Always 0.
+        ("reserved", ctypes.c_uint32),
+        # Its name.
+        ("name", ctypes.c_uint8 * 64),
+    ]
+
+
 class StageEvent(_Message):
     """An event of the show in a `Stage`."""
 
-    LAYOUT = 4
+    LAYOUT = 6
     _fields_ = [
         # Simulated seconds at which it happens.
         ("time", ctypes.c_double),
         # The event, as the state that it leads to: one of `STATES`.
         ("state", ctypes.c_uint32),
+        # The first bench of the event, from 0; 4294967295 if it has none.
+        ("bench_a", ctypes.c_uint32),
+        # The second bench, or the number of an obstacle; 4294967295 if it has none.
+        ("bench_b", ctypes.c_uint32),
         # Always 0.
         ("reserved", ctypes.c_uint32),
     ]
@@ -517,50 +609,39 @@ class StageCue(_Message):
 class Stage(_Message):
     """The geometry and the time line of a show, for drawing them. Sent at the start and kept for late joiners.
 
-    The head's board and the other boards can differ in length. The team may stand further back than the first segment
-    begins, on the same spiral or line.
+    The segments of all paths and outlines stand in one list: first those of the dragons, then those of the obstacles.
+    Handles are numbered through all dragons. In the bench fields of alerts and events the number of handles plus j is
+    the obstacle j, from 0.
 
-    Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
-    layout 4 added the time line: the freeze time, the events and the cues, layout 5 the hash of the scene's text.
+    Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments
+    of the path, layout 3 gave them their name, layout 4 added the time line: the freeze time, the events and the cues,
+    layout 5 the hash of the scene's text, layout 6 the dragons, the obstacles and a path of any length.
     """
 
-    LAYOUT = 5
+    LAYOUT = 6
     _fields_ = [
         # The run, as `FrameHeader.run_id`.
         ("run_id", ctypes.c_uint64),
         # CLOCK_REALTIME in nanoseconds when this was written.
         ("stamp_ns", ctypes.c_uint64),
-        # Metres per turn of the spiral or spirals; NaN if the path has none.
-        ("pitch", ctypes.c_double),
-        # The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
-        ("start_turn", ctypes.c_double),
-        # Metres from the centre of a handle's hole to the nearest end of the board.
-        ("hole_inset", ctypes.c_double),
-        # Metres along the head's board.
-        ("head_length", ctypes.c_double),
-        # Metres along every other board.
-        ("body_length", ctypes.c_double),
-        # Metres across every board.
-        ("width", ctypes.c_double),
         # Simulated seconds at which the show freezes: a seek reaches no later time.
         ("freeze_time", ctypes.c_double),
-        # The number of benches; one less than the number of handles.
-        ("benches", ctypes.c_uint32),
-        # The number of segments in use, at most 32.
-        ("segments", ctypes.c_uint32),
-        # The number of events in use, at most 4; a scene without `[alerts]` has its last one only.
-        ("events", ctypes.c_uint32),
         # The number of cues in the show; the first 32 of them are listed.
         ("cues", ctypes.c_uint32),
+        # Always 0.
+        ("reserved", ctypes.c_uint32),
         # BLAKE3 of the scene's text, as `verify` prints it of a certificate: the proofs of that text hold for this
         # show. All zero if it is not known.
         ("scene_hash", ctypes.c_uint8 * 32),
-        # The segments of the path in the order of travel; those not in use are zero.
-        ("path", StageSegment * 32),
-        # The events in order of time; those not in use are zero. Those after the freeze time are not reached.
-        ("timeline", StageEvent * 4),
-        # The cues in order of time; those not in use are zero.
-        ("cue_list", StageCue * 32),
+        # The dragons in the order of their handles.
+        ("dragons", _list(StageDragon, 16)),
+        # The obstacles in the order of the scene; the boundary, if there is one, stands last.
+        ("obstacles", _list(StageObstacle, 65)),
+        # The events in order of time: the first of each kind of each dragon and of each obstacle. Those after the
+        # freeze time are not reached. A scene without `[alerts]` has its last one only.
+        ("events", _list(StageEvent, 160)),
+        # The cues in order of time.
+        ("cue_list", _list(StageCue, 32)),
     ]
 
 

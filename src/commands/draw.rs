@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use bench_dragon::drawing::dragons::Dragons;
 use bench_dragon::drawing::swept::SweptArea;
 use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Style, Surroundings, Theme, mean_speeds};
 use bench_dragon::motion::model::Point;
@@ -13,7 +14,7 @@ use serde::Serialize;
 
 use super::solve::time_of;
 use super::swept::{Benches, Stretch, benches, swept};
-use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_one, figure, number, progress_bar, search_timeline};
 
 /// Arguments of `draw`.
 #[derive(Debug, clap::Args)]
@@ -106,8 +107,17 @@ const VIEW: Accepted = Accepted { least: 1e-9, greatest: 1e9, unit: "metres" };
 
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
-    let scene = common.load_scene()?;
+    let scene = common.load_any_scene()?;
     let look = arguments.look.look()?;
+    if look.style == Style::Lanterns {
+        expect_one(&scene, "--look lanterns")?;
+    }
+    if arguments.many.swept {
+        expect_one(&scene, "--swept")?;
+    }
+    if arguments.many.animated {
+        expect_one(&scene, "--animated")?;
+    }
     let timeline = search_timeline(&scene, common);
     let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);
     let many = &arguments.many;
@@ -135,6 +145,11 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
             session.draw_one(look, time, ground.as_ref().map(|ground| &ground.area))
         }
     }
+}
+
+/// Returns the dragons of a scene.
+fn dragons(scene: &Scene) -> Dragons<'_> {
+    scene.ensemble.as_ref().map_or_else(|| Dragons::one(&scene.motion), Dragons::several)
 }
 
 /// Returns the number of steps of --every between two times.
@@ -177,8 +192,11 @@ struct Session<'a> {
 impl<'a> Session<'a> {
     fn new(scene: &'a Scene, timeline: &'a Timeline, file: Option<&'a Path>, json: bool) -> Self {
         // Boards are coloured by speed, even if the scene publishes no speeds.
-        let solver = scene.motion.solver(Velocities::Computed).solver;
-        let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.team().handles()));
+        let solver = match &scene.ensemble {
+            Some(ensemble) => Box::new(ensemble.solver(Velocities::Computed)),
+            None => scene.motion.solver(Velocities::Computed).solver,
+        };
+        let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.handles()));
         Self { scene, timeline, solver, chain, earlier, file, json }
     }
 
@@ -186,15 +204,19 @@ impl<'a> Session<'a> {
         let solver = self.solver.as_mut();
         let time = solve_at_or_just_before(solver, time, &mut self.chain)
             .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))?;
-        mean_speeds(&self.scene.motion, solver, time, &mut self.chain, &mut self.earlier);
+        // Several dragons are coloured by their names.
+        if self.scene.ensemble.is_none() {
+            mean_speeds(&self.scene.motion, solver, time, &mut self.chain, &mut self.earlier);
+        }
         Ok(())
     }
 
     fn extent(&mut self, times: &[f64]) -> Result<Extent, CommandError> {
         let mut extent = Extent::NONE;
+        let dragons = dragons(self.scene);
         for time in times {
             self.solve(*time)?;
-            extent.include(&self.scene.motion, *time, &self.chain);
+            extent.include(&dragons, *time, &self.chain);
         }
         Ok(extent)
     }
@@ -203,7 +225,7 @@ impl<'a> Session<'a> {
     where
         'a: 'd,
     {
-        Drawing::new(&self.scene.name, &self.scene.motion, self.timeline, extent, look)
+        Drawing::new(&self.scene.name, dragons(self.scene), self.timeline, extent, look)
     }
 
     fn draw_one(&mut self, look: Look, time: f64, swept: Option<&SweptArea>) -> Result<(), CommandError> {

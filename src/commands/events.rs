@@ -11,7 +11,9 @@ use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
-use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
+use super::{
+    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, progress_bar, search_timeline,
+};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -46,7 +48,7 @@ struct EventLine {
 /// Prints the events of the scene.
 pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
-    let scene = text.parse()?;
+    let scene = text.parse_any()?;
     let timeline = search_timeline(&scene, common);
     let proved = match &arguments.certify {
         Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),
@@ -62,7 +64,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     };
     let status = |event: &Event| proof(event.kind, number(event));
     let mut output = Output::standard();
-    for timed in timeline.events() {
+    for timed in &timeline.all() {
         if common.json {
             let TimedEvent { event, time } = *timed;
             output.json(&EventLine {
@@ -70,7 +72,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 time,
                 bench_a: event.bench_a,
                 bench_b: event.bench_b,
-                obstacle: scene.motion.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
+                obstacle: scene.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
                 x: event.place.map(|place| place.x),
                 y: event.place.map(|place| place.y),
                 enclosure: status(&event).map(enclosure),
@@ -87,7 +89,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
             Some(time) => format!("up to t = {} s, where the search gave up", figure(time)),
             None => "before the motion ends".to_owned(),
         };
-        let obstacle = (!scene.motion.ground().is_empty()).then_some(EventKind::Obstacle);
+        let obstacle = (!scene.ground().is_empty()).then_some(EventKind::Obstacle);
         for kind in [EventKind::Contact].into_iter().chain(obstacle).chain([EventKind::Stall]) {
             if timeline.find(kind).is_none() {
                 match kind {
@@ -120,6 +122,7 @@ fn certified(
     file: &Path,
     common: &Common,
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
+    expect_one_dragon(scene)?;
     expect_exact_motion(scene)?;
     let mut certificate = CertificateFile::create(file)?;
     let bar = progress_bar(1000, common).with_message("proving");
@@ -169,13 +172,19 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
         EventKind::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
         EventKind::Contact => format!("{first} and {second} touch{place}"),
         EventKind::Obstacle => {
-            let obstacle = scene.motion.obstacle_of(&event).map_or(second, obstacle_label);
+            let obstacle = scene.obstacle_of(&event).map_or(second, obstacle_label);
             let how = if time == 0.0 { "is at" } else { "meets" };
             format!("{first} {how} {obstacle}{}{place}", if time == 0.0 { " from the start," } else { "" })
         }
         EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
         EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot continue"),
-        EventKind::PathEnd => "the head reaches the end of the path".to_owned(),
+        EventKind::PathEnd => match (&scene.ensemble, event.bench_a) {
+            (Some(all), Some(head)) => {
+                let name = all.owner(head as usize).map_or("a dragon", |(dragon, _)| &all.dragons()[dragon].name);
+                format!("the head of {name} reaches the end of the path")
+            }
+            _ => "the head reaches the end of the path".to_owned(),
+        },
     };
     format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), figure(time))
         .replace("path (counting from 1)", "path")
@@ -195,7 +204,10 @@ pub fn find_least_clearance<'t>(
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
     let freeze = timeline.freeze(scene.stops_at_contact());
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let found = scene.motion.least_clearance(timeline, freeze, &mut progress);
+    let found = match &scene.ensemble {
+        Some(ensemble) => ensemble.least_clearance(freeze, &mut progress),
+        None => scene.motion.least_clearance(timeline, freeze, &mut progress),
+    };
     bar.finish_and_clear();
     (found, freeze)
 }
@@ -214,5 +226,5 @@ pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
 
 /// Returns a bench's name for people, counted from 1.
 pub fn bench_name(scene: &Scene, bench: u32) -> String {
-    bench_dragon::messages::sentence::bench_name(bench, scene.team().benches as u32)
+    scene.bench_name(bench)
 }

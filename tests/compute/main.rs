@@ -16,6 +16,7 @@ mod oracle;
 mod paths;
 mod placement;
 mod scene;
+mod several;
 mod show;
 mod solvers;
 mod staged;

@@ -18,6 +18,7 @@ mod replay;
 mod scene;
 mod second_publisher;
 mod send;
+mod several;
 mod soak;
 mod transports;
 mod tunnel;

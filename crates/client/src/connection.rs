@@ -3,8 +3,8 @@
 //! It keeps no counts: the [`feed`](super::feed), which calls it, decides when to open, to read and to disconnect. A
 //! service can have more than one publisher: `selected` has the one whose messages are read.
 
-mod scene;
 mod selected;
+mod slices;
 
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
@@ -22,11 +22,11 @@ use crate::clock::monotonic_clock_name;
 use crate::shared_memory::MOST_PUBLISHERS;
 use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
 use bench_dragon_messages::{
-    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
+    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus,
+    SceneHeader, Stage, StageSegment,
 };
-use scene::SceneReceiver;
-pub use scene::SceneSample;
 use selected::{OfRun, Origin, Selected, publishers};
+pub use slices::{SceneSample, StageSample};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 type PoseSample = Sample<ipc::Service, [HandlePose], FrameHeader>;
@@ -44,8 +44,8 @@ pub struct Connection {
     expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
-    stage: Option<Receiver<Stage, ()>>,
-    scene: Option<SceneReceiver>,
+    stage: Option<Receiver<[StageSegment], Stage>>,
+    scene: Option<Receiver<[u8], SceneHeader>>,
     chase: Option<Receiver<ChaseStatus, ()>>,
     tick: Option<Listener<ipc::Service>>,
     selection: Selection,
@@ -129,8 +129,8 @@ impl Subscription {
             self.service::<CollisionAlert>("alerts")?;
             self.service::<Cue>("cues")?;
             self.service::<LoopStatus>("status")?;
-            self.service::<Stage>("stage")?;
-            self.scene_service()?;
+            self.slices::<StageSegment, Stage>("stage")?;
+            self.slices::<u8, SceneHeader>("scene")?;
             return Ok(None);
         }
         check_room_to_subscribe()?;
@@ -150,8 +150,8 @@ impl Subscription {
             expects_cues: false,
             status: self.receiver("status")?,
             status_service: self.service("status")?,
-            stage: self.receiver("stage")?,
-            scene: self.scene_receiver()?,
+            stage: self.slice_receiver("stage")?,
+            scene: self.slice_receiver("scene")?,
             chase: self.receiver("chase")?,
             tick: self.listener(),
             selection: Selection::Undecided { statuses: Vec::new() },
@@ -223,10 +223,10 @@ impl Subscription {
             connection.status_service = self.service("status")?;
         }
         if connection.stage.is_none() {
-            connection.stage = self.receiver("stage")?;
+            connection.stage = self.slice_receiver("stage")?;
         }
         if connection.scene.is_none() {
-            connection.scene = self.scene_receiver()?;
+            connection.scene = self.slice_receiver("scene")?;
         }
         if connection.chase.is_none() {
             connection.chase = self.receiver("chase")?;
@@ -386,12 +386,6 @@ impl Connection {
             any = true;
         }
         any
-    }
-
-    /// Returns the next stage, if one has come.
-    pub fn stage(&mut self) -> Option<Stage> {
-        self.decide();
-        self.next(self.stage.as_ref())
     }
 
     /// Returns the next status of a chase of this run, if one has come.

@@ -1,11 +1,12 @@
 //! Alerts in words, for people. Benches are counted from 1, and the sentence states this.
 //!
-//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage
+//! In: a [`CollisionAlert`] and the names of benches. Out: a sentence. Called by `run`, `watch` and the stage
 //! picture's server, so that all of them print the same.
 
 use std::fmt::Display;
 use std::io;
 
+use super::Roster;
 use super::layouts::{ChaseStatus, CollisionAlert, Cue};
 use crate::chase::{ChaseSource, ChaseState};
 use crate::state::EventKind;
@@ -60,17 +61,17 @@ pub fn bench_name(bench: u32, benches: u32) -> String {
     }
 }
 
-/// Returns an alert of a team of `benches` benches as a sentence. A past event is in the past tense, since the show may
+/// Returns an alert of a show as a sentence. A past event is in the past tense, since the show may
 /// continue. For a coming event, its place and the two benches that are nearest now are separate.
-pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) -> String {
+pub fn alert_sentence(alert: &CollisionAlert, roster: &Roster, figures: Figures) -> String {
     let happened = alert.alert_level().is_some_and(Level::has_happened);
     let sentence = match (happened, alert.event_kind()) {
-        (true, Some(kind)) => happening(alert, kind, benches),
+        (true, Some(kind)) => happening(alert, kind, roster),
         (true, None) => "at an unknown place".to_owned(),
         (false, kind) => {
-            let coming = kind.map(|kind| coming(alert, kind, benches, figures));
+            let coming = kind.map(|kind| coming(alert, kind, roster, figures));
             let coming = coming.unwrap_or_else(|| "no contact, stall or lock ahead".to_owned());
-            match nearest(alert, benches, figures) {
+            match nearest(alert, roster, figures) {
                 Some(nearest) => format!("{coming}; {nearest}"),
                 None => coming,
             }
@@ -87,12 +88,12 @@ pub fn state_sentence(state: FrameState) -> Option<&'static str> {
     }
 }
 
-fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
-    let who = names(alert.event_benches(), benches);
+fn happening(alert: &CollisionAlert, kind: EventKind, roster: &Roster) -> String {
+    let who = names(alert.event_benches(), roster);
     let (time, place) = (alert.event_time, place(alert));
     match kind {
         EventKind::Obstacle => {
-            let [bench, obstacle] = [alert.event_bench_a, alert.event_bench_b].map(|of| bench_name(of, benches));
+            let [bench, obstacle] = [alert.event_bench_a, alert.event_bench_b].map(|of| roster.bench(of));
             format!("{bench} met {obstacle} at {place}, t = {time:.6} s")
         }
         EventKind::Contact => format!("{who} touched at {place}, t = {time:.6} s"),
@@ -110,8 +111,8 @@ fn place(alert: &CollisionAlert) -> String {
     format!("({:.3}, {:.3}) m", alert.event_x, alert.event_y)
 }
 
-fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figures) -> String {
-    let who = names(alert.event_benches(), benches);
+fn coming(alert: &CollisionAlert, kind: EventKind, roster: &Roster, figures: Figures) -> String {
+    let who = names(alert.event_benches(), roster);
     let when = match figures {
         Figures::Shown { time_scale } => format!(" {}", time_until(alert.time_to_event, time_scale)),
         Figures::Omitted => String::new(),
@@ -145,9 +146,9 @@ pub fn rounded(value: f64, decimals: usize) -> String {
 }
 
 /// Removes the sign of zero: the clearance of a touch is solved to the last bits, on either side.
-fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<String> {
+fn nearest(alert: &CollisionAlert, roster: &Roster, figures: Figures) -> Option<String> {
     alert.nearest_benches().next()?;
-    let nearest = format!("nearest now are {}", names(alert.nearest_benches(), benches));
+    let nearest = format!("nearest now are {}", names(alert.nearest_benches(), roster));
     if figures == Figures::Omitted {
         return Some(nearest);
     }
@@ -157,8 +158,8 @@ fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<Str
     Some(format!("{nearest}, {apart}"))
 }
 
-fn names(concerned: impl Iterator<Item = u32>, benches: u32) -> String {
-    concerned.map(|bench| bench_name(bench, benches)).collect::<Vec<_>>().join(" and ")
+fn names(concerned: impl Iterator<Item = u32>, roster: &Roster) -> String {
+    concerned.map(|bench| roster.bench(bench)).collect::<Vec<_>>().join(" and ")
 }
 
 #[cfg(test)]
@@ -190,7 +191,7 @@ mod tests {
     fn what_comes_has_its_kind_its_benches_and_its_time() {
         let coming = alert(Level::Approaching, Some(EventKind::Contact));
         let nearest = "nearest now are bench 1 (the head) and bench 10, 0.0031 m apart (counting from 1)";
-        let sentence = |figures| alert_sentence(&coming, 223, figures);
+        let sentence = |figures| alert_sentence(&coming, &Roster::team(223), figures);
         assert_eq!(
             sentence(SHOWN),
             format!("contact: bench 1 (the head) and bench 9 at (1.250, -0.500) m in 6.5 s; {nearest}")
@@ -205,29 +206,32 @@ mod tests {
             ..alert(Level::Clear, Some(EventKind::Stall))
         };
         assert_eq!(
-            alert_sentence(&stall, 2, SHOWN),
+            alert_sentence(&stall, &Roster::team(2), SHOWN),
             "stall: bench 1 (the head) at (1.250, -0.500) m in 6.5 s (counting from 1)"
         );
         let nothing = alert(Level::Approaching, None);
-        assert_eq!(alert_sentence(&nothing, 223, SHOWN), format!("no contact, stall or lock ahead; {nearest}"));
+        assert_eq!(
+            alert_sentence(&nothing, &Roster::team(223), SHOWN),
+            format!("no contact, stall or lock ahead; {nearest}")
+        );
     }
 
     #[test]
     fn what_has_happened_has_its_place_and_its_time() {
         let contact = alert(Level::Contact, Some(EventKind::Contact));
         assert_eq!(
-            alert_sentence(&contact, 9, SHOWN),
+            alert_sentence(&contact, &Roster::team(9), SHOWN),
             "bench 1 (the head) and bench 9 (the tail) touched at (1.250, -0.500) m, t = 412.473838 s (counting from 1)"
         );
         let lock = CollisionAlert { event_bench_b: NO_BENCH, ..alert(Level::Lock, Some(EventKind::Lock)) };
-        let sentence = alert_sentence(&lock, 223, SHOWN);
+        let sentence = alert_sentence(&lock, &Roster::team(223), SHOWN);
         assert!(sentence.starts_with("bench 1 (the head) locked, its rear handle at (1.250, -0.500) m"), "{sentence}");
     }
 
     #[test]
     fn a_show_that_stands_still_comes_to_no_event() {
         let contact = alert(Level::Approaching, Some(EventKind::Contact));
-        let sentence = alert_sentence(&contact, 9, Figures::Shown { time_scale: 0.0 });
+        let sentence = alert_sentence(&contact, &Roster::team(9), Figures::Shown { time_scale: 0.0 });
         assert!(
             sentence.starts_with(
                 "contact: bench 1 (the head) and bench 9 (the tail) at (1.250, -0.500) m not while paused"
@@ -239,6 +243,6 @@ mod tests {
     #[test]
     fn an_alert_about_nothing_names_no_bench() {
         let nothing = CollisionAlert::default();
-        assert_eq!(alert_sentence(&nothing, 2, SHOWN), "no contact, stall or lock ahead");
+        assert_eq!(alert_sentence(&nothing, &Roster::team(2), SHOWN), "no contact, stall or lock ahead");
     }
 }

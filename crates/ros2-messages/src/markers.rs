@@ -4,9 +4,9 @@
 use serde::Serialize;
 
 use super::{HasStamp, Header, Pose, Time, Xyz, level_of};
-use bench_dragon_messages::sentence::{Figures, alert_sentence, bench_name, state_sentence};
+use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Severity};
-use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Roster, Stage, StageDragon};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 
@@ -170,15 +170,19 @@ pub struct MarkerArray {
     /// The deadline of the latest frame, nanoseconds; 0 before the first.
     #[serde(skip)]
     latest_deadline_ns: u64,
+    /// The names of benches.
+    #[serde(skip)]
+    roster: Roster,
 }
 
 impl MarkerArray {
     /// Creates the markers of a stage, without positions.
     pub fn of(stage: &Stage) -> Self {
-        let width = stage.width;
-        let bench = |bench: u32| {
-            let length = if bench == 0 { stage.head_length } else { stage.body_length };
-            Marker { scale: Xyz { x: length, y: width, z: BENCH_HEIGHT }, ..Marker::new("benches", bench as i32, CUBE) }
+        let width = stage.first_dragon().width;
+        let bench = |of: &StageDragon, bench: u32| {
+            let length = if bench == 0 { of.head_length } else { of.body_length };
+            let number = (of.first_handle + bench) as i32;
+            Marker { scale: Xyz { x: length, y: of.width, z: BENCH_HEIGHT }, ..Marker::new("benches", number, CUBE) }
         };
         let sign = |ns, shape, scale| Marker { scale, color: colour(Severity::Error), ..Marker::new(ns, 0, shape) };
         // Text has only a height.
@@ -186,10 +190,11 @@ impl MarkerArray {
         let contact = sign("contact", SPHERE, Xyz { x: width, y: width, z: width });
         let coming =
             Marker { points: ring(width), ..sign("coming", LINE_LIST, Xyz { x: 0.3 * width, y: 0.0, z: 0.0 }) };
-        let mut markers: Vec<Marker> = (0..stage.benches).map(bench).collect();
+        let of_all = stage.dragons.iter().flat_map(|of| (0..of.benches).map(move |own| bench(of, own)));
+        let mut markers: Vec<Marker> = of_all.collect();
         markers.extend([contact, coming, words("sentence", 0)]);
         markers.extend((0..MOST_NAMED as i32).map(|id| words("numbers", id)));
-        Self { markers, latest_deadline_ns: 0 }
+        Self { markers, latest_deadline_ns: 0, roster: Roster::of(stage) }
     }
 
     /// Returns the lifetime of the markers of a frame, from the time since the frame before. RViz counts simulated time
@@ -211,19 +216,25 @@ impl MarkerArray {
         stage: &Stage,
         alert: Option<&CollisionAlert>,
     ) {
+        let width = stage.first_dragon().width;
         let stamp = Time::of(frame.stamp_ns);
         let lifetime = self.lifetime(frame);
         self.markers.iter_mut().for_each(|marker| marker.lifetime = lifetime);
         let level = level_of(alert);
         let alert = alert.filter(|_| level.severity() > Severity::Ok);
         let named = alert.map_or_else(Vec::new, |alert| named(alert, level.has_happened()));
-        let (benches, signs) = self.markers.split_at_mut(stage.benches as usize);
-        for (bench, (marker, pair)) in benches.iter_mut().zip(handles.windows(2)).enumerate() {
-            let points = [Point::new(pair[0].x, pair[0].y), Point::new(pair[1].x, pair[1].y)];
-            let centre = Board::from_handles(points[0], points[1], stage.hole_inset, stage.width).centre;
+        let benches: usize = stage.dragons.iter().map(|of| of.benches as usize).sum();
+        let split = benches.min(self.markers.len());
+        let (benches, signs) = self.markers.split_at_mut(split);
+        let numbers = stage.dragons.iter().flat_map(|of| (0..of.benches).map(move |own| (of, own)));
+        for (marker, (of, own)) in benches.iter_mut().zip(numbers) {
+            let number = of.first_handle + own;
+            let Some([front, rear]) = handles.get(number as usize..).and_then(|rest| rest.first_chunk()) else { break };
+            let points = [Point::new(front.x, front.y), Point::new(rear.x, rear.y)];
+            let centre = Board::from_handles(points[0], points[1], of.hole_inset, of.width).centre;
             marker.header.stamp = stamp;
-            marker.pose = Pose::flat(centre.x, centre.y, pair[0].heading);
-            marker.color = match (named.iter().find(|(one, _)| *one == bench as u32), bench) {
+            marker.pose = Pose::flat(centre.x, centre.y, front.heading);
+            marker.color = match (named.iter().find(|(one, _)| *one == number), own) {
                 (Some((_, severity)), _) => colour(*severity),
                 (None, 0) => Color { r: 0.85, g: 0.65, b: 0.13, a: 1.0 },
                 _ => Color { r: 0.55, g: 0.35, b: 0.2, a: 1.0 },
@@ -233,15 +244,16 @@ impl MarkerArray {
         let place = alert.filter(|alert| alert.event_x.is_finite()).map(|alert| (alert.event_x, alert.event_y));
         put(contact, stamp, place.filter(|_| level.has_happened()));
         put(coming, stamp, place.filter(|_| !level.has_happened()));
-        sentence.text = words(frame, stage, alert).unwrap_or_default();
+        sentence.text = words(frame, &self.roster, alert).unwrap_or_default();
         // Above the ring; without one, above the head.
         let head = handles.first().map(|head| (head.x, head.y));
-        let above = place.or(head).map(|(x, y)| (x, y + (RING_RADIUS + 2.0) * stage.width));
+        let above = place.or(head).map(|(x, y)| (x, y + (RING_RADIUS + 2.0) * width));
         put(sentence, stamp, above.filter(|_| !sentence.text.is_empty()));
         for (k, marker) in numbers.iter_mut().enumerate() {
             let bench = named.get(k);
-            marker.text = bench.map_or_else(String::new, |(bench, _)| bench_name(*bench, stage.benches));
-            let at = bench.and_then(|(bench, _)| benches.get(*bench as usize)).map(|marker| &marker.pose.position);
+            marker.text = bench.map_or_else(String::new, |(bench, _)| self.roster.bench(*bench));
+            let of = |(bench, _): &(u32, Severity)| benches.iter().find(|marker| marker.id as u32 == *bench);
+            let at = bench.and_then(of).map(|marker| &marker.pose.position);
             put(marker, stamp, at.map(|place| (place.x, place.y)));
         }
     }
@@ -280,12 +292,12 @@ fn named(alert: &CollisionAlert, happened: bool) -> Vec<(u32, Severity)> {
 }
 
 /// Returns the sentence about an alert at the time of a frame, or about a state without an alert.
-fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> Option<String> {
+fn words(frame: &FrameHeader, roster: &Roster, alert: Option<&CollisionAlert>) -> Option<String> {
     let state = FrameState::ALL.get(frame.state as usize).and_then(|state| state_sentence(*state));
     let of = |alert: &CollisionAlert| {
         // Alerts come once a second, frames more often.
         let now = CollisionAlert { time_to_event: alert.event_time - frame.sim_time, ..*alert };
-        alert_sentence(&now, stage.benches, Figures::Shown { time_scale: frame.time_scale })
+        alert_sentence(&now, roster, Figures::Shown { time_scale: frame.time_scale })
     };
     state.map(str::to_owned).or_else(|| alert.map(of))
 }
@@ -311,10 +323,12 @@ fn colour(severity: Severity) -> Color {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::List;
 
     #[test]
     fn a_marker_lives_some_periods_and_at_least_a_second_of_either_clock() {
-        let stage = Stage { benches: 3, ..Stage::default() };
+        let dragons = List::of([StageDragon { benches: 3, ..StageDragon::default() }]);
+        let stage = Stage { dragons, ..Stage::default() };
         let mut markers = MarkerArray::of(&stage);
         let mut lifetime = |seconds: f64, time_scale: f64| {
             let frame = FrameHeader { deadline_ns: (seconds * 1e9) as u64, time_scale, ..FrameHeader::default() };

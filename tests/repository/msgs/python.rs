@@ -27,6 +27,22 @@ class _Message(ctypes.Structure):
     @classmethod
     def type_name(cls) -> str:
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+
+
+def _list(element: type, most: int) -> type:
+    """Returns the type of a list with room for `most` elements. `len()`, an index and `for` see those in use."""
+
+    class List(ctypes.Structure):
+        ELEMENT = element
+        _fields_ = [("length", ctypes.c_uint32), ("reserved", ctypes.c_uint32), ("items", element * most)]
+
+        def __len__(self) -> int:
+            return min(self.length, most)
+
+        def __getitem__(self, index):
+            return self.items[: len(self)][index]
+
+    return List
 "#;
 
 /// Returns the generated part, with [`BY_HAND`] as its last line.
@@ -63,7 +79,10 @@ pub fn module(source: &Source) -> String {
     for layout in &source.layouts {
         text += &class(source, layout);
     }
-    let is_part = |name: &str| source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name));
+    let is_part = |name: &str| {
+        // The elements of a list are no message; the segments are the payload of the stage.
+        name == "StageSegment" || source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name))
+    };
     let sent: Vec<_> = names.into_iter().filter(|name| !is_part(name)).collect();
     text + &format!("\n\nMESSAGES = ({})\n\n{BY_HAND}", sent.join(", "))
 }
@@ -80,7 +99,7 @@ impl Kind {
     fn holds(&self, layout: &str) -> bool {
         match self {
             Kind::Layout(name) => name == layout,
-            Kind::Array(element, _) => element.holds(layout),
+            Kind::Array(element, _) | Kind::List(element, _) => element.holds(layout),
             Kind::Number(_) | Kind::Text(_) => false,
         }
     }
@@ -147,5 +166,6 @@ fn type_name(kind: &Kind) -> String {
         Kind::Text(bytes) => format!("ctypes.c_uint8 * {bytes}"),
         Kind::Layout(name) => name.clone(),
         Kind::Array(element, length) => format!("{} * {length}", type_name(element)),
+        Kind::List(element, most) => format!("_list({}, {most})", type_name(element)),
     }
 }

@@ -27,7 +27,7 @@ use serde_json::{Value, json};
 use bench_dragon_messages::json::{AlertObject, CueObject, Exact, StageObject};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Level, Severity};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Roster, StageMessage};
 use bench_dragon_proof::ProvedEvent;
 
 const VERSION: u8 = 3;
@@ -57,7 +57,12 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
 
 /// Returns the stage, the name of its publisher and, when they are known, the scene's name and the proofs of its
 /// events.
-pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[ProvedEvent]>) -> String {
+pub(super) fn stage(
+    stage: &StageMessage,
+    publisher: &str,
+    scene: Option<&str>,
+    proved: Option<&[ProvedEvent]>,
+) -> String {
     #[derive(Serialize)]
     struct StageMessage<'a> {
         r#type: &'static str,
@@ -83,9 +88,9 @@ fn state(state: FrameState) -> Value {
         "sentence": state_sentence(state)})
 }
 
-/// Returns an alert with its severity and its sentence, in a team of `benches` benches; the page shows the figures
+/// Returns an alert with its severity and its sentence, with the names of `roster`; the page shows the figures
 /// beside it.
-pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
+pub(super) fn alert(alert: &CollisionAlert, roster: &Roster) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
         #[serde(flatten)]
@@ -99,7 +104,7 @@ pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
         alert: alert.into(),
         severity: level.map_or(Severity::Ok, Level::severity).name(),
         happened: level.is_some_and(Level::has_happened),
-        sentence: alert_sentence(alert, benches, Figures::Omitted),
+        sentence: alert_sentence(alert, roster, Figures::Omitted),
     };
     json!(message).to_string()
 }
@@ -163,7 +168,8 @@ mod tests {
 
     #[test]
     fn the_states_stand_in_the_order_of_their_numbers() {
-        let json: Value = serde_json::from_str(&stage(&Stage::default(), "dragon", Some("paper"), None)).unwrap();
+        let json: Value =
+            serde_json::from_str(&stage(&StageMessage::default(), "dragon", Some("paper"), None)).unwrap();
         assert_eq!((&json["publisher"], &json["scene"]), (&"dragon".into(), &"paper".into()));
         assert!(json["scene_hash"].is_null() && json["proved"].is_null(), "{json}");
         let states = json["states"].as_array().unwrap();
