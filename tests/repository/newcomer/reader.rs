@@ -147,7 +147,7 @@ fn resident_kind(command: &str) -> Option<String> {
     match *subcommand? {
         _ if ends => None,
         "run" | "replay" => Some(format!("publisher {name}")),
-        kind @ ("send" | "chase") => Some(format!("{kind} {}", words.iter().skip_while(|word| *word != kind).nth(1)?)),
+        kind @ ("send" | "chase") => Some(format!("{kind} {}", words.iter().skip_while(|word| **word != kind).nth(1)?)),
         other => Some(other.to_owned()),
     }
 }
