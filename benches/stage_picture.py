@@ -215,7 +215,7 @@ def pictures():
         ("light", "405", "#light", wide, "document.body.dataset.level === 'contact' && picture.shown.time >= 412.47"),
         ("phone", "405", "#light", phone, seconds_before.format(4.2)),
         ("show", "330", "#show", wide, "picture.time > 334"),
-        ("close", "400", "#show,view=1.5,2,9", wide, "picture.time > 404"),
+        ("close", "400", "#show,view=0,-1.5,8", wide, "picture.time > 404"),
         ("seat", "400", "#seat", wide, "picture.time > 404"),
         ("seat-head", "372", "#seat=0.05,12,4", wide, "picture.time > 376"),
         ("show-contact", "405", "#show", wide, seconds_before.format(1.6)),
