@@ -82,7 +82,7 @@ impl Eye {
         let down = self.height - height;
         let depth = away * self.tilt.0 + down * self.tilt.1;
         let scale = self.focus / depth;
-        (depth >= NEAREST).then(|| Spot {
+        (depth >= NEAREST).then_some(Spot {
             x: self.middle.0 + right * scale,
             y: self.middle.1 + (down * self.tilt.0 - away * self.tilt.1) * scale,
             scale,
@@ -308,7 +308,7 @@ fn house(wide: f64, number: i32) -> Group {
     let (top, tread) = (2.9 + 1.5 * scattered(number + 60), wide / 7.0);
     let mut wall = String::from("M0 0");
     for step in 0..7 {
-        let up = top + 0.5 * f64::from(3 - (3 - step as i32).abs());
+        let up = top + 0.5 * f64::from(3 - (3 - step).abs());
         let left = f64::from(step) * tread;
         wall += &format!("L{} -{}L{} -{}", rounded(left, 2), rounded(up, 2), rounded(left + tread, 2), rounded(up, 2));
     }
