@@ -21,6 +21,7 @@ mod scale;
 mod seat;
 mod sheet;
 pub mod swept;
+mod village;
 
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Description, Group, Path, Rectangle, Title};
