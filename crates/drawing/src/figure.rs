@@ -1,4 +1,4 @@
-//! The dragon's head and tail in three dimensions for the look from a seat: balls of lit paper and tapered strands.
+//! The dragon's head and tail in three dimensions for the look from a seat: balls of lit paper and tapered tufts.
 //!
 //! Metres along the board, to its left, and upward, as in `crates/outputs/src/view/dragon_figure.js`.
 
@@ -29,7 +29,7 @@ const SKULL: [[f64; 3]; 9] = [
     [1.04, 2.11, 0.215],
     [1.19, 2.13, 0.165],
 ];
-/// Places along a strand.
+/// Places along a tuft.
 const STEPS: u32 = 6;
 
 /// The shapes of a figure with their depths.
@@ -57,8 +57,8 @@ impl<'a> Shapes<'a> {
         }
     }
 
-    /// Adds a strand through places of a share from 0 to 1, each with a radius.
-    fn strand(&mut self, colour: &str, rim: &str, at: impl Fn(f64) -> ([f64; 3], f64)) {
+    /// Adds a tuft through places of a share from 0 to 1, each with a radius.
+    fn tuft(&mut self, colour: &str, rim: &str, at: impl Fn(f64) -> ([f64; 3], f64)) {
         let spots: Option<Vec<(Spot, f64)>> = (0..=STEPS)
             .map(|step| at(f64::from(step) / f64::from(STEPS)))
             .map(|(place, radius)| self.spot(place).map(|spot| (spot, radius * spot.scale)))
@@ -117,7 +117,7 @@ pub fn head(eye: &Eye, placed: Placed) -> Group {
             let angle = -0.75 + (f64::from(flame) + 0.5 * (ring % 2) as f64) / 16.0 * 4.64;
             let long = reach * (0.9 + 0.2 * f64::from(flame % 3) - 0.1);
             let (sine, cosine) = angle.sin_cos();
-            shapes.strand(colour, "#3a0405", |q| {
+            shapes.tuft(colour, "#3a0405", |q| {
                 let spread = out + 0.34 * q * q;
                 let place = [0.1 * ring as f64 - 0.08 - long * q, cosine * spread, 2.16 + sine * spread];
                 (place, 0.1 * (1.0 - q.powf(1.4)))
@@ -141,29 +141,29 @@ fn face(shapes: &mut Shapes, side: f64) {
     shapes.ball([0.5, 0.292 * side, 2.385], 0.135, "url(#white)");
     shapes.ball([0.6, 0.335 * side, 2.395], 0.064, "#260606");
     let horn = ("#e0a23c", "#331602");
-    shapes.strand(horn.0, horn.1, |q| {
+    shapes.tuft(horn.0, horn.1, |q| {
         ([0.02 - 0.95 * q, (0.18 + 0.34 * q) * side, 2.5 + 0.7 * (1.75 * q).sin()], 0.092 * (1.0 - 0.8 * q))
     });
-    shapes.strand(horn.0, horn.1, |q| {
+    shapes.tuft(horn.0, horn.1, |q| {
         ([-0.36 - 0.02 * q, (0.31 + 0.24 * q) * side, 2.88 + 0.36 * q], 0.06 * (1.0 - 0.8 * q))
     });
     for k in 0..3 {
         let k = f64::from(k);
-        shapes.strand("#1fae80", "#021d14", |q| {
+        shapes.tuft("#1fae80", "#021d14", |q| {
             let place = [0.66 - 0.64 * q - 0.05 * k, (0.3 + 0.05 * q) * side, 2.5 + 0.05 * k + (0.1 + 0.1 * k) * q];
             (place, 0.07 * (3.1 * (0.2 + 0.8 * q)).sin())
         });
     }
     for k in 0..4 {
         let k = f64::from(k);
-        shapes.strand("#0f8a64", "#021d14", |q| {
+        shapes.tuft("#0f8a64", "#021d14", |q| {
             ([0.95 - 0.15 * k - 0.18 * q, (0.1 + 0.02 * k) * side, 1.59 - 0.4 * q], 0.05 * (1.0 - 0.95 * q))
         });
     }
-    shapes.strand("#1fae80", "#021d14", |q| {
+    shapes.tuft("#1fae80", "#021d14", |q| {
         ([-0.05 - 0.44 * q, (0.4 + 0.36 * q) * side, 2.2 + 0.24 * q], 0.1 * (3.1 * (0.3 + 0.7 * q)).sin())
     });
-    shapes.strand("#ffdf90", "#5a2404", |q| {
+    shapes.tuft("#ffdf90", "#5a2404", |q| {
         let place =
             [1.18 + 0.42 * (2.8 * q).sin() - 0.55 * q, (0.17 + 0.95 * q) * side, 2.08 + 0.3 * q * (3.6 * q).sin()];
         (place, 0.03 * (1.0 - 0.75 * q))
@@ -181,7 +181,7 @@ pub fn tail(eye: &Eye, placed: Placed) -> Group {
         for flame in -3..=3 {
             let flame = f64::from(flame);
             let long = (1.35 - 0.35 * rank) * (1.0 - 0.1 * flame.abs());
-            shapes.strand(colour, "#3a0405", |q| {
+            shapes.tuft(colour, "#3a0405", |q| {
                 let up = 0.95 - 0.12 * flame.abs() + 0.2 * rank;
                 ([-0.05 - long * q, 0.1 * flame * (0.5 + 2.1 * q), 1.34 + up * q], 0.12 * (1.0 - q.powf(1.4)))
             });

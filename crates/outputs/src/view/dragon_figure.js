@@ -1,15 +1,15 @@
-// The dragon's head and tail in three dimensions, for the view from a seat: balls of lit paper and tapered strands. Called
+// The dragon's head and tail in three dimensions, for the view from a seat: balls of lit paper and tapered tufts. Called
 // by seat.js. Metres: `u` forward, `v` to the left, `w` up; of the head from 1.1 m behind the end of its board, of the
 // tail from the end of its board.
 
 import { hash } from "./sprites.js";
 
-/** Colours of strands from their root to their tip, and of their dark rim. */
+/** Colours of tufts from their root to their tip, and of their dark rim. */
 const FIRE = ["#7c0b10", "#c91a16", "#f0501a", "#ff9a2e", "#ffd873"], FIRE_RIM = "#3a0405";
 const HORN = ["#6a3509", "#d8922a", "#ffcf6a", "#fff3c4"], HORN_RIM = "#331602";
 const LEAF = ["#04382a", "#0f8a64", "#35c898", "#c4ffe6"], LEAF_RIM = "#021d14";
 const GILT = ["#ffb43a", "#ffdf90", "#fff6d8"], GILT_RIM = "#5a2404";
-/** The width of a strand's rim, m, and the least width, pixels. */
+/** The width of a tuft's rim, m, and the least width, pixels. */
 const RIM = 0.014, LEAST_RIM = 0.7;
 
 /** The profile of skull and muzzle: forward, up, radius. */
@@ -29,16 +29,16 @@ const bothSides = (make) => [1, -1].forEach(make);
 class Figure {
   constructor() {
     this.balls = [];
-    this.strands = [];
+    this.tufts = [];
   }
 
   ball(u, v, w, radius, kind) {
     this.balls.push({ u, v, w, radius, kind });
   }
 
-  /** A strand through places `at` of a share from 0 to 1: u, v, w and the radius. */
-  strand(count, at, colours, rim) {
-    this.strands.push({ points: Array.from({ length: count }, (_, k) => at(k / (count - 1))), colours, rim });
+  /** A tuft through places `at` of a share from 0 to 1: u, v, w and the radius. */
+  tuft(count, at, colours, rim) {
+    this.tufts.push({ points: Array.from({ length: count }, (_, k) => at(k / (count - 1))), colours, rim });
   }
 }
 
@@ -63,7 +63,7 @@ export function headFigure(time) {
   bothSides((side) => {
     // A whisker from the nostril, forward, then back.
     const at = (q) => [1.18 + 0.42 * Math.sin(2.8 * q) - 0.55 * q, (0.17 + 0.95 * q) * side, 2.08 + 0.4 * q * Math.sin(3.6 * q + 1.5 * time), 0.03 * (1 - 0.75 * q)];
-    figure.strand(16, at, GILT, GILT_RIM);
+    figure.tuft(16, at, GILT, GILT_RIM);
   });
   return figure;
 }
@@ -94,9 +94,9 @@ function eye(figure, side) {
 }
 
 function horns(figure, side) {
-  figure.strand(10, (q) => [0.02 - 0.95 * q, (0.18 + 0.34 * q) * side, 2.5 + 0.7 * Math.sin(1.75 * q), 0.092 * (1 - 0.8 * q)], HORN, HORN_RIM);
-  figure.strand(5, (q) => [-0.36 - 0.02 * q, (0.31 + 0.24 * q) * side, 2.88 + 0.36 * q, 0.06 * (1 - 0.8 * q)], HORN.slice(1), HORN_RIM);
-  figure.strand(5, (q) => [-0.62 + 0.1 * q, (0.4 + 0.1 * q) * side, 3.05 + 0.3 * q, 0.046 * (1 - 0.8 * q)], HORN.slice(1), HORN_RIM);
+  figure.tuft(10, (q) => [0.02 - 0.95 * q, (0.18 + 0.34 * q) * side, 2.5 + 0.7 * Math.sin(1.75 * q), 0.092 * (1 - 0.8 * q)], HORN, HORN_RIM);
+  figure.tuft(5, (q) => [-0.36 - 0.02 * q, (0.31 + 0.24 * q) * side, 2.88 + 0.36 * q, 0.06 * (1 - 0.8 * q)], HORN.slice(1), HORN_RIM);
+  figure.tuft(5, (q) => [-0.62 + 0.1 * q, (0.4 + 0.1 * q) * side, 3.05 + 0.3 * q, 0.046 * (1 - 0.8 * q)], HORN.slice(1), HORN_RIM);
 }
 
 /** Three rings of flames behind the skull, the innermost the lightest. */
@@ -110,16 +110,16 @@ function mane(figure, time) {
         0.1 * ring - 0.08 - long * q, c * (out + 0.34 * q * q) + 0.1 * q * Math.sin(4 * time - 3.4 * q + flame),
         2.16 + s * (out + 0.38 * q * q) + 0.06 * q * Math.cos(3.3 * time - 3 * q + flame), 0.1 * (1 - q ** 1.4),
       ];
-      figure.strand(9, at, colours, FIRE_RIM);
+      figure.tuft(9, at, colours, FIRE_RIM);
     }
   });
 }
 
 /** Brow, beard and ear. */
 function greens(figure, side, time, jaw) {
-  for (let k = 0; k < 3; k++) figure.strand(7, (q) => [0.66 - 0.64 * q - 0.05 * k, (0.3 + 0.05 * q) * side, 2.5 + 0.05 * k + (0.1 + 0.1 * k) * q, 0.07 * Math.sin(Math.PI * (0.2 + 0.8 * q))], LEAF.slice(k === 2 ? 1 : 0), LEAF_RIM);
-  for (let k = 0; k < 5; k++) figure.strand(7, (q) => [0.95 - 0.13 * k - 0.18 * q, (0.1 + 0.02 * k) * side, 1.74 - 1.4 * jaw - (0.42 - 0.04 * k) * q + 0.03 * Math.sin(3 * time + k + 2 * q), 0.05 * (1 - 0.95 * q)], LEAF, LEAF_RIM);
-  figure.strand(7, (q) => [-0.05 - 0.44 * q, (0.4 + 0.36 * q) * side, 2.2 + 0.24 * q, 0.1 * Math.sin(Math.PI * (0.3 + 0.7 * q))], LEAF, LEAF_RIM);
+  for (let k = 0; k < 3; k++) figure.tuft(7, (q) => [0.66 - 0.64 * q - 0.05 * k, (0.3 + 0.05 * q) * side, 2.5 + 0.05 * k + (0.1 + 0.1 * k) * q, 0.07 * Math.sin(Math.PI * (0.2 + 0.8 * q))], LEAF.slice(k === 2 ? 1 : 0), LEAF_RIM);
+  for (let k = 0; k < 5; k++) figure.tuft(7, (q) => [0.95 - 0.13 * k - 0.18 * q, (0.1 + 0.02 * k) * side, 1.74 - 1.4 * jaw - (0.42 - 0.04 * k) * q + 0.03 * Math.sin(3 * time + k + 2 * q), 0.05 * (1 - 0.95 * q)], LEAF, LEAF_RIM);
+  figure.tuft(7, (q) => [-0.05 - 0.44 * q, (0.4 + 0.36 * q) * side, 2.2 + 0.24 * q, 0.1 * Math.sin(Math.PI * (0.3 + 0.7 * q))], LEAF, LEAF_RIM);
 }
 
 /** The tail at a show time. */
@@ -133,7 +133,7 @@ export function tailFigure(time) {
         -0.05 - long * q, 0.1 * flame * (0.5 + 2.1 * q) + 0.1 * q * Math.sin(4 * time - 3 * q + flame),
         1.34 + up * q + 0.05 * q * Math.sin(3 * time + flame), 0.12 * (1 - q ** 1.4),
       ];
-      figure.strand(9, at, rank ? FIRE.slice(2) : FIRE.slice(0, 3), FIRE_RIM);
+      figure.tuft(9, at, rank ? FIRE.slice(2) : FIRE.slice(0, 3), FIRE_RIM);
     }
   }
   return figure;
@@ -146,7 +146,7 @@ export function drawFigure(context, view, figure, { x, y, c, s }, balls) {
     const at = place(u, v, w);
     if (at) parts.push({ depth: at.depth, at, radius, kind });
   }
-  for (const { points, colours, rim } of figure.strands) {
+  for (const { points, colours, rim } of figure.tufts) {
     const places = points.map(([u, v, w]) => place(u, v, w));
     if (places.every(Boolean)) parts.push({ depth: places[places.length >> 1].depth, places, points, colours, rim });
   }
@@ -154,7 +154,7 @@ export function drawFigure(context, view, figure, { x, y, c, s }, balls) {
   context.lineJoin = "round";
   for (const part of parts) {
     if (part.places) {
-      strand(context, part);
+      tuft(context, part);
       continue;
     }
     const half = part.radius * part.at.k;
@@ -162,14 +162,14 @@ export function drawFigure(context, view, figure, { x, y, c, s }, balls) {
   }
 }
 
-/** A tapered strand: its rim, its colours from root to tip, and a line of light along it. */
-function strand(context, { places, points, colours, rim }) {
+/** A tapered tuft: its rim, its colours from root to tip, and a line of light along it. */
+function tuft(context, { places, points, colours, rim }) {
   const first = places[0], last = places.at(-1), root = points[0][3] * first.k;
   outline(context, places, points, 1);
   Object.assign(context, { strokeStyle: rim, lineWidth: 2 * Math.max(LEAST_RIM, RIM * first.k) });
   context.stroke();
   const long = Math.hypot(last.x - first.x, last.y - first.y);
-  // A strand that points at the eye shows its tip.
+  // A tuft that points at the eye shows its tip.
   if (long < 1) context.fillStyle = colours.at(-1);
   else {
     const fill = context.createLinearGradient(first.x, first.y, last.x, last.y);
@@ -183,7 +183,7 @@ function strand(context, { places, points, colours, rim }) {
   context.fill();
 }
 
-/** The outline of a strand, of a share of its width. */
+/** The outline of a tuft, of a share of its width. */
 function outline(context, places, points, share) {
   const last = places.length - 1, sides = [[], []];
   for (let k = 0; k <= last; k++) {

@@ -345,7 +345,7 @@ function teamOf(view, { stage, places, show }) {
   return { things, middle: view.to(x, y, 0), reach, show, places, life: show.life, speed: Number.isFinite(speed) ? speed : 0 };
 }
 
-/** Returns true if something within so many metres of a place is in the picture. */
+/** Returns true if a part of the circle of `metres` around a place is in the picture. */
 function isSeen({ width, height }, { x, y, k }, metres) {
   return x > -metres * k && x < width + metres * k && y > -metres * k && y - 3.5 * k < height;
 }
