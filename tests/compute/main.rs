@@ -18,6 +18,7 @@ mod placement;
 mod scene;
 mod show;
 mod solvers;
+mod staged;
 #[path = "../truth/tables.rs"]
 mod tables;
 mod truth;
