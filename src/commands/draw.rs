@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::drawing::dragons::Dragons;
 use bench_dragon::drawing::swept::SweptArea;
-use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Style, Surroundings, Theme, mean_speeds};
+use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Seat, Style, Surroundings, Theme, mean_speeds};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
@@ -65,7 +65,8 @@ struct LookArguments {
     /// The point in the middle of the picture and its width, metres, as in 1.5,2,4
     #[arg(long, value_name = "X,Y,METRES", value_parser = view, allow_hyphen_values = true)]
     view: Option<Framing>,
-    /// plan, or lanterns: the stage at night in the light of the dragon's lanterns
+    /// plan; lanterns: the stage at night in the light of the dragon's lanterns; seat or seat=TURNS,DISTANCE,HEIGHT:
+    /// the same from a place in the audience
     #[arg(long, value_name = "STYLE", default_value = "plan", value_parser = style, conflicts_with = "animated")]
     look: Style,
     /// light, dark, or auto: light, and dark if a browser prefers that
@@ -333,7 +334,7 @@ impl LookArguments {
             (None, Some(view)) => view,
             (None, None) => Framing::Everything,
         };
-        let is_bare = self.no_axes || self.look == Style::Lanterns;
+        let is_bare = self.no_axes || self.look != Style::Plan;
         let surroundings = if is_bare { Surroundings::Nothing } else { Surroundings::Words };
         Ok(Look { style: self.look, theme: self.theme, framing, surroundings, width: self.width, height: self.height })
     }
@@ -343,8 +344,24 @@ fn style(text: &str) -> Result<Style, String> {
     match text {
         "plan" => Ok(Style::Plan),
         "lanterns" => Ok(Style::Lanterns),
-        _ => Err("expected plan or lanterns".to_owned()),
+        "seat" => seat("0"),
+        _ => match text.strip_prefix("seat=") {
+            Some(numbers) => seat(numbers),
+            None => Err("expected plan, lanterns, seat or seat=TURNS,DISTANCE,HEIGHT".to_owned()),
+        },
     }
+}
+
+fn seat(text: &str) -> Result<Style, String> {
+    let numbers: Vec<f64> = text.split(',').map(|number| number.trim().parse().unwrap_or(f64::NAN)).collect();
+    let within = |at: usize, (least, most): (f64, f64)| numbers.get(at).is_none_or(|one| (least..=most).contains(one));
+    if numbers.len() > 3 || !within(0, (-1e6, 1e6)) || !within(1, (2.0, 5000.0)) || !within(2, (0.3, 1000.0)) {
+        let expected =
+            "expected turns, a distance from 2 to 5000 m and a height from 0.3 to 1000 m, as in seat=0.25,19,4.4";
+        return Err(expected.to_owned());
+    }
+    let height = numbers.get(2).copied().unwrap_or(4.4);
+    Ok(Style::Seat(Seat { turns: numbers[0], distance: numbers.get(1).copied(), height }))
 }
 
 fn theme(text: &str) -> Result<Theme, String> {

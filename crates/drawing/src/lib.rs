@@ -10,6 +10,7 @@ pub mod animation;
 mod benches;
 pub mod camera;
 pub mod dragons;
+mod figure;
 mod ground;
 mod labels;
 mod lanterns;
@@ -18,8 +19,10 @@ mod marks;
 pub mod palette;
 mod route;
 mod scale;
+mod seat;
 mod sheet;
 pub mod swept;
+mod village;
 
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Description, Group, Path, Rectangle, Title};
@@ -33,7 +36,7 @@ use bench_dragon_motion::timeline::Timeline;
 use camera::{Camera, StageBox, Viewport};
 use dragons::{Dragons, Drawn};
 use labels::Name;
-pub use look::{Framing, Length, Look, Style, Surroundings, Theme};
+pub use look::{Framing, Length, Look, Seat, Style, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
 pub use scale::mean_speeds;
@@ -99,7 +102,7 @@ impl<'a> Drawing<'a> {
                 ground::include(motion.ground(), &mut boards);
                 let margin = match look.style {
                     Style::Plan => 0.04 * boards.width().max(boards.height()) + motion.team().width,
-                    Style::Lanterns => lanterns::MARGIN,
+                    Style::Lanterns | Style::Seat(_) => lanterns::MARGIN,
                 };
                 boards.padded(margin)
             }
@@ -109,6 +112,7 @@ impl<'a> Drawing<'a> {
         };
         // A straight team still gets space beside it, and a tall one is not higher than a page.
         let shape = match look.framing {
+            _ if matches!(look.style, Style::Seat(_)) => seat::SHAPE,
             Framing::View(..) => 1.0,
             _ => (shown.height() / shown.width()).clamp(0.3, 1.3),
         };
@@ -141,6 +145,7 @@ impl<'a> Drawing<'a> {
         match self.look.style {
             Style::Plan => self.plan(time, chain),
             Style::Lanterns => self.lanterns(time, chain),
+            Style::Seat(seat) => self.seat(time, chain, seat),
         }
     }
 

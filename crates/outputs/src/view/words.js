@@ -27,6 +27,8 @@ const WORDS = {
   key_zoom: ["zoom", "缩放"],
   key_0: ["show all", "显示全部"],
   key_f: ["follow the head, or the chosen bench", "跟随龙头或所选板凳"],
+  key_camera: ["take a kept camera", "切换到已保存的视角"],
+  key_keep: ["keep this camera, on this browser", "在本浏览器中保存此视角"],
   key_t: ["light or dark", "浅色或深色"],
   key_p: ["full screen", "全屏"],
   key_s: ["sound: a tick at 3, 2, 1, a gong at the event", "声音：倒数 3、2、1 时滴答，事件发生时锣响"],
@@ -154,6 +156,12 @@ const WORDS = {
   eventAhead: ["{kind} ahead", "{kind}：尚有"],
 
   locked: ["locked", "已锁定画面"],
+  notToScale: ["Not to scale above the boards.", "板凳以上的部分不按比例。"],
+  still: ["A still, renewed every {seconds} s: this computer draws {rate} pictures/s. For a film: benches/stage_picture.py film.", "静态画面，每 {seconds} 秒更新：本机每秒只能绘制 {rate} 幅。制作影片：benches/stage_picture.py film。"],
+  cameraKept: ["Camera {number} kept", "已保存视角 {number}"],
+  cameraTaken: ["Camera {number}", "视角 {number}"],
+  cameraEmpty: ["Camera {number} is empty: Shift+{number} keeps this one", "视角 {number} 为空：Shift+{number} 保存当前视角"],
+  cameraUnkept: ["This browser keeps no cameras", "本浏览器无法保存视角"],
 
   // The state of the page, spoken once.
   server: ["waiting for the server", "等待服务器"],
