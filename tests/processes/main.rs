@@ -19,6 +19,7 @@ mod replay;
 mod scene;
 mod second_publisher;
 mod send;
+mod service_manager;
 mod soak;
 mod transports;
 mod tunnel;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pathlib
 import tomllib
+import typing
 from typing import Any
 
 import iceoryx2 as iox2
@@ -33,8 +34,9 @@ def open_messages(node: Any, service: str, payload: Any, header: type[Message] |
     except iox2.PublishSubscribeOpenError as error:
         if "IncompatibleTypes" not in str(error):
             return None
-        element = getattr(payload, "contained_type", payload)
-        raise layout_error(service, [element] + [header] * (header is not None)) from error
+        # `iox2.Slice[X]` names X.
+        named = [*(typing.get_args(payload) or [payload]), *([header] if header else [])]
+        raise layout_error(service, [layout for layout in named if issubclass(layout, Message)]) from error
 
 
 def layout_error(service: str, own: list[type[Message]]) -> LayoutError:

@@ -7,6 +7,7 @@ use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as 
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::{Connection, Origin, Selection, Subscription};
+use crate::layouts;
 use crate::shared_memory::{OpenError, service_name};
 use bench_dragon_messages::SceneHeader;
 
@@ -21,7 +22,10 @@ impl Subscription {
         let name = service_name(&self.name, "scene")?;
         match self.node.service_builder(&name).publish_subscribe::<[u8]>().user_header::<SceneHeader>().open() {
             Ok(service) => Ok(Some(service)),
-            Err(Open::IncompatibleTypes | Open::VersionMismatch) => Err(OpenError::Incompatible(name.to_string())),
+            Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
+                let own = [layouts::name::<u8>(), layouts::name::<SceneHeader>()];
+                Err(layouts::another(&name, MessagingPattern::PublishSubscribe, &own))
+            }
             Err(_) => Ok(None),
         }
     }
