@@ -6,7 +6,7 @@ mod logging;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 pub use commands::ros_args;
 use commands::{CommandError, Common};
 
@@ -113,7 +113,7 @@ fn main() -> ExitCode {
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::SoakConductor(arguments) => commands::soak_conductor::conduct(&common, arguments),
         Command::SoakClient(arguments) => commands::soak_conductor::client(&common, arguments),
-        Command::WriteManual(arguments) => commands::write_manual::write_manual(arguments),
+        Command::WriteManual(arguments) => commands::write_manual::write_manual(CommandLine::command(), arguments),
         Command::Check(arguments) => commands::check::check(&common, arguments),
     });
     exit_code(done)

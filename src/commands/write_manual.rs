@@ -3,7 +3,6 @@
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 
 use super::{CommandError, not_writable};
@@ -16,13 +15,12 @@ pub struct WriteManualArguments {
     folder: PathBuf,
 }
 
-/// Writes a man page for the program and for each command, and completions for bash, zsh and fish.
-pub fn write_manual(arguments: &WriteManualArguments) -> Result<(), CommandError> {
+/// Writes a man page for a command line and for each of its commands, and completions for bash, zsh and fish.
+pub fn write_manual(mut command: clap::Command, arguments: &WriteManualArguments) -> Result<(), CommandError> {
     let (pages, completions) = (arguments.folder.join("man"), arguments.folder.join("completions"));
     for folder in [&pages, &completions] {
         fs::create_dir_all(folder).map_err(|error| not_writable(folder.display(), &error))?;
     }
-    let mut command = crate::CommandLine::command();
     write_completions(&mut command, &completions).map_err(|error| not_writable(completions.display(), &error))?;
     // With the names of the whole line, such as `bench-dragon send osc`.
     command.build();

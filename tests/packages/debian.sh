@@ -11,24 +11,25 @@ folder=$(realpath -m "$1")
 
 cd "$repository"
 packaging/build
-[ -e "$folder/etc/debian_version" ] || debootstrap --variant=minbase --include=lintian bookworm "$folder"
+[ -e "$folder/etc/debian_version" ] || debootstrap --variant=minbase bookworm "$folder"
 mount --bind "$folder" "$folder"
 mount -t proc proc "$folder/proc"
 mount --rbind /dev "$folder/dev"
 # Authorities that this machine trusts, of a proxy perhaps.
 mkdir -p "$folder/etc/ssl/certs" "$folder/tmp/packages"
 cp -L /etc/ssl/certs/ca-certificates.crt "$folder/etc/ssl/certs/"
-rm -f "$folder"/tmp/packages/*
+rm -rf "$folder"/tmp/packages/*
 cp target/packaging/*.deb target/packaging/*.whl "$folder/tmp/packages/"
 inside() {
   chroot "$folder" env -i HOME=/root TERM=dumb PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
     bash -euo pipefail -c "cd /tmp/packages; $1"
 }
 
+inside 'apt-get update --quiet=2 && apt-get install --quiet=2 --yes --no-install-recommends lintian python3-venv >/dev/null'
 echo "== lintian"
 inside 'lintian --fail-on error --tag-display-limit 0 *.deb'
 echo "== installed, used, removed"
-inside 'apt-get install --quiet=2 --yes --no-install-recommends ./*.deb python3-venv >/dev/null
+inside 'apt-get install --quiet=2 --yes --no-install-recommends ./*.deb >/dev/null
   cd / && bench-dragon --version && bench-dragon --scene /usr/share/bench-dragon/scenes/school.toml check >/dev/null
   bash -n /usr/share/bash-completion/completions/bench-dragon
   zcat /usr/share/man/man1/bench-dragon-run.1.gz | grep -q -- "\\\\-\\\\-realtime"
@@ -41,6 +42,8 @@ with bench_dragon.subscribe(\"packages\", seconds=50) as feed:
     print(len(next(feed).handles), \"handles\")
 "
   kill -INT $publisher && wait $publisher
-  apt-get remove --quiet=2 --yes bench-dragon >/dev/null && ! command -v bench-dragon
-  ! ls -d /usr/share/bench-dragon /usr/lib/systemd/user/bench-dragon@.service 2>/dev/null'
+  apt-get remove --quiet=2 --yes bench-dragon >/dev/null
+  for left in /usr/bin/bench-dragon /usr/share/bench-dragon /usr/lib/systemd/user/bench-dragon@.service; do
+    [ ! -e "$left" ] || { echo "$left is left" >&2; exit 1; }
+  done'
 echo "PASS"
