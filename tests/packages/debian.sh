@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The packages on a clean Debian 12, which is installed into a folder: the .deb through lintian, installed, used, removed; the
-# wheel in a fresh venv there, reading a publisher of the .deb. As root; needs debootstrap, a mirror, PyPI, and what
+# The packages on a clean Debian 12, which is installed into a folder: the .deb through lintian, installed, used, removed;
+# the wheel in a fresh venv there, reading a publisher of the .deb. As root; needs debootstrap, a mirror, PyPI, and what
 # packaging/build needs. The user unit is not started: that takes a systemd that has booted.
 set -euo pipefail
 [ $# = 1 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER" >&2; exit 2; }
@@ -25,7 +25,8 @@ inside() {
     bash -euo pipefail -c "cd /tmp/packages; $1"
 }
 
-inside 'apt-get update --quiet=2 && apt-get install --quiet=2 --yes --no-install-recommends lintian python3-venv >/dev/null'
+inside 'apt-get update --quiet=2
+  apt-get install --quiet=2 --yes --no-install-recommends lintian python3-venv >/dev/null'
 echo "== lintian"
 inside 'lintian --fail-on error --tag-display-limit 0 *.deb'
 echo "== installed, used, removed"

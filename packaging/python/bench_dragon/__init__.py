@@ -5,8 +5,8 @@
     for frame in subscribe("bench_dragon"):
         x = frame.handles["x"]                   # metres, a numpy array in the publisher's own memory
 
-`subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands. `HermiteReader` gives
-the handles between two frames. The layouts of all messages are those of the program of the same version.
+`subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands. `HermiteReader`
+gives the handles between two frames. The layouts of all messages are those of the program of the same version.
 """
 
 from bench_dragon.control import CODES, COMMANDS, Controller, described

@@ -63,8 +63,8 @@ class Feed:
     def __init__(self, name: str = "bench_dragon", *, light: bool = False, seconds: float | None = None) -> None:
         """Creates a feed of the services of `name`, which need not exist yet.
 
-        `light` reads the poses in single precision, which a scene offers by `precision = "f32"`. The iterator ends after
-        `seconds` of wall time.
+        `light` reads the poses in single precision, which a scene offers by `precision = "f32"`. The iterator ends
+        after `seconds` of wall time.
         """
         self._name = name
         self._poses = "poses32" if light else "poses"

@@ -131,9 +131,9 @@ class HandlePose(Message):
 
 
 class HandlePose32(Message):
-    """The position and velocity of one handle, in half the bytes: the numbers of `HandlePose`, each rounded to the nearest
-    single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at 8 m,
-    0.06 mm at 1 km).
+    """The position and velocity of one handle, in half the bytes: the numbers of `HandlePose`, each rounded to the
+    nearest single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at
+    8 m, 0.06 mm at 1 km).
 
     Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head
     first: one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the
@@ -398,7 +398,8 @@ class LoopStatus(Message):
 
 
 class ChaseStatus(Message):
-    """The status of the process that makes a show follow an outside time, five times a second. Payload of `<name>/chase`.
+    """The status of the process that makes a show follow an outside time, five times a second. Payload of
+    `<name>/chase`.
     """
 
     LAYOUT = 1

@@ -113,14 +113,16 @@ fn events(source: &Source, item: &Enumeration) -> String {
 
 fn class(source: &Source, layout: &Layout) -> String {
     let mut text = format!("\n\nclass {}(Message):\n", layout.name);
-    let docs: Vec<_> = plain(source, Some(layout), &layout.docs).iter().map(|text| wrapped(text, "    ")).collect();
+    let mut docs = plain(source, Some(layout), &layout.docs);
+    docs[0].insert_str(0, "\"\"\"");
+    let docs: Vec<_> = docs.iter().map(|text| wrapped(text, "    ")).collect();
     let docs = docs.join("\n");
     // The quotes are on a separate line after a text of more than one line.
     let one_line = docs.trim();
-    if docs.lines().count() == 1 && one_line.len() + 10 <= 120 {
-        text += &format!("    \"\"\"{one_line}\"\"\"\n");
+    if docs.lines().count() == 1 && one_line.len() + 7 <= 120 {
+        text += &format!("    {one_line}\"\"\"\n");
     } else {
-        text += &format!("    \"\"\"{one_line}\n    \"\"\"\n");
+        text += &format!("    {one_line}\n    \"\"\"\n");
     }
     text += &format!("\n    LAYOUT = {}\n", layout.version);
     for field in &layout.fields {
