@@ -143,7 +143,7 @@ impl RunSession<'_> {
         let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
         let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
         let config =
-            TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, stage) };
+            TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, &stage) };
         let (mut transports, doors) = open_transports(&config)?;
         // The last transport, so that the log has only published frames.
         let log = self.open_log()?.map(|(transport, outcome)| {

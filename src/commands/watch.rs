@@ -213,7 +213,7 @@ impl Screen<'_> {
             FeedEvent::Silent => format!("The publisher of \"{name}\" is running but sends nothing."),
             FeedEvent::Alert(alert) => self.alert_line(alert),
             FeedEvent::Cue(cue) => format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue)),
-            FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Scene { .. } => return Ok(()),
+            FeedEvent::Frame { .. } | FeedEvent::Stage { .. } | FeedEvent::Scene { .. } => return Ok(()),
             FeedEvent::Status(_) | FeedEvent::Chase(_) => return Ok(()),
         };
         if self.display == Display::Terminal && matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {

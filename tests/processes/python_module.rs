@@ -24,6 +24,7 @@ fn a_program_of_global_variables_reads_every_service() {
     let number = |field: &str| found[field].as_u64().unwrap_or_else(|| panic!("no {field} in {found}"));
     assert_eq!(number("frames") + number("missed"), number("last") - number("first") + 1, "{found}");
     assert_eq!((number("handles"), number("benches"), number("answer")), (224, 223, 0));
+    assert_eq!(number("segments"), 1, "a spiral");
     assert_eq!((&found["scene"], &found["alert_run"]), (&whole.as_str().into(), &true.into()));
     assert!(found["cue"].as_str().unwrap().starts_with("at 4"), "{found}");
     publisher.signal(SIGINT);

@@ -39,9 +39,10 @@ print(
             "handles": len(handles),
             "answer": answer.code,
             "cue": bytes(cues[0].name).rstrip(b"\0").decode(),
-            "benches": stage.benches,
+            "benches": stage[0].dragons[0].benches,
+            "segments": len(stage[1]),
             "scene": scene[1],
-            "alert_run": alerts[0].run_id == stage.run_id == scene[0].run_id == cues[0].run_id,
+            "alert_run": alerts[0].run_id == stage[0].run_id == scene[0].run_id == cues[0].run_id,
         }
     )
 )

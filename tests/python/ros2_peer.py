@@ -151,7 +151,7 @@ def from_file(name, known):
 
 KNOWN = {"std_msgs/Header": Header}
 KNOWN["HandlePose"] = from_file("HandlePose", KNOWN)
-for part in ("StageSegment", "StageEvent", "StageCue"):
+for part in ("StageSegment", "StageDragon", "StageObstacle", "StageEvent", "StageCue"):
     KNOWN[part] = from_file(part, KNOWN)
 TOPICS = {
     "handles": from_file("HandlePoses", KNOWN),

@@ -32,7 +32,7 @@ class Iceoryx2:
     def open(self):
         iox2, messages = self.iox2, self.messages
         kinds = {
-            "stage": (messages.Stage, None),
+            "stage": (iox2.Slice[messages.StageSegment], messages.Stage),
             "alerts": (messages.CollisionAlert, None),
             "status": (messages.LoopStatus, None),
             "poses": (iox2.Slice[messages.HandlePose], messages.FrameHeader),
@@ -54,6 +54,8 @@ class Iceoryx2:
                 if kind == "poses":
                     handles = self.messages.handles_of(sample)
                     yield "frame", sample.user_header().contents, [(h["x"], h["y"]) for h in handles[:2]], len(handles)
+                elif kind == "stage":
+                    yield kind, sample.user_header().contents, None, None
                 else:
                     yield {"alerts": "alert"}.get(kind, kind), sample.payload().contents, None, None
                 sample.delete()
@@ -97,7 +99,7 @@ class Ros2:
 FIELDS = {
     "frame": ("run_id", "sequence", "tick", "sim_time", "state", "epoch", "handles"),
     "alert": ("run_id", "tick", "level", "event", "event_time", "event_bench_a", "event_bench_b"),
-    "stage": ("run_id", "benches", "segments", "body_length"),
+    "stage": ("run_id", "freeze_time", "cues"),
     "status": ("run_id", "sequence", "tick", "rate", "skipped"),
 }
 
@@ -119,6 +121,9 @@ def main():
         over = time.monotonic() >= end or (bool(told) and peer.publishers() == 0)
         for kind, message, handles, count in peer.take():
             line = {"type": kind} | {field: getattr(message, field) for field in FIELDS[kind]}
+            if kind == "stage":
+                dragon = message.dragons[0]
+                line |= {field: getattr(dragon, field) for field in ("benches", "segments", "body_length")}
             if kind == "frame":
                 line |= {"count": count, "link": math.dist(*map(lambda xy: tuple(map(float, xy)), handles))}
             print(json.dumps(line))

@@ -3,8 +3,8 @@
 //! It keeps no counts: the [`feed`](super::feed), which calls it, decides when to open, to read and to disconnect. A
 //! service can have more than one publisher: `selected` has the one whose messages are read.
 
-mod scene;
 mod selected;
+mod slices;
 
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
@@ -23,11 +23,11 @@ use crate::layouts;
 use crate::shared_memory::MOST_PUBLISHERS;
 use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
 use bench_dragon_messages::{
-    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
+    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus,
+    SceneHeader, Stage, StageSegment,
 };
-use scene::SceneReceiver;
-pub use scene::SceneSample;
 use selected::{OfRun, Origin, Selected, publishers};
+pub use slices::{SceneSample, StageSample};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 type PoseSample = Sample<ipc::Service, [HandlePose], FrameHeader>;
@@ -45,8 +45,8 @@ pub struct Connection {
     expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
-    stage: Option<Receiver<Stage, ()>>,
-    scene: Option<SceneReceiver>,
+    stage: Option<Receiver<[StageSegment], Stage>>,
+    scene: Option<Receiver<[u8], SceneHeader>>,
     chase: Option<Receiver<ChaseStatus, ()>>,
     tick: Option<Listener<ipc::Service>>,
     selection: Selection,
@@ -131,8 +131,8 @@ impl Subscription {
             self.service::<CollisionAlert>("alerts")?;
             self.service::<Cue>("cues")?;
             self.service::<LoopStatus>("status")?;
-            self.service::<Stage>("stage")?;
-            self.scene_service()?;
+            self.slices::<StageSegment, Stage>("stage")?;
+            self.slices::<u8, SceneHeader>("scene")?;
             return Ok(None);
         }
         check_room_to_subscribe()?;
@@ -152,8 +152,8 @@ impl Subscription {
             expects_cues: false,
             status: self.receiver("status")?,
             status_service: self.service("status")?,
-            stage: self.receiver("stage")?,
-            scene: self.scene_receiver()?,
+            stage: self.slice_receiver("stage")?,
+            scene: self.slice_receiver("scene")?,
             chase: self.receiver("chase")?,
             tick: self.listener(),
             selection: Selection::Undecided { statuses: Vec::new() },
@@ -225,10 +225,10 @@ impl Subscription {
             connection.status_service = self.service("status")?;
         }
         if connection.stage.is_none() {
-            connection.stage = self.receiver("stage")?;
+            connection.stage = self.slice_receiver("stage")?;
         }
         if connection.scene.is_none() {
-            connection.scene = self.scene_receiver()?;
+            connection.scene = self.slice_receiver("scene")?;
         }
         if connection.chase.is_none() {
             connection.chase = self.receiver("chase")?;
@@ -391,12 +391,6 @@ impl Connection {
             any = true;
         }
         any
-    }
-
-    /// Returns the next stage, if one has come.
-    pub fn stage(&mut self) -> Option<Stage> {
-        self.decide();
-        self.next(self.stage.as_ref())
     }
 
     /// Returns the next status of a chase of this run, if one has come.

@@ -256,6 +256,9 @@ impl SceneName {
     /// The greatest length of a name, bytes in UTF-8.
     pub const CAPACITY: usize = SCENE_NAME_BYTES;
 
+    /// The name without a letter.
+    pub(crate) const EMPTY: Self = Self([0; SCENE_NAME_BYTES]);
+
     /// Creates a name, cut to the bytes that there is room for.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; SCENE_NAME_BYTES];
@@ -273,7 +276,7 @@ impl SceneName {
 
 impl Default for SceneName {
     fn default() -> Self {
-        Self([0; SCENE_NAME_BYTES])
+        Self::EMPTY
     }
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{HasStamp, Header, Pose, Time, Xyz, level_of};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, bench_name, state_sentence};
 use bench_dragon_messages::state::{FrameState, Severity};
-use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage, StageDragon};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 
@@ -175,9 +175,9 @@ pub struct MarkerArray {
 impl MarkerArray {
     /// Creates the markers of a stage, without positions.
     pub fn of(stage: &Stage) -> Self {
-        let width = stage.width;
+        let StageDragon { head_length, body_length, width, benches, .. } = *stage.first_dragon();
         let bench = |bench: u32| {
-            let length = if bench == 0 { stage.head_length } else { stage.body_length };
+            let length = if bench == 0 { head_length } else { body_length };
             Marker { scale: Xyz { x: length, y: width, z: BENCH_HEIGHT }, ..Marker::new("benches", bench as i32, CUBE) }
         };
         let sign = |ns, shape, scale| Marker { scale, color: colour(Severity::Error), ..Marker::new(ns, 0, shape) };
@@ -186,7 +186,7 @@ impl MarkerArray {
         let contact = sign("contact", SPHERE, Xyz { x: width, y: width, z: width });
         let coming =
             Marker { points: ring(width), ..sign("coming", LINE_LIST, Xyz { x: 0.3 * width, y: 0.0, z: 0.0 }) };
-        let mut markers: Vec<Marker> = (0..stage.benches).map(bench).collect();
+        let mut markers: Vec<Marker> = (0..benches).map(bench).collect();
         markers.extend([contact, coming, words("sentence", 0)]);
         markers.extend((0..MOST_NAMED as i32).map(|id| words("numbers", id)));
         Self { markers, latest_deadline_ns: 0 }
@@ -211,16 +211,17 @@ impl MarkerArray {
         stage: &Stage,
         alert: Option<&CollisionAlert>,
     ) {
+        let dragon = *stage.first_dragon();
         let stamp = Time::of(frame.stamp_ns);
         let lifetime = self.lifetime(frame);
         self.markers.iter_mut().for_each(|marker| marker.lifetime = lifetime);
         let level = level_of(alert);
         let alert = alert.filter(|_| level.severity() > Severity::Ok);
         let named = alert.map_or_else(Vec::new, |alert| named(alert, level.has_happened()));
-        let (benches, signs) = self.markers.split_at_mut(stage.benches as usize);
+        let (benches, signs) = self.markers.split_at_mut(dragon.benches as usize);
         for (bench, (marker, pair)) in benches.iter_mut().zip(handles.windows(2)).enumerate() {
             let points = [Point::new(pair[0].x, pair[0].y), Point::new(pair[1].x, pair[1].y)];
-            let centre = Board::from_handles(points[0], points[1], stage.hole_inset, stage.width).centre;
+            let centre = Board::from_handles(points[0], points[1], dragon.hole_inset, dragon.width).centre;
             marker.header.stamp = stamp;
             marker.pose = Pose::flat(centre.x, centre.y, pair[0].heading);
             marker.color = match (named.iter().find(|(one, _)| *one == bench as u32), bench) {
@@ -236,11 +237,11 @@ impl MarkerArray {
         sentence.text = words(frame, stage, alert).unwrap_or_default();
         // Above the ring; without one, above the head.
         let head = handles.first().map(|head| (head.x, head.y));
-        let above = place.or(head).map(|(x, y)| (x, y + (RING_RADIUS + 2.0) * stage.width));
+        let above = place.or(head).map(|(x, y)| (x, y + (RING_RADIUS + 2.0) * dragon.width));
         put(sentence, stamp, above.filter(|_| !sentence.text.is_empty()));
         for (k, marker) in numbers.iter_mut().enumerate() {
             let bench = named.get(k);
-            marker.text = bench.map_or_else(String::new, |(bench, _)| bench_name(*bench, stage.benches));
+            marker.text = bench.map_or_else(String::new, |(bench, _)| bench_name(*bench, dragon.benches));
             let at = bench.and_then(|(bench, _)| benches.get(*bench as usize)).map(|marker| &marker.pose.position);
             put(marker, stamp, at.map(|place| (place.x, place.y)));
         }
@@ -285,7 +286,7 @@ fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> 
     let of = |alert: &CollisionAlert| {
         // Alerts come once a second, frames more often.
         let now = CollisionAlert { time_to_event: alert.event_time - frame.sim_time, ..*alert };
-        alert_sentence(&now, stage.benches, Figures::Shown { time_scale: frame.time_scale })
+        alert_sentence(&now, stage.first_dragon().benches, Figures::Shown { time_scale: frame.time_scale })
     };
     state.map(str::to_owned).or_else(|| alert.map(of))
 }
@@ -311,10 +312,12 @@ fn colour(severity: Severity) -> Color {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::List;
 
     #[test]
     fn a_marker_lives_some_periods_and_at_least_a_second_of_either_clock() {
-        let stage = Stage { benches: 3, ..Stage::default() };
+        let dragons = List::of([StageDragon { benches: 3, ..StageDragon::default() }]);
+        let stage = Stage { dragons, ..Stage::default() };
         let mut markers = MarkerArray::of(&stage);
         let mut lifetime = |seconds: f64, time_scale: f64| {
             let frame = FrameHeader { deadline_ns: (seconds * 1e9) as u64, time_scale, ..FrameHeader::default() };

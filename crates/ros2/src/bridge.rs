@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_client::polling::Handler;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, StageMessage};
 use bench_dragon_ros2_messages::settings::{Ros2Settings, StampClock};
 use bench_dragon_show::scene::Scene;
 
@@ -89,7 +89,7 @@ struct ShowBridge {
     /// The settings in place of those of the scene.
     settings: Option<Ros2Settings>,
     connected: bool,
-    stage: Option<Stage>,
+    stage: Option<StageMessage>,
     scene: Option<ShowScene>,
     /// The latest alert and cue of a show whose topics are not open yet.
     alert: Option<CollisionAlert>,
@@ -203,7 +203,9 @@ impl ShowBridge {
 
     fn handle(&mut self, event: FeedEvent<'_>, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
         match event {
-            FeedEvent::Stage(stage) => self.stage = Some(*stage),
+            FeedEvent::Stage { stage, segments } => {
+                self.stage = Some(StageMessage { stage: *stage, segments: segments.to_vec() });
+            }
             FeedEvent::Scene { header, text } => self.scene = Some(ShowScene::of(header.run_id, text)),
             FeedEvent::Started { run_id } => {
                 self.close();
@@ -236,7 +238,7 @@ impl ShowBridge {
 
     /// Drops what belongs to another run than `run_id`.
     fn forget_other_runs(&mut self, run_id: u64) {
-        self.stage = self.stage.filter(|stage| stage.run_id == run_id);
+        self.stage = self.stage.take().filter(|message| message.stage.run_id == run_id);
         self.scene = self.scene.take().filter(|scene| scene.run_id == run_id);
         self.alert = self.alert.filter(|alert| alert.run_id == run_id);
         self.cue = self.cue.filter(|cue| cue.run_id == run_id);
@@ -266,7 +268,7 @@ impl ShowBridge {
 
     fn open(&mut self, header: &FrameHeader, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
         let waited = self.waiting_since.get_or_insert_with(Instant::now).elapsed();
-        let Some(stage) = self.stage else { return Ok(None) };
+        let Some(stage) = self.stage.clone() else { return Ok(None) };
         let scene = match self.scene.take() {
             Some(scene) => scene,
             None if waited < SCENE_TIMEOUT => return Ok(None),
@@ -279,7 +281,7 @@ impl ShowBridge {
         let DdsNetwork { context, matches, control, stamps } = network;
         let settings = self.settings.clone().unwrap_or(settings);
         let settings = Ros2Settings { stamps: stamps.unwrap_or(settings.stamps), ..settings };
-        let (name, cues) = (self.name.clone(), stage.cues as usize);
+        let (name, cues) = (self.name.clone(), stage.stage.cues as usize);
         let rate = settings.greatest_rate();
         let topic_names = topic_names(&name, &settings, alerts, cues);
         let config = Ros2Config { name, handles: header.handles as usize, rate, settings, alerts, cues, stage };

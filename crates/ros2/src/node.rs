@@ -13,7 +13,7 @@ use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFact
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon_messages::state::Severity;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
@@ -31,12 +31,12 @@ const LINGER: Duration = Duration::from_millis(100);
 /// The writers that the scene requests, and their messages, whose memory is reused.
 pub(super) struct Topics {
     name: String,
-    stage: Stage,
+    stage: StageMessage,
     handles: Option<Stream<HandlePoses>>,
     poses: Option<Stream<PoseArray>>,
     markers: Option<Stream<MarkerArray>>,
     alerts: Option<TopicWriter<Stamped<CollisionAlert>>>,
-    stages: Option<TopicWriter<Stamped<Stage>>>,
+    stages: Option<TopicWriter<Stamped<StageMessage>>>,
     status: Option<TopicWriter<Stamped<LoopStatus>>>,
     diagnostics: Option<TopicWriter<DiagnosticArray>>,
     cues: Option<TopicWriter<Stamped<Cue>>>,
@@ -73,22 +73,23 @@ pub(super) fn open(context: &Context, name: &str) -> Result<Node, Ros2Error> {
 
 impl Topics {
     pub(super) fn open(context: Context, node: Node, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
-        let Ros2Config { stage, handles, .. } = config;
+        let Ros2Config { ref stage, handles, .. } = config;
         let mut maker = WriterFactory { context, node, config: &config };
         let rosout = Rosout::open(&maker.context, &mut maker.node, &config.name)?;
         // Stage and path hold at any simulated time.
         let stamps = config.settings.stamps;
-        let unchanging = stamps.at(stage.stamp_ns, 0.0);
-        let path = Arc::new(Path::of(&stage).at(unchanging));
+        let unchanging = stamps.at(stage.stage.stamp_ns, 0.0);
+        let path = Arc::new(Path::of(stage).at(unchanging));
         let path_bytes = EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES;
+        let stage_bytes = EVENT_BYTES + size_of_val(&stage.segments[..]);
         let mut topics = Self {
             name: config.name.clone(),
-            stage,
+            stage: stage.clone(),
             handles: maker.stream(Topic::Handles, 40, || HandlePoses::of(handles))?,
             poses: maker.stream(Topic::Poses, 56, || PoseArray::of(handles))?,
-            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(&stage))?,
+            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(&stage.stage))?,
             alerts: if config.alerts { maker.port(Topic::Alerts, EVENT_BYTES, 1.0)? } else { None },
-            stages: maker.port(Topic::Stage, EVENT_BYTES, 1.0)?,
+            stages: maker.port(Topic::Stage, stage_bytes, 1.0)?,
             status: maker.port(Topic::Status, EVENT_BYTES, 1.0)?,
             diagnostics: maker.port(Topic::Diagnostics, EVENT_BYTES, 1.0)?,
             cues: if config.cues > 0 { maker.port(Topic::Cues, EVENT_BYTES, 1.0)? } else { None },
@@ -109,7 +110,7 @@ impl Topics {
         };
         // The messages that do not change.
         if let Some(port) = &mut topics.stages {
-            port.send(Arc::new(Stamped::stage(stage).at(unchanging)), &mut topics.discarded);
+            port.send(Arc::new(Stamped::stage(stage.clone()).at(unchanging)), &mut topics.discarded);
         }
         if let Some(port) = &mut topics.path {
             port.send(path, &mut topics.discarded);
@@ -153,7 +154,7 @@ impl Topics {
         }
         if let Some(stream) = &mut self.markers {
             let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
-            stream.publish(discarded, stamp, |message| message.update(header, handles, stage, alert));
+            stream.publish(discarded, stamp, |message| message.update(header, handles, &stage.stage, alert));
         }
     }
 
@@ -162,7 +163,7 @@ impl Topics {
         self.latest_alert = Some(alert);
         if let Some(level) = alert.alert_level() {
             let figures = Figures::Shown { time_scale: self.time_scale };
-            let sentence = alert_sentence(&alert, self.stage.benches, figures);
+            let sentence = alert_sentence(&alert, self.stage.stage.first_dragon().benches, figures);
             self.rosout.tell(level.severity(), format!("{}: {sentence}", level.name()));
         }
         if let Some(port) = &mut self.alerts {
@@ -215,7 +216,9 @@ mod tests {
 
     use super::*;
     use crate::topic_writer::HEADER_BYTES;
-    use bench_dragon_messages::{SEGMENT_ARC, SceneName, StageSegment};
+    use bench_dragon_messages::{
+        List, SEGMENT_ARC, SceneName, Stage, StageCue, StageDragon, StageEvent, StageObstacle, StageSegment,
+    };
 
     fn bytes<Message: Serialize>(message: &Message) -> usize {
         CDRSerializerAdapter::<Message>::to_bytes(message).unwrap().len()
@@ -234,10 +237,19 @@ mod tests {
         };
         let limits = DiagnosticLimits { lateness_warn: 0.0, ..DiagnosticLimits::default() };
         let second = LoopSecond { before: &status, discarded: u64::MAX, discarded_before: 0, limits };
+        let name = SceneName::new(&"n".repeat(100));
+        let stage = Stage {
+            dragons: List::of([StageDragon { name, ..StageDragon::default() }; 100]),
+            obstacles: List::of([StageObstacle { name, ..StageObstacle::default() }; 100]),
+            events: List::of([StageEvent::default(); 1000]),
+            cue_list: List::of([StageCue { name, ..StageCue::default() }; 100]),
+            ..Stage::default()
+        };
+        let stage = StageMessage { stage, segments: Vec::new() };
         // iceoryx2 takes no longer name.
         let diagnostics = DiagnosticArray::of(&"n".repeat(255), &worst, Some(&alert), &second);
         let events = [
-            bytes(&Stamped::stage(Stage::default())),
+            bytes(&Stamped::stage(stage)),
             bytes(&Stamped::status(status)),
             bytes(&Stamped::alert(alert)),
             bytes(&diagnostics),
@@ -245,9 +257,9 @@ mod tests {
             bytes(&Clock::of(&FrameHeader::default())),
         ];
         assert!(events.iter().all(|bytes| *bytes < EVENT_BYTES), "{events:?} bytes of {EVENT_BYTES}");
-        let mut stage = Stage { segments: 1, ..Stage::default() };
-        stage.path[0] = StageSegment { length: 10.0, curvature: 10.0, kind: SEGMENT_ARC, ..StageSegment::default() };
-        let path = Path::of(&stage);
+        let arc = StageSegment { length: 10.0, curvature: 10.0, kind: SEGMENT_ARC, ..StageSegment::default() };
+        let dragons = List::of([StageDragon { segments: 1, ..StageDragon::default() }]);
+        let path = Path::of(&StageMessage { stage: Stage { dragons, ..Stage::default() }, segments: vec![arc] });
         assert!(path.poses.len() > 1000 && bytes(&path) < EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES);
         let transforms = bytes(&TfMessage::of(&"n".repeat(255)));
         assert!(transforms < TRANSFORMS_BYTES, "{transforms}");

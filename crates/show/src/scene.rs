@@ -8,7 +8,7 @@ pub mod cue;
 pub mod path;
 pub mod precision;
 pub mod ros2;
-mod stage;
+pub(crate) mod stage;
 mod text;
 
 use std::path::Path as FilePath;

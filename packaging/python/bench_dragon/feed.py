@@ -27,6 +27,7 @@ from bench_dragon.layouts import (
     Message,
     SceneHeader,
     Stage,
+    StageSegment,
 )
 from bench_dragon.services import new_node, open_messages
 
@@ -118,11 +119,15 @@ class Feed:
         """Returns the statuses of the publisher's loop since the last call, one a second."""
         return self._messages("status", LoopStatus)
 
-    def stage(self) -> Stage | None:
-        """Returns the geometry and time line of a show that has begun since the last call."""
+    def stage(self) -> tuple[Stage, ctypes.Array[StageSegment]] | None:
+        """Returns geometry and time line of a show that has begun since the last call, and the segments of its paths."""
         stage = None
-        for stage in self._messages("stage", Stage):
-            pass
+        port = self._port("stage", iox2.Slice[StageSegment], Stage)
+        while port is not None and (sample := port.receive()) is not None:
+            segments = StageSegment * sample.header.number_of_elements
+            memory = ctypes.string_at(sample.payload_ptr, ctypes.sizeof(segments))
+            stage = Stage.from_buffer_copy(sample.user_header().contents), segments.from_buffer_copy(memory)
+            sample.delete()
         return stage
 
     def scene(self) -> tuple[SceneHeader, str] | None:

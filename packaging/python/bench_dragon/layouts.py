@@ -9,7 +9,8 @@ publisher with another layout is refused.
 from __future__ import annotations
 
 import ctypes
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 # The bench number that means "no bench".
 NO_BENCH = 0xFFFFFFFF
@@ -90,6 +91,18 @@ SEGMENTS = (
     "outward_spiral",
 )
 
+# The values of `StageObstacle.kind`.
+OBSTACLES = (
+    # A disc.
+    "circle",
+    # A polygon with its interior.
+    "polygon",
+    # An open line: a barrier.
+    "line",
+    # The boundary: boards stay inside.
+    "boundary",
+)
+
 
 class Message(ctypes.Structure):
     """A message in memory, or a part of one."""
@@ -101,6 +114,24 @@ class Message(ctypes.Structure):
     def type_name(cls) -> str:
         """Returns the name that iceoryx2 compares with the publisher's."""
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+
+
+def _list(element: type[Message], most: int) -> type[ctypes.Structure]:
+    """Returns the type of a list with room for `most` elements. `len()`, an index and `for` see those in use."""
+
+    class List(ctypes.Structure):
+        ELEMENT = element
+        length: int
+        items: ctypes.Array[Any]
+        _fields_ = [("length", ctypes.c_uint32), ("reserved", ctypes.c_uint32), ("items", element * most)]
+
+        def __len__(self) -> int:
+            return min(self.length, most)
+
+        def __getitem__(self, index: int) -> Any:
+            return self.items[: len(self)][index]
+
+    return List
 
 
 class HandlePose(Message):
@@ -546,9 +577,13 @@ class ControlResponse(Message):
 
 
 class StageSegment(Message):
-    """One segment of the path in a `Stage`."""
+    """One segment of a path, or of an obstacle's outline. A circle is an arc of a full turn; a polygon's last line ends
+    where the first begins.
 
-    LAYOUT = 3
+    Over iceoryx2 the payload of `<name>/stage` is a slice of these. Layout 6 added the pitch.
+    """
+
+    LAYOUT = 6
     # Its beginning, metres right of the centre.
     x: float
     # Its beginning, metres up from the centre.
@@ -566,6 +601,8 @@ class StageSegment(Message):
     theta_first: float
     # Of a spiral, the polar angle at which it ends, radians; else NaN.
     theta_last: float
+    # Of a spiral, metres per turn; else NaN.
+    pitch: float
     # The kind of curve: one of `SEGMENTS`.
     kind: int
     # Always 0.
@@ -578,6 +615,7 @@ class StageSegment(Message):
         ("curvature", ctypes.c_double),
         ("theta_first", ctypes.c_double),
         ("theta_last", ctypes.c_double),
+        ("pitch", ctypes.c_double),
         ("kind", ctypes.c_uint32),
         ("reserved", ctypes.c_uint32),
     ]
@@ -602,19 +640,96 @@ class SceneHeader(Message):
     ]
 
 
+class StageDragon(Message):
+    """A dragon of the show in a `Stage`.
+
+    The head's board and the other boards can differ in length. The team may stand further back than the first segment
+    begins, on the same spiral or line.
+    """
+
+    LAYOUT = 6
+    # Metres along the head's board.
+    head_length: float
+    # Metres along every other board.
+    body_length: float
+    # Metres across every board.
+    width: float
+    # Metres from the centre of a handle's hole to the nearest end of the board.
+    hole_inset: float
+    # Metres per turn of the spiral on which the head starts, or else of the first one; NaN if the path has none.
+    pitch: float
+    # The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
+    start_turn: float
+    # The number of its first handle. Bench i joins handles i and i + 1, so it is the head's number too.
+    first_handle: int
+    # The number of its benches; one less than the number of its handles.
+    benches: int
+    # The index of the first segment of its path in the list of segments. They are in the order of travel.
+    first_segment: int
+    # The number of segments of its path.
+    segments: int
+    # Its name; empty if it is the only dragon of the show.
+    name: ctypes.Array[ctypes.c_uint8]
+    _fields_ = [
+        ("head_length", ctypes.c_double),
+        ("body_length", ctypes.c_double),
+        ("width", ctypes.c_double),
+        ("hole_inset", ctypes.c_double),
+        ("pitch", ctypes.c_double),
+        ("start_turn", ctypes.c_double),
+        ("first_handle", ctypes.c_uint32),
+        ("benches", ctypes.c_uint32),
+        ("first_segment", ctypes.c_uint32),
+        ("segments", ctypes.c_uint32),
+        ("name", ctypes.c_uint8 * 64),
+    ]
+
+
+class StageObstacle(Message):
+    """An obstacle of the show in a `Stage`, or its boundary."""
+
+    LAYOUT = 6
+    # Metres that every board has to stay away.
+    keep_out: float
+    # The kind of shape: one of `OBSTACLES`.
+    kind: int
+    # The index of the first segment of its outline in the list of segments.
+    first_segment: int
+    # The number of segments of its outline.
+    segments: int
+    # Always 0.
+    reserved: int
+    # Its name.
+    name: ctypes.Array[ctypes.c_uint8]
+    _fields_ = [
+        ("keep_out", ctypes.c_double),
+        ("kind", ctypes.c_uint32),
+        ("first_segment", ctypes.c_uint32),
+        ("segments", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
+        ("name", ctypes.c_uint8 * 64),
+    ]
+
+
 class StageEvent(Message):
     """An event of the show in a `Stage`."""
 
-    LAYOUT = 4
+    LAYOUT = 6
     # Simulated seconds at which it happens.
     time: float
     # The event, as the state that it leads to: one of `STATES`.
     state: int
+    # The first bench of the event, from 0; 4294967295 if it has none.
+    bench_a: int
+    # The second bench, or the number of an obstacle; 4294967295 if it has none.
+    bench_b: int
     # Always 0.
     reserved: int
     _fields_ = [
         ("time", ctypes.c_double),
         ("state", ctypes.c_uint32),
+        ("bench_a", ctypes.c_uint32),
+        ("bench_b", ctypes.c_uint32),
         ("reserved", ctypes.c_uint32),
     ]
 
@@ -642,67 +757,49 @@ class StageCue(Message):
 class Stage(Message):
     """The geometry and the time line of a show, for drawing them. Sent at the start and kept for late joiners.
 
-    The head's board and the other boards can differ in length. The team may stand further back than the first segment
-    begins, on the same spiral or line.
+    The segments of all paths and outlines stand in one list: first those of the dragons, then those of the obstacles.
+    Handles are numbered through all dragons. In the bench fields of alerts and events the number of handles plus j is
+    the obstacle j, from 0.
 
-    Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
-    layout 4 added the time line: the freeze time, the events and the cues, layout 5 the hash of the scene's text.
+    Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments
+    of the path, layout 3 gave them their name, layout 4 added the time line: the freeze time, the events and the cues,
+    layout 5 the hash of the scene's text, layout 6 the dragons, the obstacles and a path of any length.
     """
 
-    LAYOUT = 5
+    LAYOUT = 6
     # The run, as `FrameHeader.run_id`.
     run_id: int
     # CLOCK_REALTIME in nanoseconds when this was written.
     stamp_ns: int
-    # Metres per turn of the spiral or spirals; NaN if the path has none.
-    pitch: float
-    # The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
-    start_turn: float
-    # Metres from the centre of a handle's hole to the nearest end of the board.
-    hole_inset: float
-    # Metres along the head's board.
-    head_length: float
-    # Metres along every other board.
-    body_length: float
-    # Metres across every board.
-    width: float
     # Simulated seconds at which the show freezes: a seek reaches no later time.
     freeze_time: float
-    # The number of benches; one less than the number of handles.
-    benches: int
-    # The number of segments in use, at most 32.
-    segments: int
-    # The number of events in use, at most 4; a scene without `[alerts]` has its last one only.
-    events: int
     # The number of cues in the show; the first 32 of them are listed.
     cues: int
+    # Always 0.
+    reserved: int
     # BLAKE3 of the scene's text, as `verify` prints it of a certificate: the proofs of that text hold for this show.
     # All zero if it is not known.
     scene_hash: ctypes.Array[ctypes.c_uint8]
-    # The segments of the path in the order of travel; those not in use are zero.
-    path: ctypes.Array[StageSegment]
-    # The events in order of time; those not in use are zero. Those after the freeze time are not reached.
-    timeline: ctypes.Array[StageEvent]
-    # The cues in order of time; those not in use are zero.
-    cue_list: ctypes.Array[StageCue]
+    # The dragons in the order of their handles.
+    dragons: Sequence[StageDragon]
+    # The obstacles in the order of the scene; the boundary, if there is one, stands last.
+    obstacles: Sequence[StageObstacle]
+    # The events in order of time: the first of each kind of each dragon and of each obstacle. Those after the freeze
+    # time are not reached. A scene without `[alerts]` has its last one only.
+    events: Sequence[StageEvent]
+    # The cues in order of time.
+    cue_list: Sequence[StageCue]
     _fields_ = [
         ("run_id", ctypes.c_uint64),
         ("stamp_ns", ctypes.c_uint64),
-        ("pitch", ctypes.c_double),
-        ("start_turn", ctypes.c_double),
-        ("hole_inset", ctypes.c_double),
-        ("head_length", ctypes.c_double),
-        ("body_length", ctypes.c_double),
-        ("width", ctypes.c_double),
         ("freeze_time", ctypes.c_double),
-        ("benches", ctypes.c_uint32),
-        ("segments", ctypes.c_uint32),
-        ("events", ctypes.c_uint32),
         ("cues", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
         ("scene_hash", ctypes.c_uint8 * 32),
-        ("path", StageSegment * 32),
-        ("timeline", StageEvent * 4),
-        ("cue_list", StageCue * 32),
+        ("dragons", _list(StageDragon, 16)),
+        ("obstacles", _list(StageObstacle, 65)),
+        ("events", _list(StageEvent, 160)),
+        ("cue_list", _list(StageCue, 32)),
     ]
 
 

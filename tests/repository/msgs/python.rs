@@ -12,7 +12,8 @@ publisher with another layout is refused.
 from __future__ import annotations
 
 import ctypes
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 "#;
 
@@ -28,6 +29,24 @@ class Message(ctypes.Structure):
     def type_name(cls) -> str:
         """Returns the name that iceoryx2 compares with the publisher's."""
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+
+
+def _list(element: type[Message], most: int) -> type[ctypes.Structure]:
+    """Returns the type of a list with room for `most` elements. `len()`, an index and `for` see those in use."""
+
+    class List(ctypes.Structure):
+        ELEMENT = element
+        length: int
+        items: ctypes.Array[Any]
+        _fields_ = [("length", ctypes.c_uint32), ("reserved", ctypes.c_uint32), ("items", element * most)]
+
+        def __len__(self) -> int:
+            return min(self.length, most)
+
+        def __getitem__(self, index: int) -> Any:
+            return self.items[: len(self)][index]
+
+    return List
 "#;
 
 /// Returns the module.
@@ -64,7 +83,10 @@ pub fn module(source: &Source) -> String {
     for layout in &source.layouts {
         text += &class(source, layout);
     }
-    let is_part = |name: &str| source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name));
+    let is_part = |name: &str| {
+        // The elements of a list are no message; the segments are the payload of the stage.
+        name == "StageSegment" || source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name))
+    };
     let sent: Vec<_> = names.into_iter().filter(|name| !is_part(name)).collect();
     text += "\n\n# Every message that is sent as a whole.\nMESSAGES: tuple[type[Message], ...] = (\n";
     sent.into_iter().for_each(|name| text += &format!("    {name},\n"));
@@ -83,7 +105,7 @@ impl Kind {
     fn holds(&self, layout: &str) -> bool {
         match self {
             Kind::Layout(name) => name == layout,
-            Kind::Array(element, _) => element.holds(layout),
+            Kind::Array(element, _) | Kind::List(element, _) => element.holds(layout),
             Kind::Number(_) | Kind::Text(_) => false,
         }
     }
@@ -156,6 +178,7 @@ fn type_name(kind: &Kind) -> String {
         Kind::Text(bytes) => format!("ctypes.c_uint8 * {bytes}"),
         Kind::Layout(name) => name.clone(),
         Kind::Array(element, length) => format!("{} * {length}", type_name(element)),
+        Kind::List(element, most) => format!("_list({}, {most})", type_name(element)),
     }
 }
 
@@ -167,5 +190,6 @@ fn type_hint(kind: &Kind) -> String {
         Kind::Text(_) => "ctypes.Array[ctypes.c_uint8]".to_owned(),
         Kind::Layout(name) => name.clone(),
         Kind::Array(element, _) => format!("ctypes.Array[{}]", type_name(element)),
+        Kind::List(element, _) => format!("Sequence[{}]", type_name(element)),
     }
 }

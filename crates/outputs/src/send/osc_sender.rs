@@ -151,7 +151,7 @@ impl OscSender {
                 self.latest = Some((*header, handles.first().copied().unwrap_or_default()));
                 self.due |= self.pace.is_due(header);
             }
-            FeedEvent::Stage(stage) => self.stage = Some(*stage),
+            FeedEvent::Stage { stage, .. } => self.stage = Some(*stage),
             FeedEvent::Alert(alert) => self.take_alert(alert),
             FeedEvent::Cue(cue) => self.take_cue(cue),
             FeedEvent::Gone => self.stage = None,

@@ -35,7 +35,7 @@ function onSpiral(a, angle) {
  * How a segment's spiral stands on the stage: its centre `x`, `y`, and the direction `c`, `s` of its x axis; `side` is -1
  * where it is mirrored. Its beginning and the side to which it bends say so; without a curvature it is about the origin.
  */
-export function spiralFrame({ kind, x, y, heading, curvature, theta_first }, pitch) {
+export function spiralFrame({ kind, x, y, heading, curvature, theta_first, pitch }) {
   if (curvature === null) return { x: 0, y: 0, c: 1, s: 0, side: 1 };
   const inward = kind === "inward_spiral", a = (inward ? pitch : -pitch) / (2 * Math.PI);
   const [px, py, dx, dy] = onSpiral(a, theta_first), side = Math.sign(inward ? -curvature : curvature);
@@ -45,19 +45,19 @@ export function spiralFrame({ kind, x, y, heading, curvature, theta_first }, pit
 }
 
 /** The place of the centre of a stage's spirals; the origin where it has none. */
-export function centreOf({ pitch, path }) {
+export function centreOf({ path }) {
   const spiral = path.find(({ kind }) => kind.endsWith("_spiral"));
-  return spiral ? spiralFrame(spiral, pitch) : { x: 0, y: 0 };
+  return spiral ? spiralFrame(spiral) : { x: 0, y: 0 };
 }
 
 /**
  * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach` from its centre,
  * where the team stands.
  */
-export function pathOf({ pitch, path: segments }, reach) {
+export function pathOf({ path: segments }, reach) {
   const path = new Path2D();
   for (const segment of segments) {
-    const { kind, x, y, heading, length, curvature, theta_first, theta_last } = segment;
+    const { kind, x, y, heading, length, curvature, theta_first, theta_last, pitch } = segment;
     const c = Math.cos(heading), s = Math.sin(heading);
     if (kind === "line") {
       path.moveTo(x, y);
@@ -67,9 +67,9 @@ export function pathOf({ pitch, path: segments }, reach) {
       path.moveTo(x, y);
       path.arc(cx, cy, 1 / Math.abs(curvature), from, from + curvature * length, curvature < 0);
     } else if (kind === "inward_spiral") {
-      addSpiral(path, spiralFrame(segment, pitch), pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
+      addSpiral(path, spiralFrame(segment), pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
     } else {
-      addSpiral(path, spiralFrame(segment, pitch), -pitch, theta_first, theta_last);
+      addSpiral(path, spiralFrame(segment), -pitch, theta_first, theta_last);
     }
   }
   return path;

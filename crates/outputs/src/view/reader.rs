@@ -9,7 +9,7 @@ use tokio::sync::watch;
 
 use super::{Picture, Proofs, SceneHash, wire};
 use bench_dragon_client::feed::{Feed, FeedEvent};
-use bench_dragon_messages::{LoopStatus, Stage};
+use bench_dragon_messages::{LoopStatus, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
 
 /// The interval of polls: some browsers draw 240 times a second, none needs more. Waking this thread at each frame
@@ -60,7 +60,7 @@ struct Reader<'a> {
     /// The publisher's name.
     publisher: String,
     proofs: &'a Proofs,
-    stage: Option<Stage>,
+    stage: Option<StageMessage>,
     /// The proofs of the scene of that stage.
     proved: Option<Arc<[ProvedEvent]>>,
     /// The scene for which the log has the warning that no certificate is for it.
@@ -75,19 +75,19 @@ impl Reader<'_> {
     /// Applies an event. Returns true if the picture changed.
     fn handle(&mut self, event: FeedEvent<'_>) -> bool {
         match event {
-            FeedEvent::Stage(stage) => {
-                self.stage = Some(*stage);
+            FeedEvent::Stage { stage, segments } => {
+                self.stage = Some(StageMessage { stage: *stage, segments: segments.to_vec() });
                 self.proved = self.proofs.of(&stage.scene_hash);
                 self.describe();
                 self.warn_of_another_scene();
             }
             FeedEvent::Alert(alert) => {
-                let benches = self.stage.map_or(0, |stage| stage.benches);
+                let benches = self.stage().map_or(0, |stage| stage.first_dragon().benches);
                 self.picture.alert = wire::alert(alert, benches).into();
             }
             FeedEvent::Cue(cue) => {
                 self.cues += 1;
-                let most = self.stage.map_or(0, |stage| stage.cues as usize).max(KEPT_CUES);
+                let most = self.stage().map_or(0, |stage| stage.cues as usize).max(KEPT_CUES);
                 let kept = self.picture.cues.iter().rev().take(most - 1).rev().cloned();
                 self.picture.cues = kept.chain([(self.cues, wire::cue(cue).into())]).collect();
             }
@@ -113,9 +113,13 @@ impl Reader<'_> {
         true
     }
 
+    fn stage(&self) -> Option<&Stage> {
+        self.stage.as_ref().map(|message| &message.stage)
+    }
+
     /// Looks for proofs of the scene that came after its stage. Returns true if they change the picture.
     fn look_for_proof(&mut self) -> bool {
-        let Some(stage) = self.stage.as_ref().filter(|_| self.proved.is_none()) else { return false };
+        let Some(stage) = self.stage().filter(|_| self.proved.is_none()) else { return false };
         self.proved = self.proofs.of(&stage.scene_hash);
         if self.proved.is_some() {
             self.describe();
@@ -125,7 +129,7 @@ impl Reader<'_> {
 
     /// Warns once for each scene that all certificates are for other scenes.
     fn warn_of_another_scene(&mut self) {
-        let Some(stage) = self.stage.as_ref().filter(|stage| self.proofs.are_of_others(&stage.scene_hash)) else {
+        let Some(stage) = self.stage().copied().filter(|stage| self.proofs.are_of_others(&stage.scene_hash)) else {
             return;
         };
         if self.unproved.replace(stage.scene_hash) != Some(stage.scene_hash) {
@@ -140,7 +144,7 @@ impl Reader<'_> {
     /// Updates the message about the stage, with the scene's name when it is known.
     fn describe(&mut self) {
         let Some(stage) = &self.stage else { return };
-        let status = self.status.as_ref().filter(|status| status.run_id == stage.run_id);
+        let status = self.status.as_ref().filter(|status| status.run_id == stage.stage.run_id);
         let scene = status.map(|status| status.scene.as_str());
         self.picture.stage = wire::stage(stage, &self.publisher, scene, self.proved.as_deref()).into();
     }

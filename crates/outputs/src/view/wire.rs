@@ -27,7 +27,7 @@ use serde_json::{Value, json};
 use bench_dragon_messages::json::{AlertObject, CueObject, Exact, StageObject};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Level, Severity};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, StageMessage};
 use bench_dragon_proof::ProvedEvent;
 
 const VERSION: u8 = 3;
@@ -57,7 +57,12 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
 
 /// Returns the stage, the name of its publisher and, when they are known, the scene's name and the proofs of its
 /// events.
-pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[ProvedEvent]>) -> String {
+pub(super) fn stage(
+    stage: &StageMessage,
+    publisher: &str,
+    scene: Option<&str>,
+    proved: Option<&[ProvedEvent]>,
+) -> String {
     #[derive(Serialize)]
     struct StageMessage<'a> {
         r#type: &'static str,
@@ -163,7 +168,8 @@ mod tests {
 
     #[test]
     fn the_states_stand_in_the_order_of_their_numbers() {
-        let json: Value = serde_json::from_str(&stage(&Stage::default(), "dragon", Some("paper"), None)).unwrap();
+        let json: Value =
+            serde_json::from_str(&stage(&StageMessage::default(), "dragon", Some("paper"), None)).unwrap();
         assert_eq!((&json["publisher"], &json["scene"]), (&"dragon".into(), &"paper".into()));
         assert!(json["scene_hash"].is_null() && json["proved"].is_null(), "{json}");
         let states = json["states"].as_array().unwrap();
