@@ -26,6 +26,7 @@ mod ros2_process;
 pub mod ros_args;
 pub mod run;
 pub mod send;
+mod service_manager;
 pub mod soak;
 pub mod soak_conductor;
 pub mod solve;
@@ -34,6 +35,7 @@ pub mod trade;
 pub mod verify;
 pub mod view;
 pub mod watch;
+pub mod write_manual;
 
 use new_file::NewFile;
 use std::ffi::OsString;

@@ -10,12 +10,13 @@ use bench_dragon::client::shared_memory::OpenError;
 use bench_dragon::messages::Roster;
 use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon::publisher::live::control::CommandQueues;
-use bench_dragon::publisher::live::statistics::{RunSummary, Summary};
+use bench_dragon::publisher::live::statistics::{RunSummary, Sample, Summary};
 use bench_dragon::publisher::live::{Announcement, End, FrameSource, LoopCounts, TransportCounters};
 use bench_dragon::publisher::run::{self, Hooks, Published, Publishing, RunError};
 use bench_dragon::publisher::transports::{self, Transport, TransportConfig, TransportError};
 
 use super::lines::Lines;
+use super::service_manager::{self, ServiceManager};
 use super::{CommandError, Common, Output, severity_colour, shows_colour};
 
 /// Returns a new run number.
@@ -49,7 +50,20 @@ pub fn publish(
     let announce = move |announcement: &Announcement| {
         print.iter().zip(announced(announcement, roster)).for_each(|(print, line)| print(line));
     };
-    let hooks = Hooks { announce: Box::new(announce), ..hooks };
+    let mut manager = ServiceManager::of_this_process();
+    let is_managed = manager.is_some();
+    let Hooks { opened, mut sample, ended, .. } = hooks;
+    let sampled = move |of: &Sample| {
+        manager.iter_mut().for_each(ServiceManager::frame);
+        sample(of);
+    };
+    let stopped = move |counts| {
+        if is_managed {
+            service_manager::stopping();
+        }
+        ended(counts);
+    };
+    let hooks = Hooks { opened, announce: Box::new(announce), sample: Box::new(sampled), ended: Box::new(stopped) };
     let published = publishing.run(&SystemClock, source, transports, doors, stop, hooks);
     lines.into_iter().for_each(Lines::finish);
     Ok(published?)

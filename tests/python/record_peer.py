@@ -14,13 +14,10 @@ import json
 import math
 import pathlib
 import pickle
-import sys
 import time
 from collections import Counter, defaultdict
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-
-import bench_dragon_messages as messages
+import bench_dragon as messages
 
 KINDS = {
     "stage": messages.Stage,

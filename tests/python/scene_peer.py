@@ -9,14 +9,12 @@ they do not come in time.
 import argparse
 import ctypes
 import json
-import pathlib
 import sys
 import time
 
 import iceoryx2 as iox2
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-import bench_dragon_messages as messages
+import bench_dragon as messages
 
 
 def received(node, name, payload, header, end):

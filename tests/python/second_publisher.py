@@ -10,14 +10,10 @@ ends it.
 
 import argparse
 import json
-import pathlib
 import signal
-import sys
 import time
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-
-import bench_dragon_messages as messages
+import bench_dragon as messages
 import iceoryx2 as iox2
 
 FOREIGN_RUN = 7

@@ -10,19 +10,16 @@ gone and all its messages are read. With --until it ends a second after a messag
 import argparse
 import json
 import math
-import pathlib
 import signal
-import sys
 import time
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
 
 
 class Iceoryx2:
     """The services in shared memory, opened when they appear."""
 
     def __init__(self, name):
-        import bench_dragon_messages as messages
+        import bench_dragon as messages
         import iceoryx2 as iox2
 
         iox2.set_log_level(iox2.LogLevel.Fatal)

@@ -1,6 +1,6 @@
 //! The messages of other languages: `crates/messages/src/layouts.rs` and the enums in `crates/messages/src/state.rs`
 //! are the single source of fields, types, versions, constants and their comments. `msgs/msg/*.msg` and
-//! `examples/python/bench_dragon_messages.py` are generated from these: after a change run
+//! `packaging/python/bench_dragon/layouts.py` are generated from these: after a change run
 //!
 //! ```text
 //! BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
@@ -40,7 +40,7 @@ use serde_json::{Value, json};
 use serde_reflection::{ContainerFormat, Format, Registry, Samples, Tracer, TracerConfig};
 use source::Source;
 
-const PYTHON: &str = "examples/python/bench_dragon_messages.py";
+const PYTHON: &str = "packaging/python/bench_dragon/layouts.py";
 
 fn path(file: &str) -> String {
     format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))
@@ -57,9 +57,7 @@ static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
     let interfaces = ros::MESSAGES.iter();
     let interfaces =
         interfaces.map(|message| (format!("msgs/msg/{}.msg", message.name), ros::interface_file(&source, message)));
-    let module = read(PYTHON);
-    let (_, by_hand) = module.split_once(python::BY_HAND).expect("the part of the Python file that is written by hand");
-    let module = python::module(&source) + by_hand;
+    let module = python::module(&source);
     let mut differences = Vec::new();
     for (file, wanted) in interfaces.chain([(PYTHON.to_owned(), module)]) {
         let found = read(&file);
@@ -324,8 +322,8 @@ fn layout_of<T: Serialize + ZeroCopySend>(value: &T) -> Value {
 /// Prints Python's data on the layouts, in the words of ROS 2, and the names of numbers.
 const SCRIPT: &str = r#"
 import ctypes, json, sys
-sys.path.insert(0, "examples/python")
-import bench_dragon_messages as m
+sys.path.insert(0, "packaging/python")
+import bench_dragon as m
 
 WORDS = {ctypes.c_double: "float64", ctypes.c_float: "float32", ctypes.c_uint64: "uint64", ctypes.c_uint32: "uint32",
          ctypes.c_uint8: "uint8"}

@@ -19,6 +19,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::clock::monotonic_clock_name;
+use crate::layouts;
 use crate::shared_memory::MOST_PUBLISHERS;
 use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
 use bench_dragon_messages::{
@@ -117,7 +118,8 @@ impl Subscription {
             // It does not exist yet, or is being created or removed.
             Err(Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction) => return Ok(None),
             Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
-                return Err(OpenError::Incompatible(name.to_string()));
+                let own = [layouts::name::<HandlePose>(), layouts::name::<FrameHeader>()];
+                return Err(layouts::another(&name, MessagingPattern::PublishSubscribe, &own));
             }
             Err(error) => {
                 return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
@@ -265,7 +267,10 @@ impl Subscription {
         let name = service_name(&self.name, service)?;
         match self.node.service_builder(&name).publish_subscribe::<Message>().open() {
             Ok(service) => Ok(Some(service)),
-            Err(Open::IncompatibleTypes | Open::VersionMismatch) => Err(OpenError::Incompatible(name.to_string())),
+            Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
+                let own = [layouts::name::<Message>()];
+                Err(layouts::another(&name, MessagingPattern::PublishSubscribe, &own))
+            }
             Err(_) => Ok(None),
         }
     }

@@ -78,6 +78,7 @@ impl From<OpenError> for TransportError {
             | OpenError::TooManyPublishers(_)
             | OpenError::Incomplete(_)
             | OpenError::Incompatible(_)
+            | OpenError::OtherLayout { .. }
             | OpenError::OtherAttributes(_)
             | OpenError::OtherLimits(_) => Self::NameInUse(sentence),
             _ => Self::Failed(sentence),

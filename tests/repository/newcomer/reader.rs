@@ -181,9 +181,12 @@ fn check_out(root: &Path, checkout: &Path) {
         let name = name.as_str();
         let copy = checkout.join(name);
         std::fs::create_dir_all(copy.parent().unwrap()).unwrap();
+        let file = root.join(name);
         // A file that was deleted is still listed.
-        if root.join(name).exists() {
-            std::fs::copy(root.join(name), copy).unwrap();
+        if file.is_symlink() {
+            symlink(std::fs::read_link(file).unwrap(), copy).unwrap();
+        } else if file.exists() {
+            std::fs::copy(file, copy).unwrap();
         }
     }
 }

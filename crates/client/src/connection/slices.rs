@@ -10,6 +10,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::selected::OfRun;
 use super::{Connection, Origin, Receiver, Selection, Subscription};
+use crate::layouts;
 use crate::shared_memory::{OpenError, service_name};
 use bench_dragon_messages::{SceneHeader, Stage, StageSegment};
 
@@ -27,7 +28,10 @@ impl Subscription {
         let name = service_name(&self.name, service)?;
         match self.node.service_builder(&name).publish_subscribe::<[Element]>().user_header::<Header>().open() {
             Ok(service) => Ok(Some(service)),
-            Err(Open::IncompatibleTypes | Open::VersionMismatch) => Err(OpenError::Incompatible(name.to_string())),
+            Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
+                let own = [layouts::name::<Element>(), layouts::name::<Header>()];
+                Err(layouts::another(&name, MessagingPattern::PublishSubscribe, &own))
+            }
             Err(_) => Ok(None),
         }
     }
