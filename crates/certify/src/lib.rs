@@ -23,6 +23,7 @@ pub mod plan;
 mod search;
 pub mod speed;
 mod step;
+mod turn;
 
 use std::io;
 
