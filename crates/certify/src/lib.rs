@@ -24,6 +24,7 @@ pub mod plan;
 mod search;
 pub mod speed;
 mod step;
+mod turn;
 
 use std::io;
 

@@ -174,6 +174,8 @@ pub(super) struct Listed<'c, 'a> {
     /// Multiples of the pad to try, and the number of those that were too small for the last handle.
     multiples: &'static [f64],
     too_small: usize,
+    /// Metres added to every pad, for a path that is an interval of paths.
+    slack: f64,
     /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
 }
@@ -190,7 +192,12 @@ impl<'c, 'a> Listed<'c, 'a> {
     pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, metres: f64) -> Self {
         let is_fine = metres < NEXT_TO_EVENT * chain.team.shortest_link();
         let multiples = if is_fine { &FINE[..] } else { &COARSE };
-        Self { chain, handles, pad: 0.0, multiples, too_small: 0, body_forward: true }
+        Self { chain, handles, pad: 0.0, multiples, too_small: 0, slack: 0.0, body_forward: true }
+    }
+
+    /// Adds metres to the pad of every handle that is still to be enclosed.
+    pub fn with_slack(self, slack: f64) -> Self {
+        Self { slack, ..self }
     }
 
     /// Returns true for a step next to an event: places have low words.
@@ -260,7 +267,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let size = length.hi + radius * (1.0 + 0.1 * turned);
         let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);
         let front_cosine = ends.iter().map(|end| end.front_cosine.abs()).fold(0.0, f64::max);
-        let mut least = 1.000_001 * self.pad * front_cosine / rear_cosine;
+        let mut least = (1.000_001 * self.pad * front_cosine + self.slack) / rear_cosine;
         let turns = ends[0].front_cosine.signum() != ends[1].front_cosine.signum();
         if turns {
             let half = front.capsule.half;
