@@ -60,7 +60,6 @@ pub enum CertifyError {
 #[derive(Clone, Copy)]
 pub(crate) struct Given<'a> {
     scene: &'a str,
-    motion: &'a Motion,
     description: &'a PathDescription,
     path: &'a Path,
     team: &'a Team,
@@ -85,7 +84,6 @@ pub fn certify(
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let given = Given {
         scene,
-        motion,
         description: motion.description(),
         path: motion.path(),
         team: motion.team(),
@@ -93,7 +91,7 @@ pub fn certify(
         events: &events,
         most_steps,
     };
-    search::CertificateSearch::new(given, write).run(progress)
+    search::CertificateSearch::new(given, ground::barriers(motion), write).run(progress)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::io;
 
 use super::capsule::{Span, Spanned};
 use super::grid::{GridPoint, place};
-use super::ground::barriers;
+use super::ground::Barrier;
 use super::interval::Interval;
 use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
 use super::path::{ExactPath, Place};
@@ -73,10 +73,14 @@ impl From<io::Error> for Halt {
 const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
 
 impl<'a, 'w> CertificateSearch<'a, 'w> {
-    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>) -> Self {
+    pub fn new(
+        given: Given<'a>,
+        barriers: Vec<Barrier>,
+        write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>,
+    ) -> Self {
         let exact = ExactPath::new(given.description);
         let mut chain = Chain::new(given.path, exact, given.team);
-        chain.barriers = barriers(given.motion);
+        chain.barriers = barriers;
         // The steps begin a little before the start: a motion that begins earlier includes this one.
         let before = -LEAST * (1.0 + given.path.length());
         let at = GridPoint::new(given.path, &chain.exact, before);

@@ -1,5 +1,5 @@
 //! Proofs for all turnarounds whose turn radius is in an interval: a link stalls or locks, or two boards overlap. And
-//! for one turnaround: none of these happens. [`crate::plan`] calls it. Lemma 9 in `docs/proofs.md`.
+//! for one turnaround: none of these happens. [`crate::plan`] calls it. Lemma 10 in `docs/proofs.md`.
 
 use std::cell::Cell;
 
@@ -183,7 +183,7 @@ impl Passage {
         let is_none = |event: &CertifiedEvent| {
             event.event == EventKind::PathEnd || matches!(event.status, Status::None { time_lo: None })
         };
-        let found = CertificateSearch::new(given, &mut |_| Ok(())).run(progress);
+        let found = CertificateSearch::new(given, Vec::new(), &mut |_| Ok(())).run(progress);
         found.is_ok_and(|events| events.iter().all(is_none))
     }
 }
