@@ -146,7 +146,7 @@ fn play(scene: &Scene) {
         let header = frame_header(frame, Stamps { run_id: 1, sequence: tick, stamp_ns: 0, deadline_ns: 0 });
         let figures = Figures::Shown { time_scale: frame.time_scale };
         for alert in &frame.alerts {
-            let sentence = alert_sentence(&collision_alert(&header, alert), dragon.benches, figures);
+            let sentence = alert_sentence(&collision_alert(&header, alert), &stage, figures);
             assert!(!sentence.contains("NaN") && !sentence.contains("inf"), "{sentence}");
         }
     }

@@ -82,8 +82,8 @@ impl Reader<'_> {
                 self.warn_of_another_scene();
             }
             FeedEvent::Alert(alert) => {
-                let benches = self.stage().map_or(0, |stage| stage.first_dragon().benches);
-                self.picture.alert = wire::alert(alert, benches).into();
+                let unknown = Stage::default();
+                self.picture.alert = wire::alert(alert, self.stage().unwrap_or(&unknown)).into();
             }
             FeedEvent::Cue(cue) => {
                 self.cues += 1;
