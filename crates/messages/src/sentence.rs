@@ -106,8 +106,8 @@ fn obstacle_number(stage: &Stage, number: u32) -> Option<u32> {
     number.checked_sub(handles.saturating_add(1)).filter(|_| number != NO_BENCH)
 }
 
-/// Returns an alert of a show as a sentence; the stage has the names. A past event is in the past tense, since the show may
-/// continue. For a coming event, its place and the two benches that are nearest now are separate.
+/// Returns an alert of a show as a sentence; the stage has the names. A past event is in the past tense, since the show
+/// may continue. For a coming event, its place and the two benches that are nearest now are separate.
 pub fn alert_sentence(alert: &CollisionAlert, stage: &Stage, figures: Figures) -> String {
     let happened = alert.alert_level().is_some_and(Level::has_happened);
     let sentence = match (happened, alert.event_kind()) {
