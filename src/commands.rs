@@ -293,12 +293,12 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 
-/// Refuses a scene whose stage no proof knows.
+/// Refuses a scene with obstacles, whose clearance no proof knows.
 pub fn expect_empty_ground(scene: &Scene) -> Result<(), CommandError> {
     if scene.ground().is_empty() {
         return Ok(());
     }
-    let sentence = "the scene has obstacles, which no proof knows yet: expected a scene without the table [stage]";
+    let sentence = "the scene has obstacles, whose clearance no proof knows yet: expected a scene without [stage]";
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 

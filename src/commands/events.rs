@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Status};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::Event;
 use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::{Scene, printable};
@@ -11,8 +12,7 @@ use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
 use super::{
-    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, expect_one_dragon, figure, progress_bar,
-    search_timeline,
+    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, progress_bar, search_timeline,
 };
 
 /// Arguments of `events`.
@@ -54,10 +54,15 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
         Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),
         None => None,
     };
-    let status = |kind: EventKind| {
-        let outcome = proved.as_ref()?.iter().find(|outcome| outcome.event == kind)?;
-        Some(&outcome.status)
+    let proof = |kind: EventKind, obstacle: Option<usize>| {
+        let outcomes = proved.as_ref()?.iter();
+        Some(&outcomes.into_iter().find(|outcome| (outcome.event, outcome.obstacle) == (kind, obstacle))?.status)
     };
+    let number = |event: &Event| {
+        let named = scene.motion.obstacle_of(event)?;
+        scene.motion.ground().obstacles().iter().position(|obstacle| obstacle.name == named.name)
+    };
+    let status = |event: &Event| proof(event.kind, number(event));
     let mut output = Output::standard();
     for timed in &timeline.all() {
         if common.json {
@@ -70,11 +75,11 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 obstacle: scene.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
                 x: event.place.map(|place| place.x),
                 y: event.place.map(|place| place.y),
-                enclosure: status(event.kind).map(enclosure),
+                enclosure: status(&event).map(enclosure),
             })?;
         } else {
             output.line(&sentence(&scene, timed))?;
-            if let Some(status) = status(timed.event.kind) {
+            if let Some(status) = status(&timed.event) {
                 output.line(&proof_sentence(timed.event.kind, status))?;
             }
         }
@@ -91,9 +96,17 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                     EventKind::Obstacle => output.line(&format!("No board meets an obstacle {until}."))?,
                     _ => output.line(&format!("There is no {} {until}.", kind.name()))?,
                 }
-                if let Some(status) = status(kind) {
+                if let Some(status) = proof(kind, None) {
                     output.line(&proof_sentence(kind, status))?;
                 }
+            }
+        }
+        for (number, obstacle) in scene.motion.ground().obstacles().iter().enumerate() {
+            if let Some(status @ (Status::None { .. } | Status::Undecided { .. })) =
+                proof(EventKind::Obstacle, Some(number))
+            {
+                output.line(&format!("Of the {}:", printable(&obstacle.name)))?;
+                output.line(&proof_sentence(EventKind::Obstacle, status))?;
             }
         }
         output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).0))?;
@@ -111,7 +124,6 @@ fn certified(
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
     expect_one_dragon(scene)?;
     expect_exact_motion(scene)?;
-    expect_empty_ground(scene)?;
     let mut certificate = CertificateFile::create(file)?;
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| certificate.write(line);

@@ -19,6 +19,7 @@ mod scene;
 mod several;
 mod show;
 mod solvers;
+mod staged;
 #[path = "../truth/tables.rs"]
 mod tables;
 mod truth;

@@ -1,10 +1,10 @@
 """A subscriber of either transport, which prints its messages in one form, whatever the transport.
 
-    transport_peer.py --transport iceoryx2|ros2 --name NAME --seconds S
+    transport_peer.py --transport iceoryx2|ros2 --name NAME --seconds S [--until KIND ...]
 
 Prints a JSON line for every frame, alert, stage and status, in the order of reading, and one at the end. It may be
 started before the publisher, and stays while publishers come and go. After SIGTERM it stays until the last of them has
-gone and all its messages are read.
+gone and all its messages are read. With --until it ends a second after a message of each of these kinds has come.
 """
 
 import argparse
@@ -82,7 +82,8 @@ class Ros2:
         self.peer, self.readers = peer, {}
         for topic in self.KINDS:
             durability = "transient_local" if topic in ("stage", "alerts") else "volatile"
-            qos = peer.quality("reliable", durability)
+            # All messages of a run: this process may stand still for seconds on a busy machine.
+            qos = peer.quality("reliable", durability, 4000)
             described = Topic(participant, f"rt/{name}/{topic}", peer.TOPICS[topic])
             self.readers[topic] = DataReader(participant, described, qos=qos)
 
@@ -112,12 +113,14 @@ def main():
     parser.add_argument("--transport", choices=["iceoryx2", "ros2"], required=True)
     parser.add_argument("--name", required=True)
     parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--until", nargs="+", default=[])
     arguments = parser.parse_args()
     told = []
     signal.signal(signal.SIGTERM, lambda *_: told.append(True))
     peer = {"iceoryx2": Iceoryx2, "ros2": Ros2}[arguments.transport](arguments.name)
     print(json.dumps({"type": "ready"}), flush=True)
     end = time.monotonic() + arguments.seconds
+    awaited = set(arguments.until)
     over = False
     while not over:
         # Tested before the remaining messages are read.
@@ -130,6 +133,9 @@ def main():
             if kind == "frame":
                 line |= {"count": count, "link": math.dist(*map(lambda xy: tuple(map(float, xy)), handles))}
             print(json.dumps(line))
+            if awaited == {kind}:
+                end = min(end, time.monotonic() + 1.0)
+            awaited.discard(kind)
         time.sleep(0.002)
     print(json.dumps({"type": "end", "publishers": peer.publishers()}), flush=True)
 

@@ -13,6 +13,7 @@ mod elementary;
 mod first_order;
 mod first_order_step;
 mod grid;
+mod ground;
 mod interval;
 mod lines;
 mod link;
@@ -58,6 +59,7 @@ pub enum CertifyError {
 #[derive(Clone, Copy)]
 pub(crate) struct Given<'a> {
     scene: &'a str,
+    motion: &'a Motion,
     description: &'a PathDescription,
     path: &'a Path,
     team: &'a Team,
@@ -82,6 +84,7 @@ pub fn certify(
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let given = Given {
         scene,
+        motion,
         description: motion.description(),
         path: motion.path(),
         team: motion.team(),

@@ -20,7 +20,7 @@ use crate::commands::ShowCommands;
 use crate::control::{ControlThread, Endpoints};
 use crate::environment::{Network, check_name, other_distribution};
 use crate::matching::Matches;
-use crate::node::{self, Topics};
+use crate::node::{self, EndedTopics, Topics};
 use crate::rate::RateDivider;
 use crate::{Ros2Config, Ros2Error, context, topic_names};
 
@@ -97,6 +97,8 @@ struct ShowBridge {
     /// The time of the first frame without topics.
     waiting_since: Option<Instant>,
     open: Option<OpenShow>,
+    /// The topics of the run before.
+    ended: Option<EndedTopics>,
     counters: BridgeCounters,
 }
 
@@ -141,12 +143,17 @@ impl<'a> Bridge<'a> {
         Ok(Self { shows, network: DdsNetwork { context, matches, control, stamps }, stop, failure: None, notify })
     }
 
-    /// Closes all topics and leaves the network. Returns the counters of all shows.
+    /// Closes all topics and leaves the network when subscribers have had time to get the last messages. Returns the
+    /// counters of all shows.
     ///
     /// # Errors
     /// The [`Ros2Error`] that ended the bridge.
     pub fn finish(mut self) -> Result<BridgeCounters, Ros2Error> {
         self.shows.iter_mut().for_each(ShowBridge::close);
+        let until = self.shows.iter().filter_map(|show| show.ended.as_ref()).map(|ended| ended.until).max();
+        if let Some(until) = until {
+            std::thread::sleep(until.saturating_duration_since(Instant::now()));
+        }
         let sum = |sum: BridgeCounters, of: &ShowBridge| {
             let BridgeCounters { frames, skipped, discarded } = of.counters;
             BridgeCounters {
@@ -179,9 +186,12 @@ impl Handler for Bridge<'_> {
         }
     }
 
-    fn polled(&mut self, _now: Instant) {
+    fn polled(&mut self, now: Instant) {
         self.network.matches.update();
-        self.shows.iter_mut().filter_map(|show| show.open.as_mut()).for_each(|open| open.topics.service());
+        for show in &mut self.shows {
+            show.open.iter_mut().for_each(|open| open.topics.service());
+            show.ended.take_if(|ended| ended.until <= now);
+        }
     }
 }
 
@@ -197,6 +207,7 @@ impl ShowBridge {
             cue: None,
             waiting_since: None,
             open: None,
+            ended: None,
             counters: BridgeCounters::default(),
         }
     }
@@ -226,10 +237,12 @@ impl ShowBridge {
                     open.topics.status(status);
                 }
             }
-            FeedEvent::Chase(_) | FeedEvent::Silent => (),
+            FeedEvent::Chase(status) => self.open.iter_mut().for_each(|open| open.topics.chase(*status)),
+            FeedEvent::Silent => (),
             FeedEvent::Gone => {
                 self.close();
-                *self = Self { counters: self.counters, ..Self::new(self.name.clone(), self.settings.clone()) };
+                let (ended, counters) = (self.ended.take(), self.counters);
+                *self = Self { ended, counters, ..Self::new(self.name.clone(), self.settings.clone()) };
                 return Ok(Some(Notice::Gone));
             }
         }
@@ -285,6 +298,8 @@ impl ShowBridge {
         let rate = settings.greatest_rate();
         let topic_names = topic_names(&name, &settings, alerts, cues);
         let config = Ros2Config { name, handles: header.handles as usize, rate, settings, alerts, cues, stage };
+        // The node of the run before has the same name, and its latest alert would be one more.
+        self.ended = None;
         let mut node = node::open(context, &self.name)?;
         let endpoints = Endpoints::open(&self.name, context, &mut node, *control)?;
         let topics = Topics::open(context.clone(), node, matches.clone(), config)?;
@@ -297,12 +312,12 @@ impl ShowBridge {
         Ok(Some(Notice::Opened { topics: topic_names }))
     }
 
-    /// Closes the topics and services of a run.
+    /// Ends the topics and services of a run.
     fn close(&mut self) {
         let Some(OpenShow { control, topics, .. }) = self.open.take() else { return };
         self.counters.discarded += topics.discarded();
         drop(control);
-        topics.finish();
+        self.ended = topics.finish();
     }
 }
 

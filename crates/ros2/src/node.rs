@@ -3,7 +3,7 @@
 //! The bridge creates and drops all objects of ros2-client on its thread.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 
@@ -13,7 +13,7 @@ use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFact
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon_messages::state::Severity;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
@@ -25,8 +25,9 @@ use bench_dragon_ros2_messages::{Clock, HandlePoses, HasStamp, PoseArray, Stampe
 const PATH_POSE_BYTES: usize = 88;
 /// An upper bound of the bytes of the transforms of head and tail, for any name.
 const TRANSFORMS_BYTES: usize = 1000;
-/// The time for reliable subscribers to get the last messages.
-const LINGER: Duration = Duration::from_millis(100);
+/// The time for reliable subscribers to get the last messages. RustDDS notices the loss of a writer's last message with
+/// its next heartbeat, up to a second later.
+const LINGER: Duration = Duration::from_millis(1500);
 
 /// The writers that the scene requests, and their messages, whose memory is reused.
 pub(super) struct Topics {
@@ -46,6 +47,7 @@ pub(super) struct Topics {
     rosout: Rosout,
     stamps: StampClock,
     latest_alert: Option<CollisionAlert>,
+    latest_chase: Option<ChaseStatus>,
     /// Simulated seconds per second, of the latest frame.
     time_scale: f64,
     /// The latest status, and the messages discarded up to it.
@@ -101,6 +103,7 @@ impl Topics {
             rosout,
             stamps,
             latest_alert: None,
+            latest_chase: None,
             time_scale: 1.0,
             diagnosed: (LoopStatus::default(), 0),
             limits: config.settings.diagnostics,
@@ -124,6 +127,10 @@ impl Topics {
     pub(super) fn service(&mut self) {
         self.matches.update();
         self.rosout.send_queued();
+        self.for_each_writer(|writer, matches, node| writer.service(matches, node));
+    }
+
+    fn for_each_writer(&mut self, mut act: impl FnMut(&mut dyn Serviced, &Matches, &mut Node)) {
         fn end<T: Serviced>(end: &mut Option<T>) -> Option<&mut dyn Serviced> {
             end.as_mut().map(|end| end as &mut dyn Serviced)
         }
@@ -131,7 +138,7 @@ impl Topics {
         let events = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
         let others = [end(&mut self.status), end(&mut self.diagnostics), end(&mut self.clock)];
         for end in streams.into_iter().chain(events).chain(others).flatten() {
-            end.service(&self.matches, &mut self.node);
+            act(end, &self.matches, &mut self.node);
         }
     }
 
@@ -181,6 +188,11 @@ impl Topics {
         }
     }
 
+    /// Keeps the status of a chase for the diagnostics.
+    pub(super) fn chase(&mut self, status: ChaseStatus) {
+        self.latest_chase = Some(status);
+    }
+
     /// Sends the loop's status, and the diagnostics that follow from it.
     pub(super) fn status(&mut self, status: &LoopStatus) {
         let stamp = self.stamps.at(status.stamp_ns, status.sim_time);
@@ -192,6 +204,10 @@ impl Topics {
             let (discarded, limits) = (self.discarded, self.limits);
             let second = LoopSecond { before: &before, discarded, discarded_before, limits };
             let message = DiagnosticArray::of(&self.name, status, self.latest_alert.as_ref(), &second);
+            let message = match &self.latest_chase {
+                Some(chase) => message.with_chase(&self.name, status, chase),
+                None => message,
+            };
             port.send(Arc::new(message.at(stamp)), &mut self.discarded);
         }
     }
@@ -201,11 +217,20 @@ impl Topics {
         self.discarded
     }
 
-    /// Leaves the network after the time for reliable subscribers to get the last messages.
-    pub(super) fn finish(mut self) {
+    /// Ends the sending. Returns the topics if they have subscribers, which may still request the last messages.
+    pub(super) fn finish(mut self) -> Option<EndedTopics> {
         self.service();
-        std::thread::sleep(LINGER);
+        let mut is_read = false;
+        self.for_each_writer(|writer, matches, _| is_read |= writer.is_read(matches));
+        is_read.then(|| EndedTopics { _topics: self, until: Instant::now() + LINGER })
     }
+}
+
+/// The topics of a run that has ended. They leave the network when this value is dropped.
+pub(super) struct EndedTopics {
+    _topics: Topics,
+    /// The time until which subscribers may request the last messages.
+    pub until: Instant,
 }
 
 #[cfg(test)]
@@ -247,7 +272,10 @@ mod tests {
         };
         let stage = StageMessage { stage, segments: Vec::new() };
         // iceoryx2 takes no longer name.
-        let diagnostics = DiagnosticArray::of(&"n".repeat(255), &worst, Some(&alert), &second);
+        let name = "n".repeat(255);
+        let diagnostics = DiagnosticArray::of(&name, &worst, Some(&alert), &second);
+        let diagnostics =
+            diagnostics.with_chase(&name, &worst, &ChaseStatus { frame_rate: 2, ..ChaseStatus::default() });
         let events = [
             bytes(&Stamped::stage(stage)),
             bytes(&Stamped::status(status)),

@@ -227,8 +227,9 @@ function outward(seconds, step) {
  * Returns the proof of an event, in a show that ends at `freeze`: `text`, empty for an unknown event, and `canCome`,
  * true if the show reaches it.
  */
-export function proofOf({ event, status, time_lo, time_hi }, freeze) {
-  const kind = capital(say(event)), lo = time_lo === null ? null : outward(time_lo, -1e-9);
+export function proofOf({ event, status, time_lo, time_hi, obstacle }, freeze) {
+  const number = obstacle === undefined ? "" : ` ${obstacle + 1}`;
+  const kind = capital(say(event)) + number, lo = time_lo === null ? null : outward(time_lo, -1e-9);
   const isBeyond = lo !== null && time_lo > freeze;
   if (status === "proved") {
     const beyond = isBeyond ? say("beyondShow") : "";
