@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use anstyle::Style;
 use bench_dragon::client::clock::{SystemClock, realtime_ns};
 use bench_dragon::client::shared_memory::OpenError;
-use bench_dragon::messages::Roster;
+use bench_dragon::messages::Stage;
 use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon::publisher::live::control::CommandQueues;
 use bench_dragon::publisher::live::statistics::{RunSummary, Sample, Summary};
@@ -32,13 +32,13 @@ pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transpor
     Ok(run::open_transports(config, &TRANSPORTS)?)
 }
 
-/// Publishes, and prints alerts and cues with the names of `roster` on standard error.
+/// Publishes, and prints alerts and cues with the names of `stage` on standard error.
 ///
 /// # Errors
 /// [`RunError`], or no thread for the lines.
 pub fn publish(
     common: &Common,
-    roster: &Roster,
+    stage: &Stage,
     publishing: &Publishing,
     source: &mut (dyn FrameSource + Send),
     (transports, doors): (Vec<Box<dyn Transport>>, CommandQueues),
@@ -47,8 +47,9 @@ pub fn publish(
 ) -> Result<Published, CommandError> {
     let lines = if common.quiet || common.json { None } else { Some(Lines::start()?) };
     let print = lines.as_ref().map(Lines::printer);
+    let stage = Box::new(*stage);
     let announce = move |announcement: &Announcement| {
-        print.iter().zip(announced(announcement, roster)).for_each(|(print, line)| print(line));
+        print.iter().zip(announced(announcement, &stage)).for_each(|(print, line)| print(line));
     };
     let mut manager = ServiceManager::of_this_process();
     let is_managed = manager.is_some();
@@ -70,14 +71,14 @@ pub fn publish(
 }
 
 /// Returns the line of an alert, with the countdown in wall time, or of a cue.
-fn announced(announcement: &Announcement, roster: &Roster) -> Option<String> {
+fn announced(announcement: &Announcement, stage: &Stage) -> Option<String> {
     match announcement {
         Announcement::Alert { alert, time_scale } => {
             let level = alert.alert_level()?;
             let colour = Style::new().fg_color(Some(severity_colour(level.severity()).into()));
             let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
             let figures = Figures::Shown { time_scale: *time_scale };
-            let sentence = alert_sentence(alert, roster, figures);
+            let sentence = alert_sentence(alert, stage, figures);
             Some(format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name()))
         }
         Announcement::Cue(cue) => Some(format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue))),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::messages::sentence::rounded;
-use bench_dragon::messages::{Roster, Stage, StageMessage};
+use bench_dragon::messages::{Stage, StageMessage};
 use bench_dragon::publisher::live::End;
 use bench_dragon::publisher::run::{Hooks, Publishing};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
@@ -94,7 +94,6 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let stage = StageMessage { stage: Stage { run_id, stamp_ns: realtime_ns(), ..recorded }, segments };
     let (transports, doors) = open_transports(&config(common, &scene, &prepared, &stage))?;
     let start = start_lines(&shown, &of, &prepared);
-    let roster = Roster::of(&prepared.contents().stage.stage);
     let (mut frames, reading) = prepared.begin()?;
     let process = ros2.as_ref().map(Ros2Process::start).transpose()?;
     let publishing = Publishing {
@@ -119,7 +118,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         sample: Box::new(|_| ()),
         ended: Box::new(|_| ()),
     };
-    let mut published = publish(common, &roster, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
+    let mut published = publish(common, &stage.stage, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
     published.deliveries.extend(process.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
     let (waited, failure) = reading.finish();
     if waited > 0 {

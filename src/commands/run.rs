@@ -168,9 +168,8 @@ impl RunSession<'_> {
             sample: Box::new(|sample| histograms.iter_mut().for_each(|log| log.record(sample))),
             ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
         };
-        let roster = self.scene.roster();
         let ends = (transports, doors);
-        let mut published = publish(self.common, &roster, &publishing, &mut source, ends, stop, hooks)?;
+        let mut published = publish(self.common, &stage.stage, &publishing, &mut source, ends, stop, hooks)?;
         published.deliveries.extend(ros2.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
         print_summary(&published, self.common)?;
         let log_failure = log.and_then(|outcome| outcome.failure());

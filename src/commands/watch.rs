@@ -16,7 +16,7 @@ use bench_dragon::messages::json::{AlertObject, ChaseObject, CueObject};
 use bench_dragon::messages::sentence::{Figures, alert_sentence, chase_sentence, cue_sentence, rounded, time_until};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState, Severity};
-use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus, Roster};
+use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus, Stage};
 use bench_dragon::outputs::monitor::{IntervalReport, Latency, Monitor, Presence};
 use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
@@ -92,7 +92,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         display,
         name: common.name(),
         time_scale: 1.0,
-        roster: Roster::default(),
+        stage: Box::default(),
         drawn: Vec::new(),
         answer: None,
     };
@@ -145,8 +145,8 @@ struct Screen<'a> {
     display: Display,
     name: &'a str,
     time_scale: f64,
-    /// The names of benches, once the stage has come.
-    roster: Roster,
+    /// The names; empty before the stage has come.
+    stage: Box<Stage>,
     /// The lines of the last report on the terminal, which the next report replaces.
     drawn: Vec<String>,
     /// The playback state after the last key: the last line of the report.
@@ -201,11 +201,10 @@ impl Screen<'_> {
 
     /// Prints an event at once for people; with `--json` only alerts and cues.
     fn print_event(&mut self, event: &FeedEvent<'_>) -> Result<(), CommandError> {
-        if let FeedEvent::Frame { header, .. } = event {
-            self.time_scale = header.time_scale;
-        }
-        if let FeedEvent::Stage { stage, .. } = event {
-            self.roster = Roster::of(stage);
+        match event {
+            FeedEvent::Frame { header, .. } => self.time_scale = header.time_scale,
+            FeedEvent::Stage { stage, .. } => *self.stage = **stage,
+            _ => (),
         }
         if self.display == Display::Json {
             let mut output = stdout().lock();
@@ -320,7 +319,7 @@ impl Screen<'_> {
     fn alert_line(&self, alert: &CollisionAlert) -> String {
         let level = alert.alert_level().unwrap_or(Level::Clear);
         let style = self.style(level.severity());
-        let sentence = alert_sentence(alert, &self.roster, Figures::Shown { time_scale: self.time_scale });
+        let sentence = alert_sentence(alert, &self.stage, Figures::Shown { time_scale: self.time_scale });
         format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name())
     }
 

@@ -1,6 +1,5 @@
-//! The names of benches for people: counted from 1, within the dragon with several.
+//! The names of benches of a scene for people, before there is a stage message: counted from 1 within the dragon.
 
-use crate::layouts::{Stage, StageDragon, StageObstacle};
 use crate::sentence::bench_name;
 
 /// The dragons and obstacles of a show, as far as their names need them.
@@ -12,18 +11,6 @@ pub struct Roster {
 }
 
 impl Roster {
-    /// Creates the roster of a show with one dragon and obstacles without names.
-    pub fn team(benches: u32) -> Self {
-        Self::new(vec![(String::new(), benches)], Vec::new())
-    }
-
-    /// Creates the roster of a show from its stage.
-    pub fn of(stage: &Stage) -> Self {
-        let dragon = |of: &StageDragon| (of.name.as_str().to_owned(), of.benches);
-        let obstacle = |of: &StageObstacle| of.name.as_str().to_owned();
-        Self::new(stage.dragons.iter().map(dragon).collect(), stage.obstacles.iter().map(obstacle).collect())
-    }
-
     /// Creates the roster of dragons with their benches, in the order of their handles, and of obstacles.
     pub fn new(dragons: Vec<(String, u32)>, obstacles: Vec<String>) -> Self {
         Self { dragons, obstacles }
@@ -41,13 +28,8 @@ impl Roster {
     /// // gold has the handles 0 to 20, jade 21 to 33.
     /// assert_eq!(two.bench(21), "bench 1 (the head) of jade");
     /// assert_eq!(two.bench(34), "the well");
-    /// assert_eq!(Roster::team(223).bench(8), "bench 9");
     /// ```
     pub fn bench(&self, number: u32) -> String {
-        if self.dragons.is_empty() {
-            // The stage has not come.
-            return format!("bench {}", u64::from(number) + 1);
-        }
         let mut first = 0;
         for (name, benches) in &self.dragons {
             if number <= first + benches {

@@ -47,7 +47,7 @@ impl HasStamp for Path {
 
 /// Returns points along segments with the direction of travel: the ends of every segment, and a point for each turn by
 /// five degrees.
-fn poses(segments: &[StageSegment]) -> Vec<Pose> {
+pub(super) fn poses(segments: &[StageSegment]) -> Vec<Pose> {
     let turned: f64 = segments.iter().map(turn_of).sum();
     let turn = TURN.max(turned / MOST_POINTS);
     let along = |segment: &StageSegment| {

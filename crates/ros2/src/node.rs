@@ -13,9 +13,7 @@ use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFact
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon_messages::state::Severity;
-use bench_dragon_messages::{
-    ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Roster, StageMessage,
-};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
@@ -91,7 +89,7 @@ impl Topics {
             stage: stage.clone(),
             handles: maker.stream(Topic::Handles, 40, || HandlePoses::of(handles))?,
             poses: maker.stream(Topic::Poses, 56, || PoseArray::of(handles))?,
-            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(&stage.stage))?,
+            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(stage))?,
             alerts: if config.alerts { maker.port(Topic::Alerts, EVENT_BYTES, 1.0)? } else { None },
             stages: maker.port(Topic::Stage, stage_bytes, 1.0)?,
             status: maker.port(Topic::Status, EVENT_BYTES, 1.0)?,
@@ -172,7 +170,7 @@ impl Topics {
         self.latest_alert = Some(alert);
         if let Some(level) = alert.alert_level() {
             let figures = Figures::Shown { time_scale: self.time_scale };
-            let sentence = alert_sentence(&alert, &Roster::of(&self.stage.stage), figures);
+            let sentence = alert_sentence(&alert, &self.stage.stage, figures);
             self.rosout.tell(level.severity(), format!("{}: {sentence}", level.name()));
         }
         if let Some(port) = &mut self.alerts {

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use bench_dragon::messages::Roster;
 use bench_dragon::messages::sentence::{Figures, alert_sentence};
 use bench_dragon::motion::Method;
 use bench_dragon::motion::model::curve::Side;
@@ -135,7 +134,7 @@ fn play(scene: &Scene) {
     let Ok(mut show) = Show::new(scene, timeline, Playback { time_scale, ..playback }) else { return };
     let stage = stage(1, 0, [0; 32], &scene.motion, &show);
     let stage = stage.stage;
-    let (dragon, roster) = (stage.first_dragon(), Roster::of(&stage));
+    let dragon = stage.first_dragon();
     let sizes = [dragon.hole_inset, dragon.head_length, dragon.body_length, dragon.width, stage.freeze_time];
     assert!(sizes.iter().all(|number| number.is_finite()), "{stage:?}");
     let mut last = 0.0;
@@ -147,7 +146,7 @@ fn play(scene: &Scene) {
         let header = frame_header(frame, Stamps { run_id: 1, sequence: tick, stamp_ns: 0, deadline_ns: 0 });
         let figures = Figures::Shown { time_scale: frame.time_scale };
         for alert in &frame.alerts {
-            let sentence = alert_sentence(&collision_alert(&header, alert), &roster, figures);
+            let sentence = alert_sentence(&collision_alert(&header, alert), &stage, figures);
             assert!(!sentence.contains("NaN") && !sentence.contains("inf"), "{sentence}");
         }
     }

@@ -7,6 +7,7 @@
 use rosc::encoder::encode;
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType};
 
+use bench_dragon_messages::sentence::obstacle_in;
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, NO_BENCH, Stage};
@@ -60,6 +61,11 @@ impl Addresses {
                 OscType::Int(cue as i32),
             ],
         )
+    }
+
+    /// `/obstacle ,s`: the name of the obstacle that an alert is about; empty if it is about boards alone.
+    pub fn obstacle(&self, stage: &Stage, alert: &CollisionAlert) -> OscMessage {
+        self.message("obstacle", vec![text(obstacle_in(stage, alert).unwrap_or_default())])
     }
 
     /// `/countdown ,fs`: seconds of wall time until the next event, and its name.

@@ -120,6 +120,8 @@ impl OscSender {
         self.last_alert = Some(*alert);
         let header = self.latest.map(|(header, _)| header).filter(|header| header.run_id == alert.run_id);
         self.pending.push(self.addresses.alert(alert, header.map_or(0, |header| header.cue)));
+        let stage = self.stage.as_ref().filter(|stage| stage.run_id == alert.run_id && !stage.obstacles.is_empty());
+        self.pending.extend(stage.map(|stage| self.addresses.obstacle(stage, alert)));
         self.summary.alerts += 1;
     }
 

@@ -75,6 +75,39 @@ export function pathOf({ path: segments }, reach) {
   return path;
 }
 
+/** The obstacles of a stage, each with its shape in metres, its keep-out, its name and a place on its outline. */
+export function obstaclesOf({ obstacles }) {
+  return obstacles.filter(({ outline }) => outline.length).map(({ name, kind, keep_out, outline }) => {
+    const shape = new Path2D(), { x, y, heading, curvature } = outline[0], last = outline.at(-1);
+    if (kind === "circle") shape.arc(x - Math.sin(heading) / curvature, y + Math.cos(heading) / curvature, 1 / curvature, 0, 2 * Math.PI);
+    else {
+      for (const side of outline) shape.lineTo(side.x, side.y);
+      if (kind === "line") shape.lineTo(last.x + last.length * Math.cos(last.heading), last.y + last.length * Math.sin(last.heading));
+      else shape.closePath();
+    }
+    return { shape, name, keepOut: keep_out, isFull: kind === "circle" || kind === "polygon", isBoundary: kind === "boundary", x, y };
+  });
+}
+
+/** The obstacles on the ground: the keep-out as a pale band about the outline. */
+function paintObstacles(context, palette, pixel, obstacles) {
+  context.lineJoin = context.lineCap = "round";
+  context.setLineDash([]);
+  for (const { shape, keepOut, isFull } of obstacles) {
+    context.strokeStyle = context.fillStyle = palette.faint;
+    context.globalAlpha = 0.25;
+    context.lineWidth = 2 * keepOut;
+    if (keepOut > 0) context.stroke(shape);
+    context.globalAlpha = 1;
+    if (isFull) context.fill(shape);
+    context.strokeStyle = palette.ink;
+    context.lineWidth = 1.5 * pixel;
+    context.stroke(shape);
+  }
+  context.lineJoin = "miter";
+  context.lineCap = "butt";
+}
+
 /** The spiral r = pitch * turn from one polar angle to another, as cubic curves with its tangents. */
 function addSpiral(path, { x: cx, y: cy, c, s, side }, pitch, from, to) {
   const turns = (to - from) / (2 * Math.PI);
@@ -114,7 +147,7 @@ export class Ground {
     this.x = this.y = 0;
   }
 
-  /** Covers another context's canvas: the ground with paths on it, each with its `lines` and `dashes` in pixels. */
+  /** Covers another context's canvas: the ground with paths on it, each with its `lines`, its `obstacles` and `dashes` in pixels. */
   cover(other, camera, palette, paths) {
     const { width, height } = other.canvas, { c, s, unit } = camera, scale = camera.scale * camera.ratio, right = width >> 2, down = height >> 2;
     const look = [width, height, camera.scale, camera.ratio, c, s, palette.ground, palette.faint].join();
@@ -160,6 +193,7 @@ export class Ground {
     context.fillStyle = palette.ground;
     if (!this.transparent) context.fillRect(0, 0, width, height);
     metres();
+    for (const { obstacles } of this.paths) paintObstacles(context, palette, pixel, obstacles);
     context.lineWidth = 1.2 * pixel;
     context.strokeStyle = palette.faint;
     for (const { lines, dashes } of this.paths) {
@@ -177,7 +211,7 @@ export class Ground {
  * palette.js; null for a single dragon). Returns the words written, as boxes in pixels.
  */
 export function draw(context, camera, palette, { ground, dragons, labels }) {
-  ground.cover(context, camera, palette, dragons.map(({ path, identity }) => ({ lines: path, dashes: identity?.dashes ?? [] })));
+  ground.cover(context, camera, palette, dragons.map(({ path, obstacles, identity }) => ({ lines: path, obstacles, dashes: identity?.dashes ?? [] })));
   const stale = dragons.filter((dragon) => dragon.stale);
   for (const dragon of stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (stale.length) ground.dim(context, DIMMED);
@@ -269,6 +303,10 @@ function wordsOf(dragons, palette, isNarrow) {
     }
     name(dragon, 0, front, palette.ink);
     if (count > 1) name(dragon, count - 1, rear, palette.ink);
+  });
+  // The least important: the names of the obstacles.
+  each(({ obstacles }) => {
+    for (const { name: text, isBoundary, x, y } of obstacles) if (!isBoundary) items.push({ key: `obstacle ${text}`, text, ink: palette.ink, x, y });
   });
   return { items, rings, marked };
 }

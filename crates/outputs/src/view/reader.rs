@@ -9,7 +9,7 @@ use tokio::sync::watch;
 
 use super::{Picture, Proofs, SceneHash, wire};
 use bench_dragon_client::feed::{Feed, FeedEvent};
-use bench_dragon_messages::{LoopStatus, Roster, Stage, StageMessage};
+use bench_dragon_messages::{LoopStatus, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
 
 /// The interval of polls: some browsers draw 240 times a second, none needs more. Waking this thread at each frame
@@ -106,8 +106,8 @@ impl Reader<'_> {
                 self.warn_of_another_scene();
             }
             FeedEvent::Alert(alert) => {
-                let roster = self.stage().map(Roster::of).unwrap_or_default();
-                self.picture.alert = wire::alert(alert, &roster).into();
+                let unknown = Stage::default();
+                self.picture.alert = wire::alert(alert, self.stage().unwrap_or(&unknown)).into();
             }
             FeedEvent::Cue(cue) => {
                 self.cues += 1;

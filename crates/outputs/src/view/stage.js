@@ -114,7 +114,7 @@ function paint(there) {
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
     const { stage, places, colours, path, marks, sight } = dragon, own = dragon === whose ? chosen : -1;
-    return { stage, places, colours, path: path.lines, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
+    return { stage, places, colours, path: path.lines, obstacles: path.obstacles, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
   });
   const written = draw(context, camera, palette, { ground, dragons: scene, labels });
   picture.drawn++;

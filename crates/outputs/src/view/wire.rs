@@ -27,7 +27,7 @@ use serde_json::{Value, json};
 use bench_dragon_messages::json::{AlertObject, CueObject, Exact, StageObject};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Level, Severity};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Roster, StageMessage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
 
 const VERSION: u8 = 3;
@@ -88,9 +88,9 @@ fn state(state: FrameState) -> Value {
         "sentence": state_sentence(state)})
 }
 
-/// Returns an alert with its severity and its sentence, with the names of `roster`; the page shows the figures
+/// Returns an alert with its severity and its sentence, with the names of `stage`; the page shows the figures
 /// beside it.
-pub(super) fn alert(alert: &CollisionAlert, roster: &Roster) -> String {
+pub(super) fn alert(alert: &CollisionAlert, stage: &Stage) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
         #[serde(flatten)]
@@ -104,7 +104,7 @@ pub(super) fn alert(alert: &CollisionAlert, roster: &Roster) -> String {
         alert: alert.into(),
         severity: level.map_or(Severity::Ok, Level::severity).name(),
         happened: level.is_some_and(Level::has_happened),
-        sentence: alert_sentence(alert, roster, Figures::Omitted),
+        sentence: alert_sentence(alert, stage, Figures::Omitted),
     };
     json!(message).to_string()
 }
@@ -123,6 +123,7 @@ pub(super) fn clock(monotonic_ns: Option<u64>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::{List, StageDragon};
 
     #[test]
     fn a_frame_has_the_documented_layout() {
@@ -193,7 +194,9 @@ mod tests {
             event_y: 2.0,
             ..Default::default()
         };
-        let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
+        let dragons = List::of([StageDragon { benches: 9, ..StageDragon::default() }]);
+        let nine = Stage { dragons, ..Stage::default() };
+        let json: Value = serde_json::from_str(&alert(&alert_of, &nine)).unwrap();
         assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));
         assert_eq!((&json["severity"], &json["happened"]), (&"warning".into(), &false.into()));
         assert_eq!(

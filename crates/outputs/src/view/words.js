@@ -253,7 +253,7 @@ export function proofOf({ event, status, time_lo, time_hi, obstacle }, freeze) {
 export const nameOf = (bench) => (bench === 0 ? say("headBench") : say("one", { number: bench + 1 }));
 
 /** Returns the sentence of an alert or a state; empty for an alert that the frames have not reached, or have left. */
-export function sentenceOf(state, alert, count) {
+export function sentenceOf(state, alert, count, obstacles = []) {
   if (language === 0 || !alert && !state.sentence) {
     if (state.sentence) return `${capital(state.sentence)}.`;
     return state.severity === "ok" || alert?.level !== state.name ? "" : `${capital(alert.sentence)}.`;
@@ -261,7 +261,7 @@ export function sentenceOf(state, alert, count) {
   if (state.sentence) return "龙头已到达路径终点。";
   if (state.severity === "ok" || alert.level !== state.name) return "";
   // The numbers of obstacles follow the handles.
-  const name = (bench) => bench > count ? `第 ${bench - count} 个障碍物` : `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
+  const name = (bench) => bench > count ? `障碍物“${obstacles[bench - count - 1]?.name ?? bench - count}”` : `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
   const both = (...pair) => pair.filter((bench) => bench !== null).map(name).join("与");
   const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)},\u00a0${alert.event_y.toFixed(3)})\u00a0m`;
   if (state.happened) {

@@ -80,7 +80,7 @@ impl Messages {
     pub fn stage(&mut self, sequence: u32, message: &StageMessage) {
         let stage = &message.stage;
         self.batch.clear();
-        self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(stage));
+        self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(message));
         self.transforms = TfMessage::of(&self.name, stage);
         self.batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(message.clone()));
         if self.topics.contains(&Topic::Path) {
