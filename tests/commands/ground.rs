@@ -125,6 +125,14 @@ fn the_first_touch_of_an_obstacle_is_proved_and_verified() {
 }
 
 #[test]
+fn plans_refuse_obstacles_in_one_sentence() {
+    let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    for arguments in [["plan", "pitch", "--reach-radius=4.5"], ["plan", "speed", "--max-handle-speed=2"]] {
+        assert!(refusal(&scene, &arguments).contains("`plan` knows no obstacles"), "{arguments:?}");
+    }
+}
+
+#[test]
 fn a_team_that_starts_within_a_keep_out_meets_it_at_once_with_a_warning() {
     let scene =
         scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [8.0, 2.0], radius = 0.5 }\nkeep_out = 1.0");
