@@ -1,4 +1,4 @@
-"""Growth of the publisher: resident memory, threads and file descriptors while ROS 2 subscribers come and go.
+"""Growth of `send ros2`: resident memory, threads and file descriptors while ROS 2 subscribers come and go.
 
     cargo build --release && .venv/bin/python benches/ros2_growth.py [--minutes 10]
 
@@ -22,6 +22,17 @@ def look(process):
     return int(status["VmRSS"].split()[0]) / 1024, int(status["Threads"]), len(os.listdir(f"/proc/{process}/fd"))
 
 
+def sender(publisher):
+    """Returns the process of ROS 2 of a publisher."""
+    while publisher.poll() is None:
+        for children in pathlib.Path(f"/proc/{publisher.pid}/task").glob("*/children"):
+            for child in children.read_text().split():
+                if b"\0ros2\0" in pathlib.Path(f"/proc/{child}/cmdline").read_bytes():
+                    return int(child)
+        time.sleep(0.1)
+    sys.exit("the publisher has ended")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0)
@@ -30,6 +41,7 @@ def main():
     seconds = arguments.minutes * 60.0
     publisher = subprocess.Popen([ROOT / "target/release/bench-dragon", "run", "--ros2", "--quiet", "--loop",
                                   "--name", name, "--duration", str(seconds + 10.0)], stdout=subprocess.DEVNULL)
+    process = sender(publisher)
     start = time.monotonic()
     readers = 0
     print("  minute  resident MB  threads  file descriptors  subscribers so far")
@@ -44,7 +56,7 @@ def main():
         reader.wait()
         if time.monotonic() >= next_look:
             next_look += max(seconds / 12.0, 10.0)
-            memory, threads, files = look(publisher.pid)
+            memory, threads, files = look(process)
             print(f"{(time.monotonic() - start) / 60:8.1f} {memory:12.1f} {threads:8} {files:17} {readers:19}", flush=True)
     publisher.terminate()
     publisher.wait()

@@ -6,6 +6,8 @@
     .venv/bin/python benches/stage_picture.py latency   # from sent_ns to received and to drawn, at 20 Hz, 60 Hz and 1 kHz
     .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches, and of it as a show
     .venv/bin/python benches/stage_picture.py renderers # the same boards by canvas and by WebGL, in stage_picture_renderers.html
+    .venv/bin/python benches/stage_picture.py looks     # processor time and rate of the page, #show and #seat, in turn
+    .venv/bin/python benches/stage_picture.py film '#seat' 400 412 frames   # 25 pictures a second of show time, as PNG
     .venv/bin/python benches/stage_picture.py pictures  # makes the pictures of docs/driving-a-stage-picture.md
 
 Uses the release build, or the debug build if there is no other. Needs Debian's Chromium and Playwright, which tests/run
@@ -145,6 +147,39 @@ def renderers():
         print(f"{renderer:6} {rate:5.1f} pictures/s, {cost:5.1f} ms of processor a picture")
 
 
+def looks():
+    """In turn, so that other work of the machine affects all alike."""
+    size = {"width": 1280, "height": 720}
+    for name, arguments in [("223 benches", ["--start", "300"]), ("5,000 benches", ["--scene", str(ROOT / "config" / "long.toml")])]:
+        found = {"page": ("", []), "#show": ("#show", []), "#seat": ("#seat", [])}
+        for _ in range(3):
+            for address, turns in found.values():
+                with server() as (url, _), started("run", "--quiet", "--json", *arguments), pages(url, 1, address, **size) as [page]:
+                    page.wait_for_timeout(4000)
+                    first, before = picture(page), chromium_cpu()
+                    page.wait_for_timeout(5000)
+                    last, after = picture(page), chromium_cpu()
+                    drawn = max(1, last["drawn"] - first["drawn"])
+                    turns.append((1000 * drawn / (last["now"] - first["now"]), (after - before) / drawn))
+        for look, (_, turns) in found.items():
+            rate, used = (statistics.median(figures) for figures in zip(*turns))
+            print(f"{name}, 1280 x 720: {look:5} {rate:5.1f} pictures/s, {used:6.1f} ms of processor a picture")
+
+
+def film():
+    """Pictures of a show that plays as slowly as they are taken."""
+    address, begin, end, folder = sys.argv[2], float(sys.argv[3]), float(sys.argv[4]), pathlib.Path(sys.argv[5])
+    folder.mkdir(parents=True, exist_ok=True)
+    # The lanterns rise before the first picture.
+    lead = 0.5
+    with server() as (url, _), pages(url, 1, address, width=1920, height=1080) as [page]:
+        with started("run", "--quiet", "--json", "--start", str(max(0, begin - lead)), "--time-scale", "0.05"):
+            for number in range(int((end - begin) * 25 + 1e-9) + 1):
+                while not page.evaluate(f"picture.time !== null && picture.time >= {begin + number / 25}"):
+                    page.wait_for_timeout(5)
+                page.screenshot(path=folder / f"{number:05}.png")
+
+
 def long():
     scene = ROOT / "config" / "long.toml"
     with server() as (url, _), started("run", "--quiet", "--json", "--scene", str(scene)), pages(url, 1, width=1920, height=1080) as [page]:
@@ -180,6 +215,9 @@ def pictures():
         ("light", "405", "#light", wide, "document.body.dataset.level === 'contact' && picture.shown.time >= 412.47"),
         ("phone", "405", "#light", phone, seconds_before.format(4.2)),
         ("show", "330", "#show", wide, "picture.time > 334"),
+        ("close", "400", "#show,view=0,-1.5,8", wide, "picture.time > 404"),
+        ("seat", "400", "#seat", wide, "picture.time > 404"),
+        ("seat-head", "372", "#seat=0.05,12,4", wide, "picture.time > 376"),
         ("show-contact", "405", "#show", wide, seconds_before.format(1.6)),
     ]
     for name, start, address, viewport, when in wanted:
@@ -188,9 +226,10 @@ def pictures():
             while not page.evaluate(when):
                 assert time.monotonic() < deadline, f"{name}: not within two minutes"
                 page.wait_for_timeout(20)
-            page.screenshot(path=ROOT / "docs" / f"stage-picture-{name}.png")
+            # Photographs by night are five times as large as PNG.
+            page.screenshot(path=ROOT / "docs" / f"stage-picture-{name}.jpg", type="jpeg", quality=86)
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    {"cost": cost, "latency": latency, "long": long, "renderers": renderers, "pictures": pictures}[sys.argv[1]]()
+    {"cost": cost, "latency": latency, "long": long, "renderers": renderers, "looks": looks, "film": film, "pictures": pictures}[sys.argv[1]]()

@@ -27,6 +27,7 @@ pub mod ros_args;
 pub mod run;
 mod scene_facts;
 pub mod send;
+mod service_manager;
 pub mod soak;
 pub mod soak_conductor;
 pub mod solve;
@@ -35,6 +36,7 @@ pub mod trade;
 pub mod verify;
 pub mod view;
 pub mod watch;
+pub mod write_manual;
 
 use new_file::NewFile;
 use std::ffi::OsString;
@@ -117,6 +119,14 @@ impl Common {
     /// Bad input: the sentence names the file, the line and the field.
     pub fn load_scene(&self) -> Result<Scene, CommandError> {
         Ok(self.scene_text()?.parse()?)
+    }
+
+    /// Reads the scene, of one dragon or of several.
+    ///
+    /// # Errors
+    /// As [`Common::load_scene`].
+    pub fn load_any_scene(&self) -> Result<Scene, CommandError> {
+        Ok(self.scene_text()?.parse_any()?)
     }
 
     /// Returns the text of that scene.
@@ -255,7 +265,7 @@ pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
 /// Returns all events of a scene, with a progress bar for the long searches.
 pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     let bar = progress_bar(1000, common).with_message("searching for contact");
-    let timeline = scene.motion.timeline(&mut |share| bar.set_position((1000.0 * share) as u64));
+    let timeline = scene.timeline(&mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
     warn_of_gap(&timeline);
     timeline
@@ -286,12 +296,30 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 
-/// Refuses a scene whose stage no proof knows.
+/// Refuses a scene with obstacles, whose clearance no proof knows.
 pub fn expect_empty_ground(scene: &Scene) -> Result<(), CommandError> {
-    if scene.motion.ground().is_empty() {
+    if scene.ground().is_empty() {
         return Ok(());
     }
-    let sentence = "the scene has obstacles, which no proof knows yet: expected a scene without the table [stage]";
+    let sentence = "the scene has obstacles, whose clearance no proof knows yet: expected a scene without [stage]";
+    Err(CommandError::BadInput(sentence.to_owned()))
+}
+
+/// Refuses a scene of several dragons where `what` knows one.
+pub fn expect_one(scene: &Scene, what: &str) -> Result<(), CommandError> {
+    if scene.ensemble.is_none() {
+        return Ok(());
+    }
+    let sentence = format!("{what} knows one dragon and the scene has several, expected a scene with [team]");
+    Err(CommandError::BadInput(sentence))
+}
+
+/// Refuses a scene of several dragons, whose motions no proof knows.
+pub fn expect_one_dragon(scene: &Scene) -> Result<(), CommandError> {
+    if scene.ensemble.is_none() {
+        return Ok(());
+    }
+    let sentence = "the scene has several dragons, which no proof knows yet: expected a scene of one, with [team]";
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 

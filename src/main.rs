@@ -6,14 +6,14 @@ mod logging;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 pub use commands::ros_args;
 use commands::{CommandError, Common};
 
 /// Publishes a bench dragon live: handle poses and collision alerts at a fixed rate, over iceoryx2 shared memory and,
 /// on request, as ROS 2 topics.
 #[derive(Debug, Parser)]
-#[command(version, propagate_version = true, arg_required_else_help = true)]
+#[command(version, long_version = versions(), propagate_version = true, arg_required_else_help = true)]
 pub struct CommandLine {
     #[command(flatten)]
     common: Common,
@@ -64,8 +64,21 @@ pub enum Command {
     /// A client that soak --conduct kills
     #[command(hide = true)]
     SoakClient(commands::soak_conductor::SoakClientArguments),
+    /// Write man pages and shell completions for a package
+    #[command(hide = true)]
+    WriteManual(commands::write_manual::WriteManualArguments),
     /// Validate a scene and print what it models
     Check(commands::check::CheckArguments),
+}
+
+/// The version of iceoryx2, with which publisher and subscribers share memory.
+const ICEORYX2: &str = "0.10.0";
+
+/// Returns the versions that must agree between publisher and subscribers: program, iceoryx2, layouts.
+fn versions() -> String {
+    let layouts =
+        bench_dragon::client::layouts::names().map(|name| name.trim_start_matches("bench_dragon/")).join(", ");
+    format!("{}\niceoryx2 {ICEORYX2}\nlayouts {layouts}", env!("CARGO_PKG_VERSION"))
 }
 
 fn main() -> ExitCode {
@@ -100,6 +113,7 @@ fn main() -> ExitCode {
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
         Command::SoakConductor(arguments) => commands::soak_conductor::conduct(&common, arguments),
         Command::SoakClient(arguments) => commands::soak_conductor::client(&common, arguments),
+        Command::WriteManual(arguments) => commands::write_manual::write_manual(CommandLine::command(), arguments),
         Command::Check(arguments) => commands::check::check(&common, arguments),
     });
     exit_code(done)

@@ -108,7 +108,8 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
-    let config = TransportConfig::of(&name, &scene, stage(1, 0, [0; 32], &scene.motion, &show));
+    let stage = stage(1, 0, [0; 32], &scene.motion, &show);
+    let config = TransportConfig::of(&name, &scene, &stage);
     let mut transports = transports::open(&config, &[transports::iceoryx2::open]).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", (1, 2));

@@ -3,7 +3,7 @@
     source /opt/ros/jazzy/setup.bash && source install/setup.bash        # with bench_dragon_msgs built, see docs/ros2.md
     python3 examples/python/ros2_display.py [--name bench_dragon] [--delay 0.1]
 
-Between two messages the handles are interpolated by their velocities (hermite.py): ten messages a second give an
+Between two messages the handles are interpolated by their velocities (`HermiteReader`): ten messages a second give an
 accuracy of about 20 nanometres. The newest message alone is up to a tenth of a second old.
 """
 
@@ -11,7 +11,7 @@ import argparse
 import time
 
 import numpy as np
-from hermite import HermiteReader
+from bench_dragon import HermiteReader
 
 HANDLE_POSE = np.dtype([(field, "<f8") for field in ("x", "y", "heading", "vx", "vy")])
 

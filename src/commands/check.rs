@@ -11,9 +11,11 @@ use bench_dragon::certify::{
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::Motion;
+use bench_dragon::motion::ensemble::{Dragon, Ensemble};
 use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
 use bench_dragon::motion::model::spiral::Direction;
+use bench_dragon::motion::placement::Placement;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
 use bench_dragon::show::scene::{AtEnd, OnContact, Scene, printable};
@@ -25,8 +27,8 @@ use super::events::{bench_name, find_least_clearance, least_clearance, sentence}
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{
-    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, figure, number, progress_bar,
-    search_timeline,
+    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, expect_one, expect_one_dragon, figure,
+    number, progress_bar, search_timeline,
 };
 
 /// Arguments of `check`.
@@ -74,8 +76,9 @@ struct ClearanceLine {
 /// Validates the scene and prints what it does.
 pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
-    let scene = text.parse()?;
+    let scene = text.parse_any()?;
     if arguments.prove {
+        expect_one_dragon(&scene)?;
         expect_exact_motion(&scene)?;
         expect_empty_ground(&scene)?;
     }
@@ -95,32 +98,33 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if common.json {
         return if covered.is_some() { output.finish() } else { print_lines(&scene, &timeline, common, output) };
     }
-    let team = scene.team();
     output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
-    output.line(&format!(
-        "  Team: {} benches, {} handles; head board {} m, the others {} m, {} m wide, holes {} m from the ends.",
-        team.benches,
-        team.handles(),
-        team.head_length,
-        team.body_length,
-        team.width,
-        team.hole_inset
-    ))?;
-    output.line(&format!("  Path: {}; the head moves at {} m/s.", path(&scene.motion), scene.motion.head_speed()))?;
-    if let Some(placement) = &scene.placement {
-        let (origin, turns) = (placement.origin(), number(placement.rotation_turns()));
-        let mirrored = if placement.is_mirrored() { "mirrored, then " } else { "" };
-        output.line(&format!(
-            "  Placement: the path's coordinates {mirrored}turned by {turns} turns, then moved by ({}, {}) m.",
-            number(origin.x),
-            number(origin.y)
-        ))?;
+    match &scene.ensemble {
+        Some(ensemble) => {
+            for (k, Dragon { name, delay, motion }) in ensemble.dragons().iter().enumerate() {
+                let handles = ensemble.handles_of(k);
+                let (first, last) = (handles.start, handles.end - 1);
+                output.line(&format!("  Dragon {}, {name}: handles {first} to {last}, counting from 0.", k + 1))?;
+                describe(motion, Some(motion.placement()), &mut output)?;
+                if *delay > 0.0 {
+                    output.line(&format!("  It stands at its start for {} s.", number(*delay)))?;
+                }
+            }
+        }
+        None => describe(&scene.motion, scene.placement.as_ref(), &mut output)?,
     }
-    if !scene.motion.ground().is_empty() {
+    if !scene.ground().is_empty() {
         output.line(&format!("  Stage: {}.", ground(&scene)))?;
     }
-    let choice = scene.motion.solver(scene.velocities);
-    output.line(&format!("  Solver: {}.", choice.reason))?;
+    let choice = scene.ensemble.is_none().then(|| scene.motion.solver(scene.velocities));
+    match (&choice, &scene.ensemble) {
+        (Some(choice), _) => output.line(&format!("  Solver: {}.", choice.reason))?,
+        (None, ensemble) => {
+            for Dragon { name, motion, .. } in ensemble.iter().flat_map(Ensemble::dragons) {
+                output.line(&format!("  Solver of {name}: {}.", motion.solver(scene.velocities).reason))?;
+            }
+        }
+    }
     output.line(match scene.velocities {
         Velocities::Computed => "  Velocities: computed for every handle.",
         Velocities::Omitted => "  Velocities: not computed; vx and vy are NaN.",
@@ -131,8 +135,10 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
                 "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
                 rules.approach_time, rules.approach_clearance
             ))?;
-            let monitor = scene.motion.clearance_monitor(&choice);
-            output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
+            if let Some(choice) = &choice {
+                let monitor = scene.motion.clearance_monitor(choice);
+                output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
+            }
         }
         None => output.line(
             "  Alerts: none. `run` computes no rectangle, no clearance, no contact and no stall, and has no alerts \
@@ -166,7 +172,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         None => "  ROS 2: nothing and no network socket, unless `run --ros2` requests it.".to_owned(),
     })?;
     output.line("  Ahead, in simulated time:")?;
-    for timed in timeline.events() {
+    for timed in &timeline.all() {
         output.line(&format!("  {}", sentence(&scene, timed)))?;
     }
     for cue in cues(&scene, &timeline) {
@@ -197,6 +203,29 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         log::warn!("a board is within the keep-out of an obstacle at the start of scene \"{}\"", scene.name);
     }
     output.finish()
+}
+
+/// Prints the team, the path and the placement of a dragon.
+fn describe(motion: &Motion, placement: Option<&Placement>, output: &mut Output) -> Result<(), CommandError> {
+    let team = motion.team();
+    output.line(&format!(
+        "  Team: {} benches, {} handles; head board {} m, the others {} m, {} m wide, holes {} m from the ends.",
+        team.benches,
+        team.handles(),
+        team.head_length,
+        team.body_length,
+        team.width,
+        team.hole_inset
+    ))?;
+    output.line(&format!("  Path: {}; the head moves at {} m/s.", path(motion), motion.head_speed()))?;
+    let Some(placement) = placement else { return Ok(()) };
+    let (origin, turns) = (placement.origin(), number(placement.rotation_turns()));
+    let mirrored = if placement.is_mirrored() { "mirrored, then " } else { "" };
+    output.line(&format!(
+        "  Placement: the path's coordinates {mirrored}turned by {turns} turns, then moved by ({}, {}) m.",
+        number(origin.x),
+        number(origin.y)
+    ))
 }
 
 /// A line of `check --json`: the least clearance of two boards.
@@ -230,7 +259,7 @@ fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: 
         bench_b: found.map(|found| found.least.bench_b),
     })?;
     for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, freeze, common) {
-        let obstacle = &scene.motion.ground().obstacles()[obstacle].name;
+        let obstacle = &scene.ground().obstacles()[obstacle].name;
         let (check, clearance, bench) = ("obstacle", least.value, least.bench);
         output.json(&ObstacleLine { check, obstacle, clearance, time, bench })?;
     }
@@ -240,7 +269,11 @@ fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: 
 /// Searches for the least clearance of each obstacle over the whole show.
 fn obstacle_clearances(scene: &Scene, freeze: &TimedEvent, common: &Common) -> Vec<TimedObstacleClearance> {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
-    let found = scene.motion.obstacle_clearances(freeze, &mut |share| bar.set_position((1000.0 * share) as u64));
+    let mut progress = |share: f64| bar.set_position((1000.0 * share) as u64);
+    let found = match &scene.ensemble {
+        Some(ensemble) => ensemble.obstacle_clearances(freeze, &mut progress),
+        None => scene.motion.obstacle_clearances(freeze, &mut progress),
+    };
     bar.finish_and_clear();
     found
 }
@@ -248,12 +281,12 @@ fn obstacle_clearances(scene: &Scene, freeze: &TimedEvent, common: &Common) -> V
 /// Returns a sentence for people on the least clearance of an obstacle, and on its first touch.
 fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleClearance) -> String {
     let TimedObstacleClearance { obstacle, least, time, searched_until } = *found;
-    let Obstacle { name, keep_out, .. } = &scene.motion.ground().obstacles()[obstacle];
+    let Obstacle { name, keep_out, .. } = &scene.ground().obstacles()[obstacle];
     let (value, at, bench) = (figure(least.value), figure(time), bench_name(scene, least.bench));
     let up_to = searched_until
         .map_or(String::new(), |until| format!(" up to t = {} s, where the search gave up", figure(until)));
     let beyond = if *keep_out > 0.0 { format!(" beyond its keep-out of {keep_out} m") } else { String::new() };
-    let number = Some(scene.motion.obstacle_number(obstacle));
+    let number = Some((scene.handles() + obstacle) as u32);
     let first = timeline.events().iter().find(|timed| timed.event.bench_b == number);
     let first = first.map_or(String::new(), |timed| format!(" First met at t = {} s.", figure(timed.time)));
     format!(
@@ -264,7 +297,7 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
 
 /// Describes the obstacles in words.
 fn ground(scene: &Scene) -> String {
-    let ground = scene.motion.ground();
+    let ground = scene.ground();
     let obstacles = ground.obstacles().len() - usize::from(ground.has_boundary());
     let counted = match obstacles {
         0 => "no obstacle".to_owned(),
@@ -278,6 +311,7 @@ impl CheckArguments {
     /// Writes the file of --swept and returns what it holds.
     fn covered(&self, scene: &Scene, timeline: &Timeline, common: &Common) -> Result<Option<Swept>, CommandError> {
         let Some(file) = &self.swept else { return Ok(None) };
+        expect_one(scene, "--swept")?;
         let stretch = Stretch { from: self.from.as_deref(), until: self.until.as_deref(), benches: self.benches };
         let ground = swept(scene, timeline, stretch, common)?;
         ground.write(scene, file)?;

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use bench_dragon::drawing::dragons::Dragons;
 use bench_dragon::drawing::swept::SweptArea;
-use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Style, Surroundings, Theme, mean_speeds};
+use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Seat, Style, Surroundings, Theme, mean_speeds};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
@@ -13,7 +14,7 @@ use serde::Serialize;
 
 use super::solve::time_of;
 use super::swept::{Benches, Stretch, benches, swept};
-use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_one, figure, number, progress_bar, search_timeline};
 
 /// Arguments of `draw`.
 #[derive(Debug, clap::Args)]
@@ -64,7 +65,8 @@ struct LookArguments {
     /// The point in the middle of the picture and its width, metres, as in 1.5,2,4
     #[arg(long, value_name = "X,Y,METRES", value_parser = view, allow_hyphen_values = true)]
     view: Option<Framing>,
-    /// plan, or lanterns: the stage at night in the light of the dragon's lanterns
+    /// plan; lanterns: the stage at night in the light of the dragon's lanterns; seat or seat=TURNS,DISTANCE,HEIGHT:
+    /// the same from a place in the audience
     #[arg(long, value_name = "STYLE", default_value = "plan", value_parser = style, conflicts_with = "animated")]
     look: Style,
     /// light, dark, or auto: light, and dark if a browser prefers that
@@ -106,8 +108,17 @@ const VIEW: Accepted = Accepted { least: 1e-9, greatest: 1e9, unit: "metres" };
 
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
-    let scene = common.load_scene()?;
+    let scene = common.load_any_scene()?;
     let look = arguments.look.look()?;
+    if look.style == Style::Lanterns {
+        expect_one(&scene, "--look lanterns")?;
+    }
+    if arguments.many.swept {
+        expect_one(&scene, "--swept")?;
+    }
+    if arguments.many.animated {
+        expect_one(&scene, "--animated")?;
+    }
     let timeline = search_timeline(&scene, common);
     let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);
     let many = &arguments.many;
@@ -135,6 +146,11 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
             session.draw_one(look, time, ground.as_ref().map(|ground| &ground.area))
         }
     }
+}
+
+/// Returns the dragons of a scene.
+fn dragons(scene: &Scene) -> Dragons<'_> {
+    scene.ensemble.as_ref().map_or_else(|| Dragons::one(&scene.motion), Dragons::several)
 }
 
 /// Returns the number of steps of --every between two times.
@@ -177,8 +193,11 @@ struct Session<'a> {
 impl<'a> Session<'a> {
     fn new(scene: &'a Scene, timeline: &'a Timeline, file: Option<&'a Path>, json: bool) -> Self {
         // Boards are coloured by speed, even if the scene publishes no speeds.
-        let solver = scene.motion.solver(Velocities::Computed).solver;
-        let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.team().handles()));
+        let solver = match &scene.ensemble {
+            Some(ensemble) => Box::new(ensemble.solver(Velocities::Computed)),
+            None => scene.motion.solver(Velocities::Computed).solver,
+        };
+        let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.handles()));
         Self { scene, timeline, solver, chain, earlier, file, json }
     }
 
@@ -186,15 +205,19 @@ impl<'a> Session<'a> {
         let solver = self.solver.as_mut();
         let time = solve_at_or_just_before(solver, time, &mut self.chain)
             .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))?;
-        mean_speeds(&self.scene.motion, solver, time, &mut self.chain, &mut self.earlier);
+        // Several dragons are coloured by their names.
+        if self.scene.ensemble.is_none() {
+            mean_speeds(&self.scene.motion, solver, time, &mut self.chain, &mut self.earlier);
+        }
         Ok(())
     }
 
     fn extent(&mut self, times: &[f64]) -> Result<Extent, CommandError> {
         let mut extent = Extent::NONE;
+        let dragons = dragons(self.scene);
         for time in times {
             self.solve(*time)?;
-            extent.include(&self.scene.motion, *time, &self.chain);
+            extent.include(&dragons, *time, &self.chain);
         }
         Ok(extent)
     }
@@ -203,7 +226,7 @@ impl<'a> Session<'a> {
     where
         'a: 'd,
     {
-        Drawing::new(&self.scene.name, &self.scene.motion, self.timeline, extent, look)
+        Drawing::new(&self.scene.name, dragons(self.scene), self.timeline, extent, look)
     }
 
     fn draw_one(&mut self, look: Look, time: f64, swept: Option<&SweptArea>) -> Result<(), CommandError> {
@@ -311,7 +334,7 @@ impl LookArguments {
             (None, Some(view)) => view,
             (None, None) => Framing::Everything,
         };
-        let is_bare = self.no_axes || self.look == Style::Lanterns;
+        let is_bare = self.no_axes || self.look != Style::Plan;
         let surroundings = if is_bare { Surroundings::Nothing } else { Surroundings::Words };
         Ok(Look { style: self.look, theme: self.theme, framing, surroundings, width: self.width, height: self.height })
     }
@@ -321,8 +344,24 @@ fn style(text: &str) -> Result<Style, String> {
     match text {
         "plan" => Ok(Style::Plan),
         "lanterns" => Ok(Style::Lanterns),
-        _ => Err("expected plan or lanterns".to_owned()),
+        "seat" => seat("0"),
+        _ => match text.strip_prefix("seat=") {
+            Some(numbers) => seat(numbers),
+            None => Err("expected plan, lanterns, seat or seat=TURNS,DISTANCE,HEIGHT".to_owned()),
+        },
     }
+}
+
+fn seat(text: &str) -> Result<Style, String> {
+    let numbers: Vec<f64> = text.split(',').map(|number| number.trim().parse().unwrap_or(f64::NAN)).collect();
+    let within = |at: usize, (least, most): (f64, f64)| numbers.get(at).is_none_or(|one| (least..=most).contains(one));
+    if numbers.len() > 3 || !within(0, (-1e6, 1e6)) || !within(1, (2.0, 5000.0)) || !within(2, (0.3, 1000.0)) {
+        let expected =
+            "expected turns, a distance from 2 to 5000 m and a height from 0.3 to 1000 m, as in seat=0.25,19,4.4";
+        return Err(expected.to_owned());
+    }
+    let height = numbers.get(2).copied().unwrap_or(4.4);
+    Ok(Style::Seat(Seat { turns: numbers[0], distance: numbers.get(1).copied(), height }))
 }
 
 fn theme(text: &str) -> Result<Theme, String> {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Status};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::Event;
 use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 use bench_dragon::show::scene::{Scene, printable};
@@ -11,7 +12,7 @@ use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
 use super::{
-    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, figure, progress_bar, search_timeline,
+    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, progress_bar, search_timeline,
 };
 
 /// Arguments of `events`.
@@ -47,18 +48,23 @@ struct EventLine {
 /// Prints the events of the scene.
 pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
-    let scene = text.parse()?;
+    let scene = text.parse_any()?;
     let timeline = search_timeline(&scene, common);
     let proved = match &arguments.certify {
         Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),
         None => None,
     };
-    let status = |kind: EventKind| {
-        let outcome = proved.as_ref()?.iter().find(|outcome| outcome.event == kind)?;
-        Some(&outcome.status)
+    let proof = |kind: EventKind, obstacle: Option<usize>| {
+        let outcomes = proved.as_ref()?.iter();
+        Some(&outcomes.into_iter().find(|outcome| (outcome.event, outcome.obstacle) == (kind, obstacle))?.status)
     };
+    let number = |event: &Event| {
+        let named = scene.motion.obstacle_of(event)?;
+        scene.motion.ground().obstacles().iter().position(|obstacle| obstacle.name == named.name)
+    };
+    let status = |event: &Event| proof(event.kind, number(event));
     let mut output = Output::standard();
-    for timed in timeline.events() {
+    for timed in &timeline.all() {
         if common.json {
             let TimedEvent { event, time } = *timed;
             output.json(&EventLine {
@@ -66,14 +72,14 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 time,
                 bench_a: event.bench_a,
                 bench_b: event.bench_b,
-                obstacle: scene.motion.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
+                obstacle: scene.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
                 x: event.place.map(|place| place.x),
                 y: event.place.map(|place| place.y),
-                enclosure: status(event.kind).map(enclosure),
+                enclosure: status(&event).map(enclosure),
             })?;
         } else {
             output.line(&sentence(&scene, timed))?;
-            if let Some(status) = status(timed.event.kind) {
+            if let Some(status) = status(&timed.event) {
                 output.line(&proof_sentence(timed.event.kind, status))?;
             }
         }
@@ -83,16 +89,24 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
             Some(time) => format!("up to t = {} s, where the search gave up", figure(time)),
             None => "before the motion ends".to_owned(),
         };
-        let obstacle = (!scene.motion.ground().is_empty()).then_some(EventKind::Obstacle);
+        let obstacle = (!scene.ground().is_empty()).then_some(EventKind::Obstacle);
         for kind in [EventKind::Contact].into_iter().chain(obstacle).chain([EventKind::Stall]) {
             if timeline.find(kind).is_none() {
                 match kind {
                     EventKind::Obstacle => output.line(&format!("No board meets an obstacle {until}."))?,
                     _ => output.line(&format!("There is no {} {until}.", kind.name()))?,
                 }
-                if let Some(status) = status(kind) {
+                if let Some(status) = proof(kind, None) {
                     output.line(&proof_sentence(kind, status))?;
                 }
+            }
+        }
+        for (number, obstacle) in scene.motion.ground().obstacles().iter().enumerate() {
+            if let Some(status @ (Status::None { .. } | Status::Undecided { .. })) =
+                proof(EventKind::Obstacle, Some(number))
+            {
+                output.line(&format!("Of the {}:", printable(&obstacle.name)))?;
+                output.line(&proof_sentence(EventKind::Obstacle, status))?;
             }
         }
         output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).0))?;
@@ -108,8 +122,8 @@ fn certified(
     file: &Path,
     common: &Common,
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
+    expect_one_dragon(scene)?;
     expect_exact_motion(scene)?;
-    expect_empty_ground(scene)?;
     let mut certificate = CertificateFile::create(file)?;
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| certificate.write(line);
@@ -158,13 +172,19 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
         EventKind::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
         EventKind::Contact => format!("{first} and {second} touch{place}"),
         EventKind::Obstacle => {
-            let obstacle = scene.motion.obstacle_of(&event).map_or(second, obstacle_label);
+            let obstacle = scene.obstacle_of(&event).map_or(second, obstacle_label);
             let how = if time == 0.0 { "is at" } else { "meets" };
             format!("{first} {how} {obstacle}{}{place}", if time == 0.0 { " from the start," } else { "" })
         }
         EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
         EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot continue"),
-        EventKind::PathEnd => "the head reaches the end of the path".to_owned(),
+        EventKind::PathEnd => match (&scene.ensemble, event.bench_a) {
+            (Some(all), Some(head)) => {
+                let name = all.owner(head as usize).map_or("a dragon", |(dragon, _)| &all.dragons()[dragon].name);
+                format!("the head of {name} reaches the end of the path")
+            }
+            _ => "the head reaches the end of the path".to_owned(),
+        },
     };
     format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), figure(time))
         .replace("path (counting from 1)", "path")
@@ -184,7 +204,10 @@ pub fn find_least_clearance<'t>(
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
     let freeze = timeline.freeze(scene.stops_at_contact());
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let found = scene.motion.least_clearance(timeline, freeze, &mut progress);
+    let found = match &scene.ensemble {
+        Some(ensemble) => ensemble.least_clearance(freeze, &mut progress),
+        None => scene.motion.least_clearance(timeline, freeze, &mut progress),
+    };
     bar.finish_and_clear();
     (found, freeze)
 }
@@ -203,5 +226,5 @@ pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
 
 /// Returns a bench's name for people, counted from 1.
 pub fn bench_name(scene: &Scene, bench: u32) -> String {
-    bench_dragon::messages::sentence::bench_name(bench, scene.team().benches as u32)
+    scene.bench_name(bench)
 }

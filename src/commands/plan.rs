@@ -1,5 +1,7 @@
 //! `plan`: answers for a choreographer, with the place that decides them.
 
+mod turn;
+
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::CertificateLine;
@@ -8,7 +10,7 @@ use bench_dragon::certify::plan::{
     least_pitch,
 };
 use bench_dragon::certify::speed::MOST_HANDLES;
-use bench_dragon::show::scene::Accepted;
+use bench_dragon::show::scene::{Accepted, Scene};
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
@@ -42,6 +44,12 @@ enum Question {
         #[arg(long, value_name = "FILE")]
         certify: Option<PathBuf>,
     },
+    /// The least turn radius with which the scene's team turns round without contact, stall or lock
+    Turn {
+        /// Radius of the first arc over that of the second; without it, the best that is found
+        #[arg(long, value_name = "K", allow_negative_numbers = true)]
+        arc_ratio: Option<f64>,
+    },
 }
 
 /// The line of `plan pitch --json`.
@@ -72,11 +80,12 @@ struct SpeedLine {
     ratio: f64,
 }
 
-/// Plans the pitch or the speed.
+/// Plans the pitch, the speed or the turn.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     match &arguments.question {
         Question::Pitch { reach_radius, certify } => plan_pitch(common, *reach_radius, certify.as_deref()),
         Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
+        Question::Turn { arc_ratio } => turn::plan_turn(common, *arc_ratio),
     }
 }
 
@@ -84,6 +93,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let scene = text.parse()?;
+    expect_no_obstacles(&scene)?;
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let found = if let Some(file) = file {
@@ -152,6 +162,7 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
     Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let scene = text.parse()?;
+    expect_no_obstacles(&scene)?;
     expect_exact_motion(&scene)?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
@@ -191,6 +202,15 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
         )
     })?;
     output.finish()
+}
+
+/// Refuses a scene with obstacles: a plan knows only the boards.
+fn expect_no_obstacles(scene: &Scene) -> Result<(), CommandError> {
+    if scene.motion.ground().is_empty() {
+        return Ok(());
+    }
+    let sentence = "`plan` knows no obstacles, but the scene has some: expected a scene without the table [stage]";
+    Err(CommandError::BadInput(sentence.to_owned()))
 }
 
 impl From<PlanError> for CommandError {

@@ -7,14 +7,16 @@ use std::sync::atomic::AtomicBool;
 use anstyle::Style;
 use bench_dragon::client::clock::{SystemClock, realtime_ns};
 use bench_dragon::client::shared_memory::OpenError;
+use bench_dragon::messages::Stage;
 use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon::publisher::live::control::CommandQueues;
-use bench_dragon::publisher::live::statistics::{RunSummary, Summary};
+use bench_dragon::publisher::live::statistics::{RunSummary, Sample, Summary};
 use bench_dragon::publisher::live::{Announcement, End, FrameSource, LoopCounts, TransportCounters};
 use bench_dragon::publisher::run::{self, Hooks, Published, Publishing, RunError};
 use bench_dragon::publisher::transports::{self, Transport, TransportConfig, TransportError};
 
 use super::lines::Lines;
+use super::service_manager::{self, ServiceManager};
 use super::{CommandError, Common, Output, severity_colour, shows_colour};
 
 /// Returns a new run number.
@@ -30,13 +32,13 @@ pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transpor
     Ok(run::open_transports(config, &TRANSPORTS)?)
 }
 
-/// Publishes, and prints alerts and cues of a team with `benches` on standard error.
+/// Publishes, and prints alerts and cues with the names of `stage` on standard error.
 ///
 /// # Errors
 /// [`RunError`], or no thread for the lines.
 pub fn publish(
     common: &Common,
-    benches: u32,
+    stage: &Stage,
     publishing: &Publishing,
     source: &mut (dyn FrameSource + Send),
     (transports, doors): (Vec<Box<dyn Transport>>, CommandQueues),
@@ -45,24 +47,38 @@ pub fn publish(
 ) -> Result<Published, CommandError> {
     let lines = if common.quiet || common.json { None } else { Some(Lines::start()?) };
     let print = lines.as_ref().map(Lines::printer);
+    let stage = Box::new(*stage);
     let announce = move |announcement: &Announcement| {
-        print.iter().zip(announced(announcement, benches)).for_each(|(print, line)| print(line));
+        print.iter().zip(announced(announcement, &stage)).for_each(|(print, line)| print(line));
     };
-    let hooks = Hooks { announce: Box::new(announce), ..hooks };
+    let mut manager = ServiceManager::of_this_process();
+    let is_managed = manager.is_some();
+    let Hooks { opened, mut sample, ended, .. } = hooks;
+    let sampled = move |of: &Sample| {
+        manager.iter_mut().for_each(ServiceManager::frame);
+        sample(of);
+    };
+    let stopped = move |counts| {
+        if is_managed {
+            service_manager::stopping();
+        }
+        ended(counts);
+    };
+    let hooks = Hooks { opened, announce: Box::new(announce), sample: Box::new(sampled), ended: Box::new(stopped) };
     let published = publishing.run(&SystemClock, source, transports, doors, stop, hooks);
     lines.into_iter().for_each(Lines::finish);
     Ok(published?)
 }
 
 /// Returns the line of an alert, with the countdown in wall time, or of a cue.
-fn announced(announcement: &Announcement, benches: u32) -> Option<String> {
+fn announced(announcement: &Announcement, stage: &Stage) -> Option<String> {
     match announcement {
         Announcement::Alert { alert, time_scale } => {
             let level = alert.alert_level()?;
             let colour = Style::new().fg_color(Some(severity_colour(level.severity()).into()));
             let style = if shows_colour(&std::io::stderr()) { colour } else { Style::new() };
             let figures = Figures::Shown { time_scale: *time_scale };
-            let sentence = alert_sentence(alert, benches, figures);
+            let sentence = alert_sentence(alert, stage, figures);
             Some(format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name()))
         }
         Announcement::Cue(cue) => Some(format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue))),

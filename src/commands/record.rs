@@ -133,7 +133,7 @@ fn follow(
         let polled = feed.poll(interval, &mut |event| {
             match event {
                 FeedEvent::Frame { .. } => drop(first_frame.get_or_insert_with(Instant::now)),
-                FeedEvent::Stage(_) => has_stage = true,
+                FeedEvent::Stage { .. } => has_stage = true,
                 FeedEvent::Scene { .. } => has_scene = true,
                 FeedEvent::Status(status) => {
                     let seconds = Duration::try_from_secs_f64(UNREAD_FRAMES / status.rate);

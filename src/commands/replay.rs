@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
-use bench_dragon::messages::Stage;
 use bench_dragon::messages::sentence::rounded;
+use bench_dragon::messages::{Stage, StageMessage};
 use bench_dragon::publisher::live::End;
 use bench_dragon::publisher::run::{Hooks, Publishing};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
@@ -65,7 +65,7 @@ pub struct ReplayArguments {
 /// Plays the recording until it is over, its duration is, or a signal comes.
 pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), CommandError> {
     let options = arguments.options()?;
-    let mut scene = common.load_scene()?;
+    let mut scene = common.load_any_scene()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
     }
@@ -83,16 +83,17 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let show = Ros2Show {
         loop_rate: prepared.rate(),
         alerts: prepared.contents().topics.contains(&Topic::Alerts),
-        cues: prepared.contents().stage.cues as usize,
+        cues: prepared.contents().stage.stage.cues as usize,
     };
     let ros2 = scene.ros2.as_ref().map(|settings| Ros2Request::of(common, settings, show, true)).transpose()?;
     let stop = stop_on_signals()?;
     let run_id = new_run_id();
     let stem = || arguments.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let of = prepared.contents().scene.clone().unwrap_or_else(stem);
-    let (transports, doors) = open_transports(&config(common, &scene, &prepared, run_id))?;
+    let StageMessage { stage: recorded, segments } = prepared.contents().stage.clone();
+    let stage = StageMessage { stage: Stage { run_id, stamp_ns: realtime_ns(), ..recorded }, segments };
+    let (transports, doors) = open_transports(&config(common, &scene, &prepared, &stage))?;
     let start = start_lines(&shown, &of, &prepared);
-    let benches = prepared.contents().stage.benches;
     let (mut frames, reading) = prepared.begin()?;
     let process = ros2.as_ref().map(Ros2Process::start).transpose()?;
     let publishing = Publishing {
@@ -117,7 +118,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         sample: Box::new(|_| ()),
         ended: Box::new(|_| ()),
     };
-    let mut published = publish(common, benches, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
+    let mut published = publish(common, &stage.stage, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
     published.deliveries.extend(process.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
     let (waited, failure) = reading.finish();
     if waited > 0 {
@@ -177,13 +178,17 @@ fn recording_in(path: &Path) -> Result<PathBuf, CommandError> {
 }
 
 /// Returns the transports' settings: the topics of the recording, with the scene's settings.
-fn config<'a>(common: &'a Common, scene: &'a Scene, prepared: &'a Prepared, run_id: u64) -> TransportConfig<'a> {
+fn config<'a>(
+    common: &'a Common,
+    scene: &'a Scene,
+    prepared: &'a Prepared,
+    stage: &'a StageMessage,
+) -> TransportConfig<'a> {
     let contents = prepared.contents();
-    let stage = Stage { run_id, stamp_ns: realtime_ns(), ..contents.stage };
     TransportConfig {
         handles: contents.ends[0].handles as usize,
         alerts: contents.topics.contains(&Topic::Alerts),
-        cues: (stage.cues as usize).min(MOST_CUES),
+        cues: (stage.stage.cues as usize).min(MOST_CUES),
         scene: contents.scene_text.as_deref().unwrap_or(""),
         ..TransportConfig::of(common.name(), scene, stage)
     }

@@ -80,7 +80,7 @@ pub struct RunArguments {
 pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let text = common.scene_text()?;
-    let mut scene = text.parse()?;
+    let mut scene = text.parse_any()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
     }
@@ -100,7 +100,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let timeline = if scene.alerts.is_some() {
         search_timeline(&scene, common)
     } else {
-        let timeline = scene.motion.timeline_without_contact();
+        let timeline = scene.timeline_without_contact();
         warn_of_gap(&timeline);
         timeline
     };
@@ -141,9 +141,9 @@ impl RunSession<'_> {
     /// Opens the transports, publishes, and prints the summary.
     fn run(&self, show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
         let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
-        let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.motion, &show);
+        let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, self.scene, &show);
         let config =
-            TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, stage) };
+            TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, &stage) };
         let (mut transports, doors) = open_transports(&config)?;
         // The last transport, so that the log has only published frames.
         let log = self.open_log()?.map(|(transport, outcome)| {
@@ -168,9 +168,8 @@ impl RunSession<'_> {
             sample: Box::new(|sample| histograms.iter_mut().for_each(|log| log.record(sample))),
             ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
         };
-        let benches = self.scene.team().benches as u32;
         let ends = (transports, doors);
-        let mut published = publish(self.common, benches, &publishing, &mut source, ends, stop, hooks)?;
+        let mut published = publish(self.common, &stage.stage, &publishing, &mut source, ends, stop, hooks)?;
         published.deliveries.extend(ros2.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
         print_summary(&published, self.common)?;
         let log_failure = log.and_then(|outcome| outcome.failure());
@@ -184,7 +183,7 @@ impl RunSession<'_> {
         let Some(file) = &self.arguments.log else { return Ok(None) };
         let run = (self.run_id, realtime_ns());
         let show = ShowLine::new(self.text, &self.playback, Arithmetic::of(self.scene), &self.solver, run);
-        Ok(Some(recording_log::open(file, show, self.scene.team().handles())?))
+        Ok(Some(recording_log::open(file, show, self.scene.handles())?))
     }
 
     /// Opens the log of distributions, if requested.
@@ -200,7 +199,7 @@ impl RunSession<'_> {
             return;
         }
         let (scene, playback) = (self.scene, self.playback);
-        eprintln!("Scene \"{}\": {} benches, {} handles.", scene.name, scene.team().benches, scene.team().handles());
+        eprintln!("Scene \"{}\": {} benches, {} handles.", scene.name, scene.benches(), scene.handles());
         eprintln!("Solver {}.", self.solver);
         let scale = if playback.time_scale == 1.0 {
             String::new()
@@ -214,7 +213,7 @@ impl RunSession<'_> {
             Some(_) => eprintln!("Ahead, in simulated time:"),
             None => eprintln!("No alerts: contact and stall are not computed. Ahead, in simulated time:"),
         }
-        for timed in self.timeline.events() {
+        for timed in &self.timeline.all() {
             eprintln!("{}", sentence(scene, timed));
         }
         for cue in &self.cues {

@@ -4,10 +4,11 @@
 mod ros2;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
-use bench_dragon::client::feed::Delivery;
-use bench_dragon::client::polling::poll_until;
+use bench_dragon::client::feed::{Delivery, FeedEvent};
+use bench_dragon::client::polling::{Handler, poll_until};
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::outputs::send::network::{NetworkError, Outlet, Route, destination};
 use bench_dragon::outputs::send::osc::Addresses;
@@ -162,7 +163,7 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
         }
     };
     let mut sender = PsnSender::new(options, outlet, &mut notify);
-    poll_until(&stop, names, Delivery::Newest, &mut sender)?;
+    poll_one_dragon(&stop, names, &mut sender)?;
     let summary = sender.finish();
     printed?;
     let mut output = Output::standard();
@@ -220,7 +221,7 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
             number(*rate)
         )
     })?;
-    poll_until(&stop, &common.names, Delivery::Newest, &mut senders)?;
+    poll_one_dragon(&stop, &common.names, &mut senders)?;
     let summary = senders.finish();
     let mut output = Output::standard();
     if common.json {
@@ -232,6 +233,57 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
         ))?;
     }
     output.finish()
+}
+
+/// A handler of shows of one dragon. At the first show of several it stops.
+struct OneDragon<'a, H> {
+    handler: &'a mut H,
+    stop: &'a AtomicBool,
+    names: &'a [String],
+    /// By publisher: true if its show is known to have one dragon. Other events wait for that.
+    known: Vec<bool>,
+    /// The reason to stop.
+    refused: Option<String>,
+}
+
+impl<H: Handler> Handler for OneDragon<'_, H> {
+    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
+        let Some(known) = self.known.get_mut(publisher) else { return };
+        match &event {
+            FeedEvent::Stage { stage, .. } => *known = stage.dragons.len() <= 1,
+            FeedEvent::Gone => *known = false,
+            _ => {}
+        }
+        if let FeedEvent::Stage { stage, .. } = &event
+            && !*known
+        {
+            let name = self.names.get(publisher).map_or("", String::as_str);
+            let dragons = stage.dragons.len();
+            self.refused = Some(format!("\"{name}\" has {dragons} dragons, which this command does not know"));
+            self.stop.store(true, Ordering::Relaxed);
+        }
+        if self.refused.is_none() && (*known || !matches!(event, FeedEvent::Frame { .. })) {
+            self.handler.handle(publisher, event);
+        }
+    }
+
+    fn clock(&mut self, publisher: usize, shares_clock: bool) {
+        self.handler.clock(publisher, shares_clock);
+    }
+
+    fn polled(&mut self, now: Instant) {
+        self.handler.polled(now);
+    }
+}
+
+/// Polls shows of one dragon.
+///
+/// # Errors
+/// As [`poll_until`]; and a show of several dragons.
+fn poll_one_dragon(stop: &AtomicBool, names: &[String], handler: &mut impl Handler) -> Result<(), CommandError> {
+    let mut one = OneDragon { handler, stop, names, known: vec![false; names.len()], refused: None };
+    poll_until(stop, names, Delivery::Newest, &mut one)?;
+    one.refused.map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
 }
 
 fn notice_line(name: &str, notice: &Notice) -> String {

@@ -41,14 +41,13 @@ struct TimeLine {
 
 /// Solves the scene at the requested times and prints the table.
 pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandError> {
-    let scene = common.load_scene()?;
+    let scene = common.load_any_scene()?;
     let searched = [EventKind::Contact, EventKind::Obstacle];
     let wants_contact = arguments.at.iter().any(|time| searched.iter().any(|kind| time.trim() == kind.name()));
-    let timeline =
-        if wants_contact { search_timeline(&scene, common) } else { scene.motion.timeline_without_contact() };
+    let timeline = if wants_contact { search_timeline(&scene, common) } else { scene.timeline_without_contact() };
     let (count, times) = arguments.times(&timeline)?;
-    let mut solver = scene.motion.solver(scene.velocities).solver;
-    let mut chain = Chain::new(scene.team().handles());
+    let mut solver = scene.solver();
+    let mut chain = Chain::new(scene.handles());
     let mut output = match &arguments.output {
         Some(file) => Output::file(file)?,
         None => Output::standard(),

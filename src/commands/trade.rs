@@ -59,6 +59,9 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
         [&arguments.plot, &arguments.display_plot].map(|file| file.as_deref().map(Output::file).transpose());
     let (plot_file, display_file) = (plot_file?, display_file?);
     announce(&scene, common);
+    if !scene.motion.ground().is_empty() {
+        log::warn!("`trade` leaves out the obstacles of the scene: it measures handles and the boards' first contact");
+    }
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("measuring");
     let measured = measure(&scene, &timeline, &mut |share| bar.set_position((SOLVERS * share) as u64));

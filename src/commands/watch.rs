@@ -16,7 +16,7 @@ use bench_dragon::messages::json::{AlertObject, ChaseObject, CueObject};
 use bench_dragon::messages::sentence::{Figures, alert_sentence, chase_sentence, cue_sentence, rounded, time_until};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState, Severity};
-use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus};
+use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus, Stage};
 use bench_dragon::outputs::monitor::{IntervalReport, Latency, Monitor, Presence};
 use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
@@ -88,8 +88,14 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
     let interval = Duration::from_secs(1);
     let mut next = began + interval;
     let (mut has_come, mut obstacle) = (false, Obstacle::default());
-    let mut screen =
-        Screen { display, name: common.name(), time_scale: 1.0, benches: 0, drawn: Vec::new(), answer: None };
+    let mut screen = Screen {
+        display,
+        name: common.name(),
+        time_scale: 1.0,
+        stage: Box::default(),
+        drawn: Vec::new(),
+        answer: None,
+    };
     let has_keys = display == Display::Terminal && stdin().is_terminal();
     let mut keyboard = if has_keys { Some(Keyboard::new(common.name(), &stop)?) } else { None };
     if display != Display::Json {
@@ -139,7 +145,8 @@ struct Screen<'a> {
     display: Display,
     name: &'a str,
     time_scale: f64,
-    benches: u32,
+    /// The names; empty before the stage has come.
+    stage: Box<Stage>,
     /// The lines of the last report on the terminal, which the next report replaces.
     drawn: Vec<String>,
     /// The playback state after the last key: the last line of the report.
@@ -194,8 +201,10 @@ impl Screen<'_> {
 
     /// Prints an event at once for people; with `--json` only alerts and cues.
     fn print_event(&mut self, event: &FeedEvent<'_>) -> Result<(), CommandError> {
-        if let FeedEvent::Frame { header, .. } = event {
-            (self.time_scale, self.benches) = (header.time_scale, header.handles.saturating_sub(1));
+        match event {
+            FeedEvent::Frame { header, .. } => self.time_scale = header.time_scale,
+            FeedEvent::Stage { stage, .. } => *self.stage = **stage,
+            _ => (),
         }
         if self.display == Display::Json {
             let mut output = stdout().lock();
@@ -213,7 +222,7 @@ impl Screen<'_> {
             FeedEvent::Silent => format!("The publisher of \"{name}\" is running but sends nothing."),
             FeedEvent::Alert(alert) => self.alert_line(alert),
             FeedEvent::Cue(cue) => format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue)),
-            FeedEvent::Frame { .. } | FeedEvent::Stage(_) | FeedEvent::Scene { .. } => return Ok(()),
+            FeedEvent::Frame { .. } | FeedEvent::Stage { .. } | FeedEvent::Scene { .. } => return Ok(()),
             FeedEvent::Status(_) | FeedEvent::Chase(_) => return Ok(()),
         };
         if self.display == Display::Terminal && matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {
@@ -310,7 +319,7 @@ impl Screen<'_> {
     fn alert_line(&self, alert: &CollisionAlert) -> String {
         let level = alert.alert_level().unwrap_or(Level::Clear);
         let style = self.style(level.severity());
-        let sentence = alert_sentence(alert, self.benches, Figures::Shown { time_scale: self.time_scale });
+        let sentence = alert_sentence(alert, &self.stage, Figures::Shown { time_scale: self.time_scale });
         format!("{:>10.3} s  {style}{:<11}{style:#} {sentence}", alert.sim_time, level.name())
     }
 

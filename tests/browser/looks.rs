@@ -1,6 +1,6 @@
 //! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show look.
 //!
-//! The tests are in `tests/python/stage_transport.py` and `stage_show.py`. No test asserts a speed.
+//! The tests are in `tests/python/stage_transport.py`, `stage_show.py` and `stage_seat.py`. No test asserts a speed.
 
 use crate::view::run_scenario;
 
@@ -32,4 +32,14 @@ fn labels_move_with_their_boards() {
 #[test]
 fn turns_keep_the_colours_of_boards() {
     run_scenario("tests/python/stage_colours.py", "turns_keep_the_colours_of_boards");
+}
+
+#[test]
+fn seat_shows_the_dragon() {
+    run_scenario("tests/python/stage_seat.py", "seat_shows_the_dragon");
+}
+
+#[test]
+fn cameras_are_kept() {
+    run_scenario("tests/python/stage_seat.py", "cameras_are_kept");
 }

@@ -88,11 +88,11 @@ fn a_program_reads_the_documented_layout() {
         }
     };
     let numbers = ["pitch", "start_turn", "hole_inset", "head_length", "body_length", "width", "benches"];
-    let received: Vec<_> = numbers.iter().map(|key| stage[key].as_f64().unwrap()).collect();
+    let received: Vec<_> = numbers.iter().map(|key| stage["dragons"][0][key].as_f64().unwrap()).collect();
     assert_eq!(received, [0.55, 16.0, 0.275, 3.41, 2.2, 0.3, 223.0]);
-    assert_eq!(stage["path"].as_array().unwrap().len(), 1);
-    assert_eq!(stage["path"][0]["kind"], "inward_spiral");
-    assert_eq!(stage["path"][0]["theta_first"], 32.0 * std::f64::consts::PI);
+    assert_eq!(stage["dragons"][0]["path"].as_array().unwrap().len(), 1);
+    assert_eq!(stage["dragons"][0]["path"][0]["kind"], "inward_spiral");
+    assert_eq!(stage["dragons"][0]["path"][0]["theta_first"], 32.0 * std::f64::consts::PI);
     let bytes = frame(&mut socket);
     assert_eq!(bytes.len(), 72 + 20 * 224);
     assert_eq!(bytes[..4], [3, 0, 0, 0], "version 3, moving, playing");

@@ -1,6 +1,7 @@
 //! `[stage]`: first touches and least clearances against shapely, and a sentence for each wrong table.
 
 use std::io::Write;
+use std::path::Path;
 use std::process::{Command, Output};
 
 use tempfile::NamedTempFile;
@@ -101,10 +102,34 @@ fn what_no_proof_knows_is_refused() {
     let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("certificate");
-    for arguments in [vec!["events", "--certify", file.to_str().unwrap()], vec!["check", "--prove"]] {
+    let file = file.to_str().unwrap();
+    for arguments in [vec!["check", "--prove"], vec!["check", "--prove", "--certify", file]] {
         assert!(refusal(&scene, &arguments).contains("no proof knows yet"), "{arguments:?}");
     }
-    assert!(!file.exists());
+    assert!(!Path::new(file).exists());
+}
+
+#[test]
+fn the_first_touch_of_an_obstacle_is_proved_and_verified() {
+    let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("certificate");
+    let file = file.to_str().unwrap();
+    let printed = run(&scene, &["events", "--certify", file]);
+    assert!(printed.status.success(), "{printed:?}");
+    let mut verify = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let verified = verify.args(["verify", file]).output().unwrap();
+    assert!(verified.status.success(), "{verified:?}");
+    let text = String::from_utf8(verified.stdout).unwrap();
+    assert!(text.contains("obstacle"), "{text}");
+}
+
+#[test]
+fn plans_refuse_obstacles_in_one_sentence() {
+    let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    for arguments in [["plan", "pitch", "--reach-radius=4.5"], ["plan", "speed", "--max-handle-speed=2"]] {
+        assert!(refusal(&scene, &arguments).contains("`plan` knows no obstacles"), "{arguments:?}");
+    }
 }
 
 #[test]

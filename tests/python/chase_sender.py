@@ -20,8 +20,7 @@ import time
 
 import iceoryx2 as iox2
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-from bench_dragon_messages import FrameHeader, HandlePose  # noqa: E402
+from bench_dragon import FrameHeader, HandlePose
 
 
 class Frames(threading.Thread):

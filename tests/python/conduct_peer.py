@@ -7,21 +7,17 @@
 
 import argparse
 import json
-import pathlib
 import random
-import sys
 import time
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-
-from conduct import COMMANDS, Conductor  # noqa: E402
+from bench_dragon import COMMANDS, Controller
 
 
 def line(**fields):
     print(json.dumps(fields), flush=True)
 
 
-def table(conductor):
+def table(controller):
     values = {"rate": 2.0, "seek": 5.0, "step": 3.0}
     states = {
         "playing": [("release", 0), ("resume", 0)],
@@ -31,32 +27,30 @@ def table(conductor):
     for state, steps in states.items():
         for command in COMMANDS:
             for before in [("release", 0), ("resume", 0), ("rate", 1.0), *steps]:
-                conductor.send(*before)
-            answer = conductor.send(command, values.get(command, 0.0))
+                controller.send(*before)
+            answer = controller.send(command, values.get(command, 0.0))
             line(state=state, command=command, code=answer.code, playback=answer.playback, tick=answer.tick)
-    conductor.send("release")
+    controller.send("release")
     for number, value in ((10, 0.0), (4294967295, 0.0), (3, float("nan")), (3, 1e7), (4, -1.0), (4, 1e9), (5, 0.0), (5, 0.5)):
-        answer = conductor.send(number, value)
+        answer = controller.send(number, value)
         line(state="any", command=number, value=None if value != value else value, code=answer.code)
 
 
-def latency(conductor):
+def latency(controller):
     chance = random.Random(5)
     for _ in range(60):
         time.sleep(chance.uniform(0.0, 0.05))
         sent = time.monotonic_ns()
-        answer = conductor.send("state")
+        answer = controller.send("state")
         line(ms=(time.monotonic_ns() - sent) / 1e6, tick=answer.tick, code=answer.code)
 
 
-def flood(conductor):
-    from bench_dragon_messages import ControlRequest
-
+def flood(controller):
     pending = []
     line(type="flooding")
     while True:
         try:
-            pending.append(conductor._client.send_copy(ControlRequest(id=1, value=0.0, command=0, reserved=0)))
+            pending.append(controller.request("state"))
         except Exception:
             pending.clear()
 
@@ -66,7 +60,7 @@ def main():
     parser.add_argument("--name", required=True)
     parser.add_argument("what", choices=["table", "latency", "flood"])
     arguments = parser.parse_args()
-    {"table": table, "latency": latency, "flood": flood}[arguments.what](Conductor(arguments.name))
+    {"table": table, "latency": latency, "flood": flood}[arguments.what](Controller(arguments.name))
 
 
 if __name__ == "__main__":

@@ -16,12 +16,21 @@ import time
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
 
-import hermite  # noqa: E402
+from bench_dragon import HermiteReader, subscribe  # noqa: E402
 import ros2_display  # noqa: E402
 
 
 # No wait here lasts forever.
 WATCHDOG = 250.0
+
+
+def shared_memory_frames(name, seconds):
+    end = time.monotonic() + seconds
+    with subscribe(name) as feed:
+        while time.monotonic() < end:
+            while (frame := feed.poll()) is not None:
+                yield frame.header, frame.handles
+            yield None
 
 
 def ros2_frames(name, seconds):
@@ -47,8 +56,8 @@ def main():
     parser.add_argument("--moments", type=int, required=True)
     parser.add_argument("--delay", type=float, required=True)
     arguments = parser.parse_args()
-    frames = {"iceoryx2": hermite.frames, "ros2": ros2_frames}[arguments.transport]
-    shown, chance, reader, count, between = [], random.Random(7), hermite.HermiteReader(), 0, 0
+    frames = {"iceoryx2": shared_memory_frames, "ros2": ros2_frames}[arguments.transport]
+    shown, chance, reader, count, between = [], random.Random(7), HermiteReader(), 0, 0
     for frame in frames(arguments.name, WATCHDOG):
         if between >= arguments.moments:
             break

@@ -7,15 +7,12 @@ Prints a JSON line with the counts, and ends with an error if a frame is not its
 
 import argparse
 import json
-import pathlib
-import sys
 import time
 
 import iceoryx2 as iox2
 import numpy as np
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-from bench_dragon_messages import FrameHeader, HandlePose, HandlePose32, handles_of, indices_of  # noqa: E402
+from bench_dragon import FrameHeader, HandlePose, HandlePose32, handles_of, indices_of
 
 # Each message has its own sending time and its own count.
 OF_THE_FRAME = [name for name, _ in FrameHeader._fields_ if name not in ("sent_ns", "handles")]

@@ -19,17 +19,14 @@ import pathlib
 import socket
 import struct
 import subprocess
-import sys
 import threading
 import time
 
 import numpy as np
 import pypsn
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-
-import bench_dragon_messages as messages  # noqa: E402
-import iceoryx2 as iox2  # noqa: E402
+import bench_dragon as messages
+import iceoryx2 as iox2
 
 
 def listen(port, group):

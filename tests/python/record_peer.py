@@ -14,13 +14,10 @@ import json
 import math
 import pathlib
 import pickle
-import sys
 import time
 from collections import Counter, defaultdict
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-
-import bench_dragon_messages as messages
+import bench_dragon as messages
 
 KINDS = {
     "stage": messages.Stage,
@@ -46,6 +43,8 @@ def subscribe(name, kept):
             builder = node.service_builder(iox2.ServiceName.new(f"{name}/{kind}"))
             if kind == "poses":
                 builder = builder.publish_subscribe(iox2.Slice[messages.HandlePose]).user_header(messages.FrameHeader)
+            elif kind == "stage":
+                builder = builder.publish_subscribe(iox2.Slice[messages.StageSegment]).user_header(messages.Stage)
             else:
                 builder = builder.publish_subscribe(KINDS[kind])
             try:
@@ -63,6 +62,11 @@ def subscribe(name, kept):
                     count = sample.header.number_of_elements
                     handles = (ctypes.c_char * (40 * count)).from_address(sample.payload_ptr).raw
                     got["poses"].append((bytes(sample.user_header().contents), handles))
+                elif kind == "stage":
+                    # The header, and then the segments.
+                    size = ctypes.sizeof(messages.StageSegment) * sample.header.number_of_elements
+                    segments = (ctypes.c_char * size).from_address(sample.payload_ptr).raw
+                    got[kind].append(bytes(sample.user_header().contents) + segments)
                 else:
                     got[kind].append(bytes(sample.payload().contents))
                 sample.delete()
@@ -95,6 +99,10 @@ def equal(decoded, expected, where):
     if isinstance(decoded, str):
         name = expected if isinstance(expected, bytes) else bytes(expected).rstrip(b"\0")
         assert decoded == name.decode(), f"{where}: {decoded}, expected {name}"
+    elif hasattr(expected, "ELEMENT"):
+        assert len(decoded) == len(expected), where
+        for index, (theirs, ours) in enumerate(zip(decoded, expected)):
+            equal(theirs, ours, f"{where}[{index}]")
     elif isinstance(expected, ctypes.Structure):
         same(decoded, expected, where)
     elif isinstance(expected, ctypes.Array):
@@ -130,6 +138,9 @@ class Comparison:
         ]
         self.by_stamp = {header.stamp_ns: (header, handles) for header, handles in self.frames}
         self.events = {kind: [of.from_buffer_copy(raw) for raw in kept.get(kind, [])] for kind, of in KINDS.items()}
+        segments = [raw[ctypes.sizeof(messages.Stage) :] for raw in kept.get("stage", [])]
+        count = [len(raw) // ctypes.sizeof(messages.StageSegment) for raw in segments]
+        self.segments = [(messages.StageSegment * n).from_buffer_copy(raw) for n, raw in zip(count, segments)]
         self.seen, self.counts, self.first = defaultdict(list), Counter(), None
 
     def message(self, topic, stamp_ns, sequence, message):
@@ -147,6 +158,8 @@ class Comparison:
             assert stamp_ns == expected.stamp_ns, where
             stamped(message, stamp_ns, where)
             same(message, expected, where)
+            if kind == "stage":
+                equal(message.segments, self.segments[index], f"{where}.segments")
         elif kind in ("/diagnostics", "path"):
             getattr(self, kind.strip("/"))(message, index, stamp_ns, where)
         else:
@@ -207,7 +220,7 @@ class Comparison:
         assert stamp_ns == stage.stamp_ns and len(message.poses) > 100, where
         for pose in message.poses:
             x, y = pose.pose.position.x, pose.pose.position.y
-            turns = math.hypot(x, y) / stage.pitch
+            turns = math.hypot(x, y) / stage.dragons[0].pitch
             off = math.remainder(math.atan2(y, x) / math.tau - turns, 1.0)
             assert abs(off) < 1e-9 or math.hypot(x, y) < 1e-9, (where, off)
 
@@ -234,7 +247,8 @@ def compare(name, kept, recordings):
             attached = json.loads(attachments["bench_dragon.json"])
             scene_hash = bytes(comparison.events["stage"][0].scene_hash)
             assert blake3(attachments["scene.toml"]).digest() == scene_hash, "another scene than the show's"
-            assert attached["name"] == name and attached["stage"]["benches"] == comparison.events["stage"][0].benches
+            dragon = comparison.events["stage"][0].dragons[0]
+            assert attached["name"] == name and attached["stage"]["dragons"][0]["benches"] == dragon.benches
             assert int(attached["run_id"]) == comparison.frames[0][0].run_id
             assert min(times) >= comparison.first, "a time before all frames"
             sizes.append(len(times))

@@ -81,11 +81,8 @@ class SharedMemory:
     """The frames of the shared memory by their stamp: sequence and handles."""
 
     def __init__(self, name):
-        import sys
-
-        sys.path.insert(0, "examples/python")
         import iceoryx2 as iox2
-        from bench_dragon_messages import FrameHeader, HandlePose, handles_of
+        from bench_dragon import FrameHeader, HandlePose, handles_of
 
         iox2.set_log_level(iox2.LogLevel.Fatal)
         self._handles_of = handles_of

@@ -151,7 +151,7 @@ def from_file(name, known):
 
 KNOWN = {"std_msgs/Header": Header}
 KNOWN["HandlePose"] = from_file("HandlePose", KNOWN)
-for part in ("StageSegment", "StageEvent", "StageCue"):
+for part in ("StageSegment", "StageDragon", "StageObstacle", "StageEvent", "StageCue"):
     KNOWN[part] = from_file(part, KNOWN)
 TOPICS = {
     "handles": from_file("HandlePoses", KNOWN),
@@ -189,11 +189,11 @@ def shortened(kind, sample):
     return plain(sample)
 
 
-def quality(reliability, durability):
+def quality(reliability, durability, depth=100):
     return Qos(
         Policy.Reliability.Reliable(duration(seconds=1)) if reliability == "reliable" else Policy.Reliability.BestEffort,
         Policy.Durability.TransientLocal if durability == "transient_local" else Policy.Durability.Volatile,
-        Policy.History.KeepLast(100),
+        Policy.History.KeepLast(depth),
     )
 
 

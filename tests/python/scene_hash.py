@@ -14,9 +14,10 @@ import blake3
 import iceoryx2 as iox2
 from by_design import opaque
 
-# Nine numbers of eight bytes and four of four come before the hash.
-HASH = slice(9 * 8 + 4 * 4, 9 * 8 + 4 * 4 + 32)
-SIZE = HASH.stop + 32 * 64 + 4 * 16 + 32 * 80
+# Three numbers of eight bytes and two of four come before the hash. After it stand four lists, each with its length and
+# room for dragons, obstacles, events and cues.
+HASH = slice(3 * 8 + 2 * 4, 3 * 8 + 2 * 4 + 32)
+SIZE = HASH.stop + (8 + 16 * 128) + (8 + 65 * 88) + (8 + 160 * 24) + (8 + 32 * 80)
 
 
 def main():
@@ -27,7 +28,7 @@ def main():
     iox2.set_log_level(iox2.LogLevel.Fatal)
     node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
     service = node.service_builder(iox2.ServiceName.new(f"{arguments.name}/stage"))
-    service = service.publish_subscribe(opaque("Stage", 5, SIZE))
+    service = service.publish_subscribe(iox2.Slice[opaque("StageSegment", 6, 72)]).user_header(opaque("Stage", 6, SIZE))
     deadline = time.monotonic() + 60
     while True:
         try:
@@ -41,7 +42,7 @@ def main():
     while (sample := stages.receive()) is None:
         assert time.monotonic() < deadline, "no stage came"
         time.sleep(0.02)
-    published = bytes(sample.payload().contents)[HASH].hex()
+    published = bytes(sample.user_header().contents)[HASH].hex()
     sample.delete()
     computed = blake3.blake3(pathlib.Path(arguments.scene).read_bytes()).hexdigest()
     print(json.dumps({"published": published, "computed": computed}))

@@ -9,14 +9,12 @@ they do not come in time.
 import argparse
 import ctypes
 import json
-import pathlib
 import sys
 import time
 
 import iceoryx2 as iox2
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-import bench_dragon_messages as messages
+import bench_dragon as messages
 
 
 def received(node, name, payload, header, end):
@@ -50,8 +48,8 @@ def main():
     text = bytes((ctypes.c_uint8 * length).from_address(scene.payload_ptr)).decode()
     line = {"run_id": header.run_id, "hash": bytes(header.hash).hex(), "text": text}
     scene.delete()
-    stage = received(node, f"{name}/stage", messages.Stage, None, end)
-    shown = stage.payload().contents
+    stage = received(node, f"{name}/stage", iox2.Slice[messages.StageSegment], messages.Stage, end)
+    shown = stage.user_header().contents
     print(json.dumps(line | {"stage_run_id": shown.run_id, "stage_hash": bytes(shown.scene_hash).hex()}))
     stage.delete()
 

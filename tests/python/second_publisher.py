@@ -10,14 +10,10 @@ ends it.
 
 import argparse
 import json
-import pathlib
 import signal
-import sys
 import time
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
-
-import bench_dragon_messages as messages
+import bench_dragon as messages
 import iceoryx2 as iox2
 
 FOREIGN_RUN = 7
@@ -42,19 +38,21 @@ def main():
     node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
     kinds = {
         "status": messages.LoopStatus,
-        "stage": messages.Stage,
+        "stage": iox2.Slice[messages.StageSegment],
         "alerts": messages.CollisionAlert,
         "poses": iox2.Slice[messages.HandlePose],
     }
+    headers = {"poses": messages.FrameHeader, "stage": messages.Stage}
     services = {}
     while len(services) < len(kinds):
         for kind in kinds.keys() - services.keys():
             builder = node.service_builder(iox2.ServiceName.new(f"{name}/{kind}")).publish_subscribe(kinds[kind])
             try:
-                services[kind] = (builder.user_header(messages.FrameHeader) if kind == "poses" else builder).open()
+                services[kind] = (builder.user_header(headers[kind]) if kind in headers else builder).open()
             except iox2.PublishSubscribeOpenError:
                 time.sleep(0.02)
-    make = {kind: services[kind].publisher_builder for kind in ("status", "stage", "alerts")}
+    make = {kind: services[kind].publisher_builder for kind in ("status", "alerts")}
+    make["stage"] = lambda: services["stage"].publisher_builder().initial_max_slice_len(1)
     make["poses"] = lambda: services["poses"].publisher_builder().initial_max_slice_len(224)
     ports = {kind: builder().create() for kind, builder in make.items()}
     stages = services["stage"].subscriber_builder().create()
@@ -63,7 +61,7 @@ def main():
     sequence = 0
     while not told:
         while (sample := stages.receive()) is not None:
-            stage = sample.payload().contents
+            stage = sample.user_header().contents
             print(json.dumps({"type": "stage", "run_id": stage.run_id, "stamp_ns": stage.stamp_ns}), flush=True)
             sample.delete()
         if len(sending) > 1:

@@ -1,28 +1,25 @@
 """A subscriber of either transport, which prints its messages in one form, whatever the transport.
 
-    transport_peer.py --transport iceoryx2|ros2 --name NAME --seconds S
+    transport_peer.py --transport iceoryx2|ros2 --name NAME --seconds S [--until KIND ...]
 
 Prints a JSON line for every frame, alert, stage and status, in the order of reading, and one at the end. It may be
 started before the publisher, and stays while publishers come and go. After SIGTERM it stays until the last of them has
-gone and all its messages are read.
+gone and all its messages are read. With --until it ends a second after a message of each of these kinds has come.
 """
 
 import argparse
 import json
 import math
-import pathlib
 import signal
-import sys
 import time
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "python"))
 
 
 class Iceoryx2:
     """The services in shared memory, opened when they appear."""
 
     def __init__(self, name):
-        import bench_dragon_messages as messages
+        import bench_dragon as messages
         import iceoryx2 as iox2
 
         iox2.set_log_level(iox2.LogLevel.Fatal)
@@ -35,7 +32,7 @@ class Iceoryx2:
     def open(self):
         iox2, messages = self.iox2, self.messages
         kinds = {
-            "stage": (messages.Stage, None),
+            "stage": (iox2.Slice[messages.StageSegment], messages.Stage),
             "alerts": (messages.CollisionAlert, None),
             "status": (messages.LoopStatus, None),
             "poses": (iox2.Slice[messages.HandlePose], messages.FrameHeader),
@@ -57,6 +54,8 @@ class Iceoryx2:
                 if kind == "poses":
                     handles = self.messages.handles_of(sample)
                     yield "frame", sample.user_header().contents, [(h["x"], h["y"]) for h in handles[:2]], len(handles)
+                elif kind == "stage":
+                    yield kind, sample.user_header().contents, None, None
                 else:
                     yield {"alerts": "alert"}.get(kind, kind), sample.payload().contents, None, None
                 sample.delete()
@@ -80,7 +79,8 @@ class Ros2:
         self.peer, self.readers = peer, {}
         for topic in self.KINDS:
             durability = "transient_local" if topic in ("stage", "alerts") else "volatile"
-            qos = peer.quality("reliable", durability)
+            # All messages of a run: this process may stand still for seconds on a busy machine.
+            qos = peer.quality("reliable", durability, 4000)
             described = Topic(participant, f"rt/{name}/{topic}", peer.TOPICS[topic])
             self.readers[topic] = DataReader(participant, described, qos=qos)
 
@@ -100,7 +100,7 @@ class Ros2:
 FIELDS = {
     "frame": ("run_id", "sequence", "tick", "sim_time", "state", "epoch", "handles"),
     "alert": ("run_id", "tick", "level", "event", "event_time", "event_bench_a", "event_bench_b"),
-    "stage": ("run_id", "benches", "segments", "body_length"),
+    "stage": ("run_id", "freeze_time", "cues"),
     "status": ("run_id", "sequence", "tick", "rate", "skipped"),
 }
 
@@ -110,21 +110,29 @@ def main():
     parser.add_argument("--transport", choices=["iceoryx2", "ros2"], required=True)
     parser.add_argument("--name", required=True)
     parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--until", nargs="+", default=[])
     arguments = parser.parse_args()
     told = []
     signal.signal(signal.SIGTERM, lambda *_: told.append(True))
     peer = {"iceoryx2": Iceoryx2, "ros2": Ros2}[arguments.transport](arguments.name)
     print(json.dumps({"type": "ready"}), flush=True)
     end = time.monotonic() + arguments.seconds
+    awaited = set(arguments.until)
     over = False
     while not over:
         # Tested before the remaining messages are read.
         over = time.monotonic() >= end or (bool(told) and peer.publishers() == 0)
         for kind, message, handles, count in peer.take():
             line = {"type": kind} | {field: getattr(message, field) for field in FIELDS[kind]}
+            if kind == "stage":
+                dragon = message.dragons[0]
+                line |= {field: getattr(dragon, field) for field in ("benches", "segments", "body_length")}
             if kind == "frame":
                 line |= {"count": count, "link": math.dist(*map(lambda xy: tuple(map(float, xy)), handles))}
             print(json.dumps(line))
+            if awaited == {kind}:
+                end = min(end, time.monotonic() + 1.0)
+            awaited.discard(kind)
         time.sleep(0.002)
     print(json.dumps({"type": "end", "publishers": peer.publishers()}), flush=True)
 

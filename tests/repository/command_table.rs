@@ -3,7 +3,7 @@
 use bench_dragon::messages::control::{Code, Command, CommandEntry, CommandValue};
 
 const LAYOUTS: &str = include_str!("../../crates/messages/src/layouts/control.rs");
-const PYTHON: &str = include_str!("../../examples/python/conduct.py");
+const PYTHON: &str = include_str!("../../packaging/python/bench_dragon/control.py");
 const CONDUCTING: &str = include_str!("../../docs/conducting.md");
 
 /// Returns the text of `file` between `begin` and the next `end`.
@@ -26,7 +26,7 @@ fn the_layouts_list_every_command_and_code() {
 }
 
 #[test]
-fn the_python_example_has_every_command_and_code() {
+fn the_python_module_has_every_command_and_code() {
     let tuple = |words: Vec<&str>| words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
     let commands = tuple(Command::TABLE.iter().map(|entry| entry.name).collect());
     assert_eq!(between(PYTHON, "\nCOMMANDS = (", ")\n"), commands);

@@ -1,6 +1,6 @@
 //! The messages of other languages: `crates/messages/src/layouts.rs` and the enums in `crates/messages/src/state.rs`
 //! are the single source of fields, types, versions, constants and their comments. `msgs/msg/*.msg` and
-//! `examples/python/bench_dragon_messages.py` are generated from these: after a change run
+//! `packaging/python/bench_dragon/layouts.py` are generated from these: after a change run
 //!
 //! ```text
 //! BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
@@ -27,9 +27,10 @@ use std::sync::LazyLock;
 
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon::messages::{
-    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32,
-    LoopStatus, NO_BENCH, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneHeader, Stage,
-    StageCue, StageEvent, StageSegment,
+    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, List,
+    LoopStatus, NO_BENCH, OBSTACLE_BOUNDARY, OBSTACLE_CIRCLE, OBSTACLE_LINE, OBSTACLE_POLYGON, SEGMENT_ARC,
+    SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneHeader, Stage, StageCue, StageDragon, StageEvent,
+    StageMessage, StageObstacle, StageSegment,
 };
 use bench_dragon::ros2_messages::settings::Topic;
 use bench_dragon::ros2_messages::{HandlePoses, Header, MessageType, Stamped};
@@ -39,7 +40,7 @@ use serde_json::{Value, json};
 use serde_reflection::{ContainerFormat, Format, Registry, Samples, Tracer, TracerConfig};
 use source::Source;
 
-const PYTHON: &str = "examples/python/bench_dragon_messages.py";
+const PYTHON: &str = "packaging/python/bench_dragon/layouts.py";
 
 fn path(file: &str) -> String {
     format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))
@@ -56,9 +57,7 @@ static DIFFERENCES: LazyLock<Vec<String>> = LazyLock::new(|| {
     let interfaces = ros::MESSAGES.iter();
     let interfaces =
         interfaces.map(|message| (format!("msgs/msg/{}.msg", message.name), ros::interface_file(&source, message)));
-    let module = read(PYTHON);
-    let (_, by_hand) = module.split_once(python::BY_HAND).expect("the part of the Python file that is written by hand");
-    let module = python::module(&source) + by_hand;
+    let module = python::module(&source);
     let mut differences = Vec::new();
     for (file, wanted) in interfaces.chain([(PYTHON.to_owned(), module)]) {
         let found = read(&file);
@@ -142,6 +141,17 @@ fn interface(name: &str) -> Interface {
     interface
 }
 
+/// A stage with one element in each list: serde shows no element of an empty list.
+fn full_stage() -> Stage {
+    Stage {
+        dragons: List::of([StageDragon::default()]),
+        obstacles: List::of([StageObstacle::default()]),
+        events: List::of([StageEvent::default()]),
+        cue_list: List::of([StageCue::default()]),
+        ..Stage::default()
+    }
+}
+
 /// Returns serde's output for a message: (type, field) in the words of ROS 2, with nested layouts expanded.
 fn on_the_wire<T: Serialize>(message: &T) -> Vec<(String, String)> {
     let mut tracer = Tracer::new(TracerConfig::default());
@@ -188,9 +198,14 @@ fn fields_types_and_order_are_those_that_serde_writes() {
         ("HandlePoses", on_the_wire(&frame)),
         ("CollisionAlert", on_the_wire(&Stamped::alert(CollisionAlert::default()))),
         ("LoopStatus", on_the_wire(&Stamped::status(LoopStatus::default()))),
-        ("Stage", on_the_wire(&Stamped::stage(Stage::default()))),
+        (
+            "Stage",
+            on_the_wire(&Stamped::stage(StageMessage { stage: full_stage(), segments: vec![StageSegment::default()] })),
+        ),
         ("Cue", on_the_wire(&Stamped::cue(Cue::default()))),
         ("StageSegment", on_the_wire(&StageSegment::default())),
+        ("StageDragon", on_the_wire(&StageDragon::default())),
+        ("StageObstacle", on_the_wire(&StageObstacle::default())),
         ("StageEvent", on_the_wire(&StageEvent::default())),
         ("StageCue", on_the_wire(&StageCue::default())),
     ];
@@ -225,6 +240,7 @@ struct Names {
     levels: Vec<Option<&'static str>>,
     playback: Vec<&'static str>,
     segments: Vec<&'static str>,
+    obstacles: Vec<&'static str>,
     /// All events that lead to a state, by its number.
     events: BTreeMap<u32, &'static str>,
     /// The events that an alert can be about.
@@ -241,6 +257,9 @@ fn names() -> Names {
     let kind = |kind| StageSegment { kind, ..Default::default() }.kind_name();
     let segments = [SEGMENT_LINE, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL];
     assert_eq!(kind(segments.len() as u32), "unknown", "a segment is not compared");
+    let shape = |kind| StageObstacle { kind, ..Default::default() }.kind_name();
+    let obstacles = [OBSTACLE_CIRCLE, OBSTACLE_POLYGON, OBSTACLE_LINE, OBSTACLE_BOUNDARY];
+    assert_eq!(shape(obstacles.len() as u32), "unknown", "an obstacle is not compared");
     let events = FrameState::ALL.into_iter().filter_map(|state| Some((state as u32, state.event()?)));
     let alerted = events.clone().filter(|(_, kind)| Level::of(*kind).is_some());
     Names {
@@ -250,6 +269,7 @@ fn names() -> Names {
             .collect(),
         playback: in_order(PlaybackState::ALL.map(|playback| (playback as u32, playback.name()))),
         segments: in_order(segments.map(|number| (number, kind(number)))),
+        obstacles: in_order(obstacles.map(|number| (number, shape(number)))),
         events: events.map(|(number, kind)| (number, kind.name())).collect(),
         alerted: alerted.map(|(number, kind)| (number, kind.name())).collect(),
     }
@@ -271,8 +291,9 @@ fn constants_are_the_states_levels_events_playback_and_segments() {
     alert.extend([("EVENT_NONE".to_owned(), 0), ("NO_BENCH".to_owned(), NO_BENCH)]);
     assert_eq!(interface("CollisionAlert").constants, alert);
     assert_eq!(interface("StageSegment").constants, in_order("", &names.segments));
+    assert_eq!(interface("StageObstacle").constants, in_order("", &names.obstacles));
     assert_eq!(interface("StageEvent").constants, in_order("STATE_", &names.states));
-    for name in ["HandlePose", "LoopStatus", "Stage", "Cue", "StageCue"] {
+    for name in ["HandlePose", "LoopStatus", "Stage", "Cue", "StageDragon", "StageCue"] {
         assert_eq!(interface(name).constants, BTreeMap::new(), "{name}");
     }
 }
@@ -280,9 +301,12 @@ fn constants_are_the_states_levels_events_playback_and_segments() {
 /// Returns a layout as Python must see it: its name for iceoryx2, its size, and each field's name, type, offset and
 /// size.
 fn layout<T: Serialize + ZeroCopySend + Default>() -> Value {
-    let value = T::default();
-    let members = memory::members(&value);
-    let types = on_the_wire(&value);
+    layout_of(&T::default())
+}
+
+fn layout_of<T: Serialize + ZeroCopySend>(value: &T) -> Value {
+    let members = memory::members(value);
+    let types = on_the_wire(value);
     assert_eq!(members.len(), types.len());
     let fields = members.iter().zip(&types).map(|((name, offset, size), (kind, name_on_the_wire))| {
         assert_eq!(name, name_on_the_wire);
@@ -298,13 +322,15 @@ fn layout<T: Serialize + ZeroCopySend + Default>() -> Value {
 /// Prints Python's data on the layouts, in the words of ROS 2, and the names of numbers.
 const SCRIPT: &str = r#"
 import ctypes, json, sys
-sys.path.insert(0, "examples/python")
-import bench_dragon_messages as m
+sys.path.insert(0, "packaging/python")
+import bench_dragon as m
 
 WORDS = {ctypes.c_double: "float64", ctypes.c_float: "float32", ctypes.c_uint64: "uint64", ctypes.c_uint32: "uint32",
          ctypes.c_uint8: "uint8"}
 
 def word(of):
+    if hasattr(of, "ELEMENT"):
+        return f"{word(of.ELEMENT)}[]"
     if issubclass(of, ctypes.Array):
         # A text is as long as no array of other bytes is.
         is_text = of._type_ is ctypes.c_uint8 and of._length_ == 64
@@ -317,8 +343,8 @@ def layout(of):
 
 print(json.dumps({
     "messages": [layout(message) for message in m.MESSAGES],
-    "parts": [layout(part) for part in [m.StageSegment, m.StageEvent, m.StageCue]],
-    "names": [m.STATES, m.LEVELS, m.PLAYBACK, m.SEGMENTS, m.EVENTS],
+    "parts": [layout(part) for part in [m.StageSegment, m.StageDragon, m.StageObstacle, m.StageEvent, m.StageCue]],
+    "names": [m.STATES, m.LEVELS, m.PLAYBACK, m.SEGMENTS, m.EVENTS, m.OBSTACLES],
     "no_bench": m.NO_BENCH,
     "handle_poses": [m.HANDLE_POSE.itemsize, m.HANDLE_POSE_32.itemsize],
 }))
@@ -342,18 +368,24 @@ fn python_sees_the_layouts_and_the_names_of_rust() {
         layout::<ControlRequest>(),
         layout::<ControlResponse>(),
         layout::<SceneHeader>(),
-        layout::<Stage>(),
+        layout_of(&full_stage()),
     ];
     assert_eq!(printed["messages"].as_array().unwrap().len(), messages.len(), "a message is not compared");
     for (of_python, of_rust) in printed["messages"].as_array().unwrap().iter().zip(messages) {
         assert_eq!(*of_python, of_rust);
     }
-    let parts = [layout::<StageSegment>(), layout::<StageEvent>(), layout::<StageCue>()];
+    let parts = [
+        layout::<StageSegment>(),
+        layout::<StageDragon>(),
+        layout::<StageObstacle>(),
+        layout::<StageEvent>(),
+        layout::<StageCue>(),
+    ];
     assert_eq!(printed["parts"], json!(parts));
-    let Names { states, levels, playback, segments, events, .. } = names();
+    let Names { states, levels, playback, segments, obstacles, events, .. } = names();
     let mut events: BTreeMap<_, _> = events.iter().map(|(number, name)| (number.to_string(), Some(*name))).collect();
     events.insert("0".to_owned(), None);
-    assert_eq!(printed["names"], json!([states, levels, playback, segments, events]));
+    assert_eq!(printed["names"], json!([states, levels, playback, segments, events, obstacles]));
     assert_eq!(printed["no_bench"], json!(NO_BENCH));
     assert_eq!(printed["handle_poses"], json!([size_of::<HandlePose>(), size_of::<HandlePose32>()]));
 }

@@ -116,10 +116,10 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
 
     let stages = messages(&lines, topics[1]);
     assert_eq!(stages.len(), 1, "{stages:?}");
-    assert_eq!(stages[0]["pitch"], 0.55);
-    assert_eq!(stages[0]["benches"], 223);
-    assert_eq!(stages[0]["segments"], 1);
-    assert_eq!(stages[0]["path"][0]["kind"], 2);
+    assert_eq!(stages[0]["dragons"][0]["pitch"], 0.55);
+    assert_eq!(stages[0]["dragons"][0]["benches"], 223);
+    assert_eq!(stages[0]["segments"].as_array().unwrap().len(), 1);
+    assert_eq!(stages[0]["segments"][0]["kind"], 2);
     let scene_hash = blake3::hash(&std::fs::read(&scene).unwrap());
     assert_eq!(stages[0]["scene_hash"], serde_json::json!(scene_hash.as_bytes()));
     assert_eq!(stages[0]["header"]["frame_id"], "stage");

@@ -4,8 +4,10 @@
 
 use crate::harness;
 
+use std::net::UdpSocket;
 use std::process::Command;
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use bench_dragon::soak::resources::child_of;
 use harness::{
@@ -249,6 +251,74 @@ fn services_of_a_show_that_was_paused_before_know_its_rate() {
     bridge.signal(SIGINT);
     let output = bridge.output_within(60);
     assert!(output.status.success(), "{}", text(&output.stderr));
+    stopped(publisher);
+}
+
+/// Returns an ArtTimeCode packet of this frame at 25 frames per second, by the table of Art-Net 4.
+fn art_time_code(frame: u32) -> Vec<u8> {
+    let [frames, seconds, minutes] = [frame % 25, frame / 25 % 60, frame / 1500].map(|number| number as u8);
+    [&b"Art-Net\0"[..], &[0, 0x97, 0, 14, 0, 0, frames, seconds, minutes, 0, 1]].concat()
+}
+
+#[test]
+fn the_diagnostics_tell_of_a_chase_and_of_its_end() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "diagnosed_chase";
+    let (subscriber, lines) = peer(name, &["diagnostics"]);
+    let publisher = Process::start(program(name).args(["run", "--ros2", "--json", "--paused", "--duration", "600"]));
+    wait_until("the show runs", || control(name, &["state"]).0 == 0);
+    let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let chase = Process::start(program(name).args(["chase", "artnet", "--listen", &port.to_string()]));
+    let subject = format!("{}: chase", unique(name));
+    // The topic is that of all shows of the domain.
+    /// A test of a status of the chase, with a function that returns its figures.
+    type Test = dyn Fn(&Value, &dyn Fn(&str) -> String) -> bool;
+    let until = |is_it: &Test| {
+        let began = Instant::now();
+        while began.elapsed().as_secs() < 90 {
+            let message = next(&lines, "diagnostics");
+            let of_chase = message["status"].as_array().unwrap().iter().find(|status| status["name"] == subject);
+            let Some(status) = of_chase else { continue };
+            let value = |key: &str| {
+                let values = status["values"].as_array().unwrap();
+                let value = values.iter().find(|value| value["key"] == key);
+                value.map_or(String::new(), |value| value["value"].as_str().unwrap().to_owned())
+            };
+            if is_it(status, &value) {
+                return;
+            }
+        }
+        panic!("no such diagnostics within 90 s");
+    };
+    let must_stop = AtomicBool::new(false);
+    std::thread::scope(|threads| {
+        threads.spawn(|| {
+            let (socket, began) = (UdpSocket::bind("127.0.0.1:0").unwrap(), Instant::now());
+            for frame in 0..25 * 120 {
+                let due = Duration::from_millis(40 * u64::from(frame));
+                std::thread::sleep(due.saturating_sub(began.elapsed()));
+                // Before the chase listens, the system refuses the packets.
+                let _ = socket.send_to(&art_time_code(frame), port);
+                if must_stop.load(Ordering::Relaxed) {
+                    return;
+                }
+            }
+        });
+        until(&|status, value| {
+            let (source, label, error) = (value("source"), value("timecode"), value("error (s)"));
+            let is_locked = value("locked") == "true" && status["level"] == 0;
+            is_locked && source == "artnet" && label.len() == 11 && error.parse::<f64>().is_ok()
+        });
+        must_stop.store(true, Ordering::Relaxed);
+    });
+    // Without timecode the show goes on for a while, and is paused then.
+    until(&|status, value| value("state") == "lost" && value("locked") == "false" && status["level"] == 2);
+    chase.signal(SIGKILL);
+    chase.output_within(60);
+    until(&|status, _| status["level"] == 2 && status["message"].as_str().unwrap().starts_with("has died"));
+    subscriber.signal(SIGKILL);
     stopped(publisher);
 }
 

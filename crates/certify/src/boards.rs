@@ -99,14 +99,29 @@ impl MovingBoard {
         axes.into_iter().any(is_separated) || metres > 0.0 && is_separated(self.towards(other))
     }
 
+    /// Returns the disc that holds the board at every moment of the step: its middle and its radius.
+    pub fn disc(&self) -> ([f64; 2], f64) {
+        (self.centre, self.radius)
+    }
+
+    /// Returns the board between the middles of its capsules.
+    pub fn in_doubles(&self) -> Board {
+        let [front, rear] = [self.front, self.rear].map(|capsule| Point::from(capsule.point.map(Interval::middle)));
+        Board::from_handles(front, rear, (self.share * self.link).middle(), 2.0 * self.half_width.middle())
+    }
+
+    /// Returns true if the board is proved to be further than `metres` from the convex hull of some points, along a
+    /// direction towards them.
+    pub fn is_clear_along(&self, direction: [f64; 2], points: &[Point], metres: f64) -> bool {
+        let axis = direction.map(Interval::point);
+        let length = norm(axis);
+        let most = self.support(axis, length.hi) + length * metres;
+        points.iter().all(|point| most.is_below(dot(axis, [point.x, point.y].map(Interval::point))))
+    }
+
     /// Returns the vector from this board to the nearest point of the other, by the middles of their capsules.
     fn towards(&self, other: &Self) -> [f64; 2] {
-        let [one, other] = [self, other].map(|board| {
-            let [front, rear] =
-                [board.front, board.rear].map(|capsule| Point::from(capsule.point.map(Interval::middle)));
-            Board::from_handles(front, rear, (board.share * board.link).middle(), 2.0 * board.half_width.middle())
-        });
-        let (from, to) = closest_points_board_board(&one, &other);
+        let (from, to) = closest_points_board_board(&self.in_doubles(), &other.in_doubles());
         (to - from).into()
     }
 

@@ -304,24 +304,33 @@ impl<'a, 'w> Descent<'a, 'w> {
     /// overlap shortly after the contact, and handles move continuously between the two.
     fn touch(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Option<ClearanceEnclosure> {
         let benches = [event.bench_a?, event.bench_b?].map(|bench| bench as usize);
-        let touch = Upper { value: 0.0, travelled: event.travelled, head: [self.at.head; 2], benches };
         let after = self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)?;
         self.floor = Some(0.0);
         let mut until = self.go_to(&after, progress);
         self.floor = None;
         let far = TOUCH * self.chain.team.shortest_link();
-        let overlapping =
+        let (overlapping, contact) =
             (0..40).map(|power| 1e-12 * 2f64.powi(power)).take_while(|beyond| *beyond < far).find_map(|beyond| {
                 let point = self.grid_point(event.travelled + beyond);
+                let contact = self.is_before_path_end(&point).then(|| self.overlap(&point, benches))??;
                 let upper = self.upper_between(point.clone(), point.clone(), benches)?;
-                (upper.value < 0.0).then_some(point)
+                (upper.value < 0.0).then_some((point, contact))
             })?;
+        // Without the steps to it, this place shows no upper bound: no step that tests boards comes so far.
+        let touch = Upper { value: 0.0, travelled: event.travelled, head: [overlapping.head; 2], benches };
         until = until.or_else(|| self.go_to(&overlapping, progress));
-        if until.is_none() && self.write_contact(&overlapping, benches) {
+        if until.is_none() {
+            self.write(&contact);
             self.finish = Some(Finish::Contact(benches));
         }
         self.upper = Some(touch);
         until.is_none().then(|| ClearanceEnclosure { lo: 0.0, ..self.enclosed(touch, None) })
+    }
+
+    /// Returns true if a place is surely not beyond the path's end.
+    fn is_before_path_end(&self, point: &GridPoint) -> bool {
+        let length = self.chain.path.length();
+        self.chain.exact.travelled(point.head).hi <= length - END_SLACK * (1.0 + length)
     }
 
     fn enclosed(&self, upper: Upper, until: Option<f64>) -> ClearanceEnclosure {
@@ -453,7 +462,8 @@ impl<'a, 'w> Descent<'a, 'w> {
         let spans: Vec<Span> = listed.handles[1..].iter().map(|handle| handle.span).collect();
         let Span(from, to) = listed.handles[0].span;
         let (apart, at) = if looks { (Some(self.threshold()), places) } else { (None, Vec::new()) };
-        let step = Step { links: self.links, from, to, moving: false, clear: false, spans, apart, at };
+        let step =
+            Step { links: self.links, from, to, moving: false, clear: false, spans, free: Vec::new(), apart, at };
         Ok(ShownStep { step, body_forward: listed.body_forward })
     }
 }

@@ -13,6 +13,7 @@ mod elementary;
 mod first_order;
 mod first_order_step;
 mod grid;
+mod ground;
 mod interval;
 mod lines;
 mod link;
@@ -23,6 +24,7 @@ pub mod plan;
 mod search;
 pub mod speed;
 mod step;
+mod turn;
 
 use std::io;
 
@@ -89,7 +91,7 @@ pub fn certify(
         events: &events,
         most_steps,
     };
-    search::CertificateSearch::new(given, write).run(progress)
+    search::CertificateSearch::new(given, ground::barriers(motion), write).run(progress)
 }
 
 #[cfg(test)]

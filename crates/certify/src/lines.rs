@@ -69,6 +69,21 @@ pub enum CertificateLine<'a> {
         /// Metres.
         most: f64,
     },
+    /// A board is within the keep-out of an obstacle.
+    Reached {
+        /// The obstacle's number on the stage, the boundary last.
+        obstacle: usize,
+        /// The bench, counted from 0.
+        bench: usize,
+        /// The first place of the head.
+        from: Place,
+        /// The last place of the head.
+        to: Place,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A point of the board, metres.
+        point: [f64; 2],
+    },
     /// The front product of a link is negative.
     Stall {
         /// The link, counted from 0.
@@ -255,6 +270,9 @@ pub struct Step {
     pub clear: bool,
     /// The spans of the handles from 1 on.
     pub spans: Vec<Span>,
+    /// The obstacles of which all boards stay clear in this step and before.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub free: Vec<usize>,
     /// Metres that boards are further apart in this step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub apart: Option<f64>,
@@ -269,6 +287,9 @@ pub struct CertifiedEvent {
     /// The kind of event.
     #[serde(serialize_with = "name")]
     pub event: EventKind,
+    /// The number of the obstacle on the stage, the boundary last; `None` for other kinds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<usize>,
     /// The result.
     #[serde(flatten)]
     pub status: Status,

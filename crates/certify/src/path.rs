@@ -212,41 +212,42 @@ impl ExactPath {
                 Self::inward(a, length)
             }
             PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out: _ } => {
-                let a = Interval::point(*pitch).over(pi() * 2.0);
-                let theta = Interval::point(*turn_radius).over(a);
-                let both = (Interval::point(*turn_radius).square() + a.square()).sqrt();
-                let second_radius = both.over(Interval::ONE + Interval::point(*arc_ratio));
-                let first_radius = second_radius * *arc_ratio;
-                let angle = atan(theta) * 2.0;
-                let turn = sin_cos_of(theta);
-                let inward = Curve::Inward { a };
-                let (start, tangent) = (inward.point_of(exactly(theta), turn), inward.tangent_of(theta, turn));
-                let right: Vector = [tangent[1], -tangent[0]];
-                let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
-                // The end of arc 2 and its tangent are known. Its begin is `angle` radians back.
-                let (sine, cosine) = sin_cos_of(angle);
-                let middle = first.point_of(exactly(angle), (sine, cosine));
-                let direction = first.tangent_of(angle, (sine, cosine));
-                let left: Vector = [-direction[1], direction[0]];
-                let second = Curve::Arc { origin: middle, direction, inward: left, radius: second_radius };
-                let lead_in = Interval::point(*lead_in);
-                let arc_end = lead_in + first_radius * angle;
-                let (zero, far) = (Interval::ZERO, Interval::point(FAR));
-                let segments = vec![
-                    Segment { curve: inward, begin: far, end: theta, travelled: lead_in },
-                    Segment { curve: first, begin: zero, end: angle, travelled: lead_in },
-                    Segment { curve: second, begin: zero, end: angle, travelled: arc_end },
-                    Segment {
-                        curve: Curve::Outward { a },
-                        begin: theta,
-                        end: far,
-                        travelled: arc_end + second_radius * angle,
-                    },
-                ];
-                Self { segments }
+                Self::turnaround(*pitch, Interval::point(*turn_radius), *arc_ratio, *lead_in)
             }
             PathDescription::Route { heading_turns, steps } => route(*heading_turns, steps),
         }
+    }
+
+    /// Creates all turnarounds whose turn radius is in an interval. The inward and the outward spiral do not depend on the
+    /// radius; the arcs do.
+    pub fn turnaround(pitch: f64, turn_radius: Interval, arc_ratio: f64, lead_in: f64) -> Self {
+        let a = Interval::point(pitch).over(pi() * 2.0);
+        let theta = turn_radius.over(a);
+        let both = (turn_radius.square() + a.square()).sqrt();
+        let second_radius = both.over(Interval::ONE + Interval::point(arc_ratio));
+        let first_radius = second_radius * arc_ratio;
+        let angle = atan(theta) * 2.0;
+        let turn = sin_cos_of(theta);
+        let inward = Curve::Inward { a };
+        let (start, tangent) = (inward.point_of(exactly(theta), turn), inward.tangent_of(theta, turn));
+        let right: Vector = [tangent[1], -tangent[0]];
+        let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
+        // The end of arc 2 and its tangent are known. Its begin is `angle` radians back.
+        let (sine, cosine) = sin_cos_of(angle);
+        let middle = first.point_of(exactly(angle), (sine, cosine));
+        let direction = first.tangent_of(angle, (sine, cosine));
+        let left: Vector = [-direction[1], direction[0]];
+        let second = Curve::Arc { origin: middle, direction, inward: left, radius: second_radius };
+        let lead_in = Interval::point(lead_in);
+        let arc_end = lead_in + first_radius * angle;
+        let (zero, far) = (Interval::ZERO, Interval::point(FAR));
+        let segments = vec![
+            Segment { curve: inward, begin: far, end: theta, travelled: lead_in },
+            Segment { curve: first, begin: zero, end: angle, travelled: lead_in },
+            Segment { curve: second, begin: zero, end: angle, travelled: arc_end },
+            Segment { curve: Curve::Outward { a }, begin: theta, end: far, travelled: arc_end + second_radius * angle },
+        ];
+        Self { segments }
     }
 
     /// Creates an inward spiral alone, of `a` metres per radian. The head reaches its end at the centre after

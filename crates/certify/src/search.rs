@@ -5,6 +5,7 @@ use std::io;
 
 use super::capsule::{Span, Spanned};
 use super::grid::{GridPoint, place};
+use super::ground::Barrier;
 use super::interval::Interval;
 use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
 use super::path::{ExactPath, Place};
@@ -48,6 +49,9 @@ pub(super) struct CertificateSearch<'a, 'w> {
     /// True if Lemma 4 may still be used.
     covered: bool,
     proofs: [Option<Status>; 4],
+    /// The obstacles of which steps still claim to stay clear, and by obstacle the result.
+    free: Vec<usize>,
+    of_obstacles: Vec<Option<Status>>,
     /// Length of the next step to try, metres.
     step: f64,
     steps: u64,
@@ -69,16 +73,36 @@ impl From<io::Error> for Halt {
 const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
 
 impl<'a, 'w> CertificateSearch<'a, 'w> {
-    pub fn new(given: Given<'a>, write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>) -> Self {
+    pub fn new(
+        given: Given<'a>,
+        barriers: Vec<Barrier>,
+        write: &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>,
+    ) -> Self {
         let exact = ExactPath::new(given.description);
-        let chain = Chain::new(given.path, exact, given.team);
+        let mut chain = Chain::new(given.path, exact, given.team);
+        chain.barriers = barriers;
         // The steps begin a little before the start: a motion that begins earlier includes this one.
         let before = -LEAST * (1.0 + given.path.length());
         let at = GridPoint::new(given.path, &chain.exact, before);
         let step = 0.25 * given.team.shortest_link();
         let (links, proofs) = (Links::All, [const { None }; 4]);
-        let spans = Vec::new();
-        Self { given, chain, write, at, spans, links, moving: true, clear: true, covered: true, proofs, step, steps: 0 }
+        let (free, of_obstacles) = ((0..chain.barriers.len()).collect(), chain.barriers.iter().map(|_| None).collect());
+        Self {
+            given,
+            chain,
+            write,
+            at,
+            spans: Vec::new(),
+            links,
+            moving: true,
+            clear: true,
+            covered: true,
+            proofs,
+            free,
+            of_obstacles,
+            step,
+            steps: 0,
+        }
     }
 
     /// Writes the certificate and returns what it proves.
@@ -96,19 +120,23 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             Some(Status::Proved { time_lo, .. }) => Some(time_lo),
             _ => None,
         };
-        let events = KINDS.map(|event| {
-            let found = self.proofs[event as usize].take();
-            let status = found.unwrap_or_else(|| match (&stuck, event) {
-                (Some(because), _) => Status::Undecided { time_lo: until, because: because.clone() },
-                (None, EventKind::PathEnd) => Status::None { time_lo: None },
-                (None, _) => Status::None { time_lo: lock },
-            });
-            CertifiedEvent { event, status }
-        });
+        let found = std::mem::take(&mut self.of_obstacles).into_iter().enumerate();
+        let found = found.map(|(number, found)| (EventKind::Obstacle, Some(number), found));
+        let kinds = KINDS.map(|event| (event, None, self.proofs[event as usize].take()));
+        let events: Vec<_> = (kinds.into_iter().chain(found))
+            .map(|(event, obstacle, found)| {
+                let status = found.unwrap_or_else(|| match (&stuck, event) {
+                    (Some(because), _) => Status::Undecided { time_lo: until, because: because.clone() },
+                    (None, EventKind::PathEnd) => Status::None { time_lo: None },
+                    (None, _) => Status::None { time_lo: lock },
+                });
+                CertifiedEvent { event, obstacle, status }
+            })
+            .collect();
         for event in &events {
             (self.write)(&CertificateLine::Result(event.clone())).map_err(CertifyError::Write)?;
         }
-        Ok(events.into())
+        Ok(events)
     }
 
     /// Proves the whole motion, event by event.
@@ -118,9 +146,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         for event in self.given.events {
             match event.kind {
                 EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
-                EventKind::Obstacle => {
-                    return Err(Halt::Stuck("this program proves nothing of the obstacles of a stage".to_owned()));
-                }
+                EventKind::Obstacle if event.travelled == 0.0 => self.at_obstacle_at_start(event)?,
                 EventKind::PathEnd => {
                     let beyond = path_end(&self.chain.exact, self.given.path);
                     self.go_to(event.travelled - self.around(), None, &mut progress)?;
@@ -132,6 +158,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                     self.go_to(event.travelled - self.around(), Some(event), &mut progress)?;
                     match kind {
                         EventKind::Contact => self.contact(event, &mut progress)?,
+                        EventKind::Obstacle => self.obstacle(event, &mut progress)?,
                         EventKind::Stall => self.stall(event, &mut progress)?,
                         _ => self.lock(event)?,
                     }
@@ -175,6 +202,11 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let most = around.max(NEAR * self.given.team.shortest_link());
         let try_at = |search: &mut Self, far: f64| {
             let mut point = search.grid_point(event.travelled + far);
+            // An event beyond the path's end is none of the scene.
+            let length = search.given.path.length();
+            if search.chain.exact.travelled(point.head).hi > length - LEAST * (1.0 + length) {
+                return None;
+            }
             let result = shown(search, &mut point)?;
             Some((point, result))
         };
@@ -226,7 +258,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 self.grid_point(self.at.travelled + self.step)
             };
             let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
-            match self.chain.show(&mut self.at, &mut to, claim) {
+            match self.chain.show(&mut self.at, &mut to, claim, &self.free) {
                 Ok(shown) => {
                     self.accept(to, shown)?;
                     self.step = (self.step * GROWTH).min(longest);
@@ -299,6 +331,13 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 );
                 self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo, because });
                 self.moving = false;
+                Ok(())
+            }
+            Obstacle::Stage(number) => {
+                let because =
+                    "a board comes so near the obstacle that doubles cannot tell whether it meets it".to_owned();
+                self.of_obstacles[number] = Some(Status::Undecided { time_lo, because });
+                self.free.retain(|other| *other != number);
                 Ok(())
             }
             Obstacle::Stall(_) | Obstacle::Behind if self.links == Links::Front => {
@@ -379,6 +418,56 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             Status::Undecided { time_lo: self.time(earliest).lo, because }
         };
         self.proofs[EventKind::Contact as usize] = Some(status);
+        Ok(())
+    }
+
+    /// Returns the number of an event's obstacle on the stage.
+    fn number(&self, event: &Event) -> Option<usize> {
+        (event.bench_b? as usize).checked_sub(self.given.team.benches + 1)
+    }
+
+    /// Returns the spans of handles 1 and on and a point of the board, if it is proved to be within the keep-out while
+    /// the head is between two grid points.
+    fn reach(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
+        let (bench, number) = (event.bench_a? as usize, self.number(event)?);
+        let handles = self.chain.spans(from, to, bench + 1)?;
+        let point = self.chain.barriers.get(number)?.reached_by(&self.chain.board(&handles, bench))?;
+        Some((handles[1..].iter().map(|handle| handle.span).collect(), point))
+    }
+
+    /// Handles a board that is at an obstacle from the start.
+    fn at_obstacle_at_start(&mut self, event: &Event) -> Result<(), Halt> {
+        let Some(obstacle) = self.number(event) else { return Ok(()) };
+        let (mut from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
+        self.free.retain(|other| *other != obstacle);
+        let bench = event.bench_a.unwrap_or(0) as usize;
+        let status = if let Some((spans, point)) = self.reach(event, &mut from, &mut to) {
+            (self.write)(&CertificateLine::Reached { obstacle, bench, from: from.head, to: to.head, spans, point })?;
+            Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a: Some(bench), bench_b: None, because: None }
+        } else {
+            let because = "the board is so little within the obstacle's keep-out that doubles cannot tell".to_owned();
+            Status::Undecided { time_lo: 0.0, because }
+        };
+        self.of_obstacles[obstacle] = Some(status);
+        Ok(())
+    }
+
+    fn obstacle(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+        let Some(obstacle) = self.number(event).filter(|number| self.free.contains(number)) else { return Ok(()) };
+        let earliest = self.at.head;
+        self.free.retain(|other| *other != obstacle);
+        let bench = event.bench_a.unwrap_or(0) as usize;
+        let found = self.beyond(event, |search, point| search.reach(event, &mut point.clone(), point));
+        let status = if let Some((reached, (spans, point))) = found {
+            self.go_to_point(&reached, None, progress)?;
+            let head = reached.head;
+            (self.write)(&CertificateLine::Reached { obstacle, bench, from: head, to: head, spans, point })?;
+            self.proved(event.kind, earliest, head, [event.bench_a, None])
+        } else {
+            let because = "doubles cannot tell whether the board meets the obstacle that it comes so near".to_owned();
+            Status::Undecided { time_lo: self.time(earliest).lo, because }
+        };
+        self.of_obstacles[obstacle] = Some(status);
         Ok(())
     }
 

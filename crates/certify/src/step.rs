@@ -3,6 +3,7 @@
 use super::boards::{MovingBoard, Shape};
 use super::capsule::{Span, Spanned, moved_back};
 use super::grid::{GridPoint, span};
+use super::ground::Barrier;
 use super::interval::Interval;
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
@@ -33,6 +34,8 @@ pub(super) enum Obstacle {
     Behind,
     /// Two boards may touch.
     Pair(usize, usize),
+    /// A board may come to an obstacle of the stage, which has this number.
+    Stage(usize),
 }
 
 impl Obstacle {
@@ -42,6 +45,7 @@ impl Obstacle {
             Self::Pair(..) => kind == EventKind::Contact,
             Self::Stall(_) => kind == EventKind::Stall,
             Self::Link(_) => kind == EventKind::Lock,
+            Self::Stage(_) => kind == EventKind::Obstacle,
             Self::Behind => false,
         }
     }
@@ -63,6 +67,8 @@ pub(super) struct Chain<'a> {
     pub shape: Shape,
     /// A bound of S of Lemma 4: a place no earlier than the start of handle 1.
     pub start: Option<Place>,
+    /// The obstacles of the stage.
+    pub barriers: Vec<Barrier>,
 }
 
 /// Length added to both ends of a span, as a multiple of the rounding of doubles.
@@ -83,7 +89,7 @@ pub(super) fn links_of(team: &Team) -> [Interval; 2] {
 
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
-        Self { path, exact, team, links: links_of(team), shape: Shape::new(team), start: None }
+        Self { path, exact, team, links: links_of(team), shape: Shape::new(team), start: None, barriers: Vec::new() }
     }
 
     /// Returns the metres between the handles of a bench.
@@ -91,11 +97,17 @@ impl<'a> Chain<'a> {
         self.links[bench.min(1)]
     }
 
-    /// Shows a claim over the step between two grid points.
+    /// Shows a claim over the step between two grid points, and that boards stay clear of the obstacles `free`.
     ///
     /// # Errors
     /// The obstacle.
-    pub fn show(&self, from: &mut GridPoint, to: &mut GridPoint, claim: Claim) -> Result<Shown, Obstacle> {
+    pub fn show(
+        &self,
+        from: &mut GridPoint,
+        to: &mut GridPoint,
+        claim: Claim,
+        free: &[usize],
+    ) -> Result<Shown, Obstacle> {
         let mut listed = Listed::new(self, Span(from.head, to.head), to.travelled - from.travelled);
         while listed.handles.len() <= self.team.benches && !listed.is_enough(claim) {
             listed.extend(from, to, claim)?;
@@ -103,10 +115,11 @@ impl<'a> Chain<'a> {
         if claim.clear {
             listed.boards_are_apart(claim.links)?;
         }
+        listed.boards_avoid(free, claim.links)?;
         let spans = listed.handles[1..].iter().map(|handle| handle.span).collect();
         let Claim { links, moving, clear } = claim;
-        let (apart, at) = (None, Vec::new());
-        let step = Step { links, from: from.head, to: to.head, moving, clear, spans, apart, at };
+        let (free, apart, at) = (free.to_vec(), None, Vec::new());
+        let step = Step { links, from: from.head, to: to.head, moving, clear, spans, free, apart, at };
         Ok(Shown { step, body_forward: listed.body_forward })
     }
 
@@ -161,6 +174,8 @@ pub(super) struct Listed<'c, 'a> {
     /// Multiples of the pad to try, and the number of those that were too small for the last handle.
     multiples: &'static [f64],
     too_small: usize,
+    /// Metres added to every pad, for a path that is an interval of paths.
+    slack: f64,
     /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
 }
@@ -177,7 +192,12 @@ impl<'c, 'a> Listed<'c, 'a> {
     pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, metres: f64) -> Self {
         let is_fine = metres < NEXT_TO_EVENT * chain.team.shortest_link();
         let multiples = if is_fine { &FINE[..] } else { &COARSE };
-        Self { chain, handles, pad: 0.0, multiples, too_small: 0, body_forward: true }
+        Self { chain, handles, pad: 0.0, multiples, too_small: 0, slack: 0.0, body_forward: true }
+    }
+
+    /// Adds metres to the pad of every handle that is still to be enclosed.
+    pub fn with_slack(self, slack: f64) -> Self {
+        Self { slack, ..self }
     }
 
     /// Returns true for a step next to an event: places have low words.
@@ -247,7 +267,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let size = length.hi + radius * (1.0 + 0.1 * turned);
         let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);
         let front_cosine = ends.iter().map(|end| end.front_cosine.abs()).fold(0.0, f64::max);
-        let mut least = 1.000_001 * self.pad * front_cosine / rear_cosine;
+        let mut least = (1.000_001 * self.pad * front_cosine + self.slack) / rear_cosine;
         let turns = ends[0].front_cosine.signum() != ends[1].front_cosine.signum();
         if turns {
             let half = front.capsule.half;
@@ -313,6 +333,22 @@ impl<'c, 'a> Listed<'c, 'a> {
             }
         }
         Ok(())
+    }
+
+    /// Shows that boards stay clear of obstacles: all boards, or boards 0 and 1.
+    fn boards_avoid(&self, free: &[usize], links: Links) -> Result<(), Obstacle> {
+        if free.is_empty() {
+            return Ok(());
+        }
+        let (chain, benches) = (self.chain, self.chain.team.benches);
+        let listed = self.handles.len() - 1;
+        let firsts = if links == Links::All { listed } else { listed.min(2) };
+        let mut boards: Vec<_> = (0..firsts).map(|bench| chain.board(&self.handles, bench)).collect();
+        if links == Links::All && listed < benches {
+            boards.push(self.straight_run(listed));
+        }
+        let is_near = |obstacle: &&usize| !boards.iter().all(|board| chain.barriers[**obstacle].is_avoided_by(board));
+        free.iter().find(is_near).map_or(Ok(()), |obstacle| Err(Obstacle::Stage(*obstacle)))
     }
 
     /// Returns the boards from `first` to the last as one, on the line of the last listed handle.

@@ -289,7 +289,7 @@ impl Handler for Chase<'_> {
     fn handle(&mut self, _publisher: usize, event: FeedEvent<'_>) {
         match event {
             FeedEvent::Frame { header, .. } => self.frame(header),
-            FeedEvent::Stage(stage) => {
+            FeedEvent::Stage { stage, .. } => {
                 self.steering.set_end(stage.freeze_time);
                 if let Leader::Tracker(tracker) = &self.leader
                     && stage.scene_hash != tracker.scene_hash

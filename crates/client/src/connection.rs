@@ -3,8 +3,8 @@
 //! It keeps no counts: the [`feed`](super::feed), which calls it, decides when to open, to read and to disconnect. A
 //! service can have more than one publisher: `selected` has the one whose messages are read.
 
-mod scene;
 mod selected;
+mod slices;
 
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
@@ -19,14 +19,15 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::clock::monotonic_clock_name;
+use crate::layouts;
 use crate::shared_memory::MOST_PUBLISHERS;
 use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
 use bench_dragon_messages::{
-    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus, Stage,
+    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus,
+    SceneHeader, Stage, StageSegment,
 };
-use scene::SceneReceiver;
-pub use scene::SceneSample;
 use selected::{OfRun, Origin, Selected, publishers};
+pub use slices::{SceneSample, StageSample};
 
 type Receiver<Payload, Header> = Port<ipc::Service, Payload, Header>;
 type PoseSample = Sample<ipc::Service, [HandlePose], FrameHeader>;
@@ -44,8 +45,8 @@ pub struct Connection {
     expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
-    stage: Option<Receiver<Stage, ()>>,
-    scene: Option<SceneReceiver>,
+    stage: Option<Receiver<[StageSegment], Stage>>,
+    scene: Option<Receiver<[u8], SceneHeader>>,
     chase: Option<Receiver<ChaseStatus, ()>>,
     tick: Option<Listener<ipc::Service>>,
     selection: Selection,
@@ -117,7 +118,8 @@ impl Subscription {
             // It does not exist yet, or is being created or removed.
             Err(Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction) => return Ok(None),
             Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
-                return Err(OpenError::Incompatible(name.to_string()));
+                let own = [layouts::name::<HandlePose>(), layouts::name::<FrameHeader>()];
+                return Err(layouts::another(&name, MessagingPattern::PublishSubscribe, &own));
             }
             Err(error) => {
                 return Err(OpenError::Failed { service: name.to_string(), reason: format!("{error:?}") });
@@ -129,8 +131,8 @@ impl Subscription {
             self.service::<CollisionAlert>("alerts")?;
             self.service::<Cue>("cues")?;
             self.service::<LoopStatus>("status")?;
-            self.service::<Stage>("stage")?;
-            self.scene_service()?;
+            self.slices::<StageSegment, Stage>("stage")?;
+            self.slices::<u8, SceneHeader>("scene")?;
             return Ok(None);
         }
         check_room_to_subscribe()?;
@@ -150,8 +152,8 @@ impl Subscription {
             expects_cues: false,
             status: self.receiver("status")?,
             status_service: self.service("status")?,
-            stage: self.receiver("stage")?,
-            scene: self.scene_receiver()?,
+            stage: self.slice_receiver("stage")?,
+            scene: self.slice_receiver("scene")?,
             chase: self.receiver("chase")?,
             tick: self.listener(),
             selection: Selection::Undecided { statuses: Vec::new() },
@@ -223,10 +225,10 @@ impl Subscription {
             connection.status_service = self.service("status")?;
         }
         if connection.stage.is_none() {
-            connection.stage = self.receiver("stage")?;
+            connection.stage = self.slice_receiver("stage")?;
         }
         if connection.scene.is_none() {
-            connection.scene = self.scene_receiver()?;
+            connection.scene = self.slice_receiver("scene")?;
         }
         if connection.chase.is_none() {
             connection.chase = self.receiver("chase")?;
@@ -265,7 +267,10 @@ impl Subscription {
         let name = service_name(&self.name, service)?;
         match self.node.service_builder(&name).publish_subscribe::<Message>().open() {
             Ok(service) => Ok(Some(service)),
-            Err(Open::IncompatibleTypes | Open::VersionMismatch) => Err(OpenError::Incompatible(name.to_string())),
+            Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
+                let own = [layouts::name::<Message>()];
+                Err(layouts::another(&name, MessagingPattern::PublishSubscribe, &own))
+            }
             Err(_) => Ok(None),
         }
     }
@@ -386,12 +391,6 @@ impl Connection {
             any = true;
         }
         any
-    }
-
-    /// Returns the next stage, if one has come.
-    pub fn stage(&mut self) -> Option<Stage> {
-        self.decide();
-        self.next(self.stage.as_ref())
     }
 
     /// Returns the next status of a chase of this run, if one has come.

@@ -13,6 +13,7 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::builder::request_response::RequestResponseOpenError as Open;
 use iceoryx2::service::port_factory::request_response;
 
+use crate::layouts;
 use crate::shared_memory::{OpenError, check_room_to_subscribe, node, service_name};
 use bench_dragon_messages::control::{Code, Command, PLAYING_RATE, RATES};
 use bench_dragon_messages::sentence::number;
@@ -88,7 +89,8 @@ impl Controller {
         let opened = opened.map_err(|error| match error {
             Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction => no_publisher(),
             Open::IncompatibleRequestOrResponseType | Open::VersionMismatch => {
-                OpenError::Incompatible(service.to_string()).into()
+                let own = [layouts::name::<ControlRequest>(), layouts::name::<ControlResponse>()];
+                layouts::another(&service, MessagingPattern::RequestResponse, &own).into()
             }
             error => failed(name, format!("{error:?}")).into(),
         })?;

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use super::connection::{Connection, Subscription, Wake};
 use crate::shared_memory::OpenError;
 use bench_dragon_messages::{
-    ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, SceneHeader, Stage,
+    ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, SceneHeader, Stage, StageSegment,
 };
 use liveness::{Change, Liveness};
 use sequence::SequenceTracker;
@@ -63,7 +63,12 @@ pub enum FeedEvent<'a> {
         missed: u64,
     },
     /// The stage, at the start of each run.
-    Stage(&'a Stage),
+    Stage {
+        /// The stage.
+        stage: &'a Stage,
+        /// The segments of its paths and outlines.
+        segments: &'a [StageSegment],
+    },
     /// The text of the scene, at the start of each run.
     Scene {
         /// Its header.
@@ -290,11 +295,12 @@ impl Connected {
             *received = true;
             handle(event);
         };
-        while let Some(stage) = connection.stage() {
+        while let Some(sample) = connection.stage() {
+            let (stage, segments) = (sample.user_header(), sample.payload());
             connection.expect_cues(stage.cues > 0);
             let of = Some((stage.run_id, stage.stamp_ns));
             if std::mem::replace(latest_stage, of) != of {
-                handle(FeedEvent::Stage(&stage));
+                handle(FeedEvent::Stage { stage, segments });
             }
         }
         while let Some(scene) = connection.scene() {

@@ -8,5 +8,6 @@ pub mod connection;
 pub mod control;
 pub mod feed;
 pub mod hermite;
+pub mod layouts;
 pub mod polling;
 pub mod shared_memory;

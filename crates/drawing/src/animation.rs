@@ -82,7 +82,7 @@ impl Drawing<'_> {
         let now = happened.iter().rev().find(|past| past.tense == Tense::Present);
         let touching: Vec<usize> = now.into_iter().flat_map(Happened::benches).map(|bench| bench as usize).collect();
         let team = self.motion.team();
-        let mut stage = self.with_obstacles(self.stage(), palette).add(self.path(palette));
+        let mut stage = self.with_obstacles(self.stage(), palette).add(self.path(&self.dragons.all()[0], palette));
         let mut boards = Group::new().set("id", "benches");
         if team.width * self.camera.scale > 4.0 {
             boards = boards.set("stroke", palette.ground).set("stroke-width", self.camera.metres(0.7));

@@ -11,10 +11,17 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::model::{Point, Vector};
 use bench_dragon_motion::solve::Chain;
 
-/// Returns the board of a bench. The heading keeps digits that the difference of two far handles has lost.
+/// Returns the board of a bench of the only dragon of a chain.
 pub fn board(team: &Team, chain: &Chain, bench: usize) -> Board {
-    let (sine, cosine) = chain.heading[bench].sin_cos();
-    let front = Point::new(chain.x[bench], chain.y[bench]);
+    board_from(team, chain, 0, bench)
+}
+
+/// Returns the board of a bench of the dragon whose handles begin at `first`. The heading keeps digits that the
+/// difference of two far handles has lost.
+fn board_from(team: &Team, chain: &Chain, first: usize, bench: usize) -> Board {
+    let handle = first + bench;
+    let (sine, cosine) = chain.heading[handle].sin_cos();
+    let front = Point::new(chain.x[handle], chain.y[handle]);
     Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.width)
 }
 
@@ -25,9 +32,10 @@ pub fn extent(board: &Board) -> StageBox {
     extent
 }
 
-/// Returns the benches that may have a part in a box, with their boards, the head first.
-pub fn seen(team: &Team, chain: &Chain, view: &StageBox) -> Vec<(usize, Board)> {
-    let boards = (0..team.benches).map(|bench| (bench, board(team, chain, bench)));
+/// Returns the benches that may have a part in a box, with their boards, the head first, of the dragon whose handles
+/// begin at `first`.
+pub fn seen(team: &Team, chain: &Chain, first: usize, view: &StageBox) -> Vec<(usize, Board)> {
+    let boards = (0..team.benches).map(|bench| (first + bench, board_from(team, chain, first, bench)));
     boards.filter(|(_, board)| extent(board).meets(view)).collect()
 }
 

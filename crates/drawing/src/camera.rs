@@ -13,6 +13,11 @@ pub struct StageBox {
 }
 
 impl StageBox {
+    /// The box of the whole stage.
+    pub const ALL: Self = Self {
+        least: Point::new(f64::NEG_INFINITY, f64::NEG_INFINITY),
+        greatest: Point::new(f64::INFINITY, f64::INFINITY),
+    };
     /// The empty box.
     pub const EMPTY: Self = Self {
         least: Point::new(f64::INFINITY, f64::INFINITY),

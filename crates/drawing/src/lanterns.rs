@@ -53,7 +53,7 @@ impl Drawing<'_> {
     pub(super) fn lanterns(&self, time: f64, chain: &Chain) -> String {
         let team = self.motion.team();
         let view = self.camera.view().padded(POOL + 0.5 * team.head_length);
-        let boards = benches::seen(team, chain, &view);
+        let boards = benches::seen(team, chain, 0, &view);
         let mut document = self.document(time, chain, &super::palette::DARK).add(definitions());
         let black = Rectangle::new().set("width", WIDTH).set("height", rounded(self.height, 4)).set("fill", "#000000");
         document = document.add(black);

@@ -9,6 +9,8 @@
 pub mod animation;
 mod benches;
 pub mod camera;
+pub mod dragons;
+mod figure;
 mod ground;
 mod labels;
 mod lanterns;
@@ -17,8 +19,10 @@ mod marks;
 pub mod palette;
 mod route;
 mod scale;
+mod seat;
 mod sheet;
 pub mod swept;
+mod village;
 
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Description, Group, Path, Rectangle, Title};
@@ -30,8 +34,9 @@ use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 use camera::{Camera, StageBox, Viewport};
+use dragons::{Dragons, Drawn};
 use labels::Name;
-pub use look::{Framing, Length, Look, Style, Surroundings, Theme};
+pub use look::{Framing, Length, Look, Seat, Style, Surroundings, Theme};
 use marks::{Happened, Tense};
 use palette::Palette;
 pub use scale::mean_speeds;
@@ -57,9 +62,9 @@ impl Extent {
     pub const NONE: Self = Self { boards: StageBox::EMPTY, speeds: Speeds::NONE, last: 0.0 };
 
     /// Adds the chain at a time.
-    pub fn include(&mut self, motion: &Motion, time: f64, chain: &Chain) {
-        for bench in 0..motion.team().benches {
-            let corners = benches::board(motion.team(), chain, bench).corners();
+    pub fn include(&mut self, dragons: &Dragons, time: f64, chain: &Chain) {
+        for (_, board) in dragons.seen(chain, &StageBox::ALL) {
+            let corners = board.corners();
             corners.into_iter().for_each(|corner| self.boards.include(corner));
         }
         self.speeds.include(chain);
@@ -76,6 +81,8 @@ impl Extent {
 /// One camera and one look for one picture or many.
 pub struct Drawing<'a> {
     name: &'a str,
+    dragons: Dragons<'a>,
+    /// The motion of the first dragon.
     motion: &'a Motion,
     timeline: &'a Timeline,
     look: Look,
@@ -86,15 +93,16 @@ pub struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    /// Creates the drawings of a motion called `name`. `extent` holds the content of all pictures.
-    pub fn new(name: &'a str, motion: &'a Motion, timeline: &'a Timeline, extent: &Extent, look: Look) -> Self {
+    /// Creates the drawings of a scene called `name`. `extent` holds the content of all pictures.
+    pub fn new(name: &'a str, dragons: Dragons<'a>, timeline: &'a Timeline, extent: &Extent, look: Look) -> Self {
+        let motion = dragons.first();
         let shown = match look.framing {
             Framing::Everything => {
                 let mut boards = extent.boards;
                 ground::include(motion.ground(), &mut boards);
                 let margin = match look.style {
                     Style::Plan => 0.04 * boards.width().max(boards.height()) + motion.team().width,
-                    Style::Lanterns => lanterns::MARGIN,
+                    Style::Lanterns | Style::Seat(_) => lanterns::MARGIN,
                 };
                 boards.padded(margin)
             }
@@ -104,6 +112,7 @@ impl<'a> Drawing<'a> {
         };
         // A straight team still gets space beside it, and a tall one is not higher than a page.
         let shape = match look.framing {
+            _ if matches!(look.style, Style::Seat(_)) => seat::SHAPE,
             Framing::View(..) => 1.0,
             _ => (shown.height() / shown.width()).clamp(0.3, 1.3),
         };
@@ -123,7 +132,7 @@ impl<'a> Drawing<'a> {
         };
         let camera = Camera::showing(&shown, viewport);
         let scale = extent.speeds.scale(motion.head_speed());
-        Self { name, motion, timeline, look, height, camera, scale, ground: None }
+        Self { name, dragons, motion, timeline, look, height, camera, scale, ground: None }
     }
 
     /// Returns the same drawings above the ground that boards cover.
@@ -136,13 +145,14 @@ impl<'a> Drawing<'a> {
         match self.look.style {
             Style::Plan => self.plan(time, chain),
             Style::Lanterns => self.lanterns(time, chain),
+            Style::Seat(seat) => self.seat(time, chain, seat),
         }
     }
 
     fn plan(&self, time: f64, chain: &Chain) -> String {
         let palette = self.look.theme.palette();
         let happened = marks::happened(self.timeline, time);
-        let boards = benches::seen(self.motion.team(), chain, &self.camera.view());
+        let boards = self.dragons.seen(chain, &self.camera.view());
         let overlaps = self.overlaps(chain);
         let (outlined, what) = outlined(&happened, &overlaps);
         let outlined: Vec<usize> =
@@ -151,11 +161,15 @@ impl<'a> Drawing<'a> {
         if let Some(area) = self.ground {
             stage = stage.add(covered(area, palette));
         }
-        stage = stage.add(self.path(palette));
-        stage =
-            stage.add(benches::group(&boards, |bench| self.fill(chain.speed[bench], palette), &self.camera, palette));
+        for of in self.dragons.all() {
+            stage = stage.add(self.path(of, palette));
+        }
+        let fill = |bench: usize| match self.dragons.colour(bench, palette) {
+            Some(colour) => colour.to_owned(),
+            None => self.fill(chain.speed[bench], palette),
+        };
+        stage = stage.add(benches::group(&boards, fill, &self.camera, palette));
         stage = stage.add(benches::handles(self.motion.team(), chain, &self.camera, palette));
-        let benches = self.motion.team().benches;
         let mut marks = Group::new().set("id", "marks");
         let (mut events, mut places) = (Vec::new(), Vec::new());
         for past in &happened {
@@ -163,28 +177,30 @@ impl<'a> Drawing<'a> {
                 let place = self.camera.sheet(place);
                 places.push(place);
                 marks = marks.add(past.sign(place, palette));
-                events.push((*past, past.sentence("here", self.motion)));
+                events.push((*past, past.sentence("here", &self.dragons.roster)));
             }
         }
         let (mut signs, mut names) = ((false, false), Vec::new());
         for (bench, board) in boards.iter().rev() {
-            if *bench + 1 == benches && benches > 1 {
+            let is_head = self.dragons.is_head(*bench);
+            if self.dragons.is_tail(*bench) {
                 stage = stage.add(benches::tail_sign(board, &self.camera, palette));
                 signs.1 = true;
             }
             if outlined.contains(bench) {
                 stage = stage.add(benches::outline(board, palette.ground, 6.0, &self.camera));
                 stage = stage.add(benches::outline(board, palette.danger, 3.0, &self.camera));
-            } else if *bench == 0 {
+            } else if is_head {
                 stage = stage.add(benches::outline(board, palette.ink, 2.0, &self.camera));
             }
-            if *bench == 0 {
+            if is_head {
                 stage = stage.add(benches::head_sign(board, &self.camera, palette));
                 signs.0 = true;
             }
-            if let Some(name) = name(*bench, benches - 1, &outlined) {
+            if let Some(name) = self.dragons.label(*bench, &outlined) {
                 let colour = if outlined.contains(bench) { palette.danger } else { palette.ink };
-                names.push(Name { words: name, number: bench + 1, board: *board, colour });
+                let number = bench + 1;
+                names.push(Name { words: name, number, board: *board, colour });
             }
         }
         // Names of outlined boards are placed first.
@@ -193,7 +209,8 @@ impl<'a> Drawing<'a> {
         // The clip path is in sheet units, whatever the units of the group.
         document = document.add(Group::new().set("clip-path", "url(#frame)").add(stage).add(marks));
         if self.look.surroundings == Surroundings::Words {
-            let coloured = boards.iter().any(|(bench, _)| chain.speed[*bench].is_finite());
+            let by_speed = !self.dragons.are_several();
+            let coloured = by_speed && boards.iter().any(|(bench, _)| chain.speed[*bench].is_finite());
             let contents = sheet::Contents {
                 scale: self.scale.filter(|_| coloured),
                 head: signs.0,
@@ -248,10 +265,11 @@ impl<'a> Drawing<'a> {
         if ground.is_empty() { stage } else { stage.add(ground::group(ground, &self.camera, palette)) }
     }
 
-    fn path(&self, palette: &Palette) -> Path {
-        let path = Path::new().set("id", "path").set("d", route::data(self.motion, &self.camera)).set("fill", "none");
+    fn path(&self, of: &Drawn, palette: &Palette) -> Path {
+        let id = if of.name.is_empty() { "path".to_owned() } else { format!("path-{}", of.name) };
+        let path = Path::new().set("id", id).set("d", route::data(of.motion, &self.camera)).set("fill", "none");
         // Finer where turns are close together.
-        let turns = match self.motion.description() {
+        let turns = match of.motion.description() {
             PathDescription::Spiral { pitch, .. } | PathDescription::Turnaround { pitch, .. } => {
                 pitch * self.camera.scale
             }
@@ -272,7 +290,7 @@ impl<'a> Drawing<'a> {
         let team = self.motion.team();
         // A board that overlaps a visible board may be outside the picture.
         let reach = team.longest_link() + 2.0 * team.hole_inset + team.width;
-        let near = benches::seen(team, chain, &self.camera.view().padded(reach));
+        let near = self.dragons.seen(chain, &self.camera.view().padded(reach));
         benches::overlapping(&near, 1e-9 * team.longest_link())
     }
 
@@ -288,14 +306,13 @@ impl<'a> Drawing<'a> {
         overlaps: &[(usize, usize, f64)],
         palette: &'p Palette,
     ) -> (String, &'p str) {
-        let benches = self.motion.team().benches;
         let now = happened.iter().rev().find(|happened| happened.tense == Tense::Present);
         if let Some(now) = now {
             let place = now.timed.event.place.unwrap_or_default();
             let place = format!("at ({}, {}) m", rounded(place.x, 3), rounded(place.y, 3));
-            return (now.sentence(&place, self.motion), palette.danger);
+            return (now.sentence(&place, &self.dragons.roster), palette.danger);
         }
-        if let Some(sentence) = marks::overlap_sentence(overlaps, benches) {
+        if let Some(sentence) = marks::overlap_sentence(overlaps, &self.dragons.roster) {
             return (sentence, palette.danger);
         }
         let next = self.timeline.events().iter().find(|event| event.time > time);
@@ -306,20 +323,23 @@ impl<'a> Drawing<'a> {
 
     /// Returns the picture in words.
     fn description(&self, chain: &Chain) -> String {
-        let team = self.motion.team();
-        let (x, y) = (rounded(chain.x[0], 3), rounded(chain.y[0], 3));
-        let mut words = format!(
-            "A bench dragon of {} benches seen from above; the front handle of its head is at ({x}, {y}) m.",
-            team.benches
-        );
+        let mut words = String::new();
+        for Drawn { name, first, motion } in self.dragons.all() {
+            let (x, y) = (rounded(chain.x[*first], 3), rounded(chain.y[*first], 3));
+            let called = if name.is_empty() { String::new() } else { format!(", {name},") };
+            let space = if *first == 0 { "" } else { " " };
+            words += &format!(
+                "{space}A bench dragon{called} of {} benches seen from above; the front handle of its head is at ({x}, {y}) m.",
+                motion.team().benches
+            );
+        }
         for timed in self.timeline.events() {
             let (kind, time) = (timed.event.kind.name().replace('_', " "), rounded(timed.time, 3));
-            let obstacle = self.motion.obstacle_of(&timed.event);
-            let other = timed.event.bench_b.filter(|_| obstacle.is_none());
-            let benches =
-                [timed.event.bench_a, other].into_iter().flatten().map(|bench| format!("bench {}", bench + 1));
-            let benches: Vec<String> =
-                benches.chain(obstacle.map(|obstacle| format!("the {}", text(&obstacle.name)))).collect();
+            let roster = &self.dragons.roster;
+            let benches = [timed.event.bench_a, timed.event.bench_b].into_iter().flatten();
+            let benches: Vec<String> = benches
+                .map(|bench| text(&roster.bench(bench)).replace(" (the head)", "").replace(" (the tail)", ""))
+                .collect();
             let benches = if benches.is_empty() { String::new() } else { format!(", {}", benches.join(" and ")) };
             words += &format!(" Event: {kind} at {time} s{benches}.");
         }
@@ -337,18 +357,6 @@ fn outlined(happened: &[Happened], overlaps: &[(usize, usize, f64)]) -> (Vec<usi
     benches.sort_unstable();
     benches.dedup();
     (benches, what)
-}
-
-/// Returns the name of a bench in the picture: for the head, the tail, and touching benches if they are few.
-fn name(bench: usize, last: usize, outlined: &[usize]) -> Option<String> {
-    let concerned = outlined.len() <= 4 && outlined.contains(&bench);
-    match bench {
-        0 if concerned => Some("head (bench 1)".to_owned()),
-        0 => Some("head".to_owned()),
-        _ if concerned => Some(format!("bench {}", bench + 1)),
-        _ if bench == last => Some("tail".to_owned()),
-        _ => None,
-    }
 }
 
 /// Returns the ground that boards cover.

@@ -26,13 +26,26 @@ impl Theme {
     }
 }
 
+/// A place in the audience.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seat {
+    /// Turns around the stage from its south.
+    pub turns: f64,
+    /// The distance from the dragon's middle, metres; by default it follows from the dragon's reach.
+    pub distance: Option<f64>,
+    /// The height of the eye, metres.
+    pub height: f64,
+}
+
 /// The manner in which the stage is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Style {
     /// Boards in the colours of their speeds.
     Plan,
     /// The stage at night in the light of the dragon's lanterns, without theme, surroundings and animation.
     Lanterns,
+    /// The stage at night from a seat, without theme, framing, surroundings and animation.
+    Seat(Seat),
 }
 
 /// The part of the stage to show.

@@ -6,9 +6,8 @@ use svg::node::element::{Circle, Group, Path};
 use super::camera::Camera;
 use super::palette::Palette;
 use super::rounded;
-use bench_dragon_messages::sentence::bench_name;
+use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
@@ -48,17 +47,17 @@ impl Happened {
     }
 
     /// Returns the sentence of the event, with benches counted from 1 in words.
-    pub fn sentence(&self, place: &str, motion: &Motion) -> String {
-        let who: Vec<String> = self.benches().map(|bench| bench_name(bench, motion.team().benches as u32)).collect();
-        let obstacle = motion.obstacle_of(&self.timed.event).map_or("", |obstacle| &obstacle.name);
+    pub fn sentence(&self, place: &str, roster: &Roster) -> String {
+        let who: Vec<String> = self.benches().map(|bench| roster.bench(bench)).collect();
+        let obstacle = self.timed.event.bench_b.map_or(String::new(), |number| roster.bench(number));
         let who = who.join(" and ");
         let time = rounded(self.timed.time, 3);
         let sentence = match (self.timed.event.kind, self.tense) {
             (EventKind::Contact, Tense::Present) => format!("contact: {who} touch {place}"),
             (EventKind::Contact, Tense::Past) => format!("contact: {who} touched {place} at {time} s"),
-            (EventKind::Obstacle, Tense::Present) => format!("obstacle: {who} meets the {obstacle} {place}"),
+            (EventKind::Obstacle, Tense::Present) => format!("obstacle: {who} meets {obstacle} {place}"),
             (EventKind::Obstacle, Tense::Past) => {
-                format!("obstacle: {who} met the {obstacle} {place} at {time} s")
+                format!("obstacle: {who} met {obstacle} {place} at {time} s")
             }
             (EventKind::Stall, Tense::Present) => format!("stall: {who} stalls, its rear handle {place}"),
             (EventKind::Stall, Tense::Past) => format!("stall: {who} stalled at {time} s, its rear handle {place}"),
@@ -109,9 +108,9 @@ impl Happened {
 }
 
 /// Returns the pairs that overlap now, in words; `None` without any.
-pub fn overlap_sentence(pairs: &[(usize, usize, f64)], benches: usize) -> Option<String> {
+pub fn overlap_sentence(pairs: &[(usize, usize, f64)], roster: &Roster) -> Option<String> {
     let deepest = pairs.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let name = |bench: usize| bench_name(bench as u32, benches as u32);
+    let name = |bench: usize| roster.bench(bench as u32);
     let (one, other, depth) = deepest;
     let depth = rounded(depth, 3);
     let deepest = format!("{} and {}", name(one), name(other));

@@ -5,7 +5,10 @@
 
 use serde::Serialize;
 
-use super::layouts::{ChaseStatus, CollisionAlert, Cue, NO_BENCH, Stage, StageCue, StageEvent, StageSegment};
+use super::StageMessage;
+use super::layouts::{
+    ChaseStatus, CollisionAlert, Cue, NO_BENCH, Stage, StageCue, StageDragon, StageEvent, StageObstacle, StageSegment,
+};
 use crate::chase::{ChaseSource, ChaseState};
 use crate::state::EventKind;
 use crate::state::Level;
@@ -131,26 +134,44 @@ impl From<&ChaseStatus> for ChaseObject {
     }
 }
 
-/// A [`Stage`] with the entries that are in use.
+/// A [`StageMessage`]: each dragon with its path, each obstacle with its outline.
 #[derive(Debug, Clone, Serialize)]
 pub struct StageObject {
     run_id: Exact,
+    dragons: Vec<DragonObject>,
+    obstacles: Vec<ObstacleObject>,
+    /// In hexadecimal digits.
+    scene_hash: Option<String>,
+    freeze_time: f64,
+    events: Vec<EventObject>,
+    cues: Vec<StageCueObject>,
+}
+
+/// A dragon.
+#[derive(Debug, Clone, Serialize)]
+struct DragonObject {
+    name: String,
+    first_handle: u32,
+    benches: u32,
     pitch: f64,
     start_turn: f64,
     hole_inset: f64,
     head_length: f64,
     body_length: f64,
     width: f64,
-    benches: u32,
-    /// In hexadecimal digits.
-    scene_hash: Option<String>,
     path: Vec<SegmentObject>,
-    freeze_time: f64,
-    events: Vec<EventObject>,
-    cues: Vec<StageCueObject>,
 }
 
-/// A segment of the path.
+/// An obstacle, or the boundary.
+#[derive(Debug, Clone, Serialize)]
+struct ObstacleObject {
+    name: String,
+    kind: &'static str,
+    keep_out: f64,
+    outline: Vec<SegmentObject>,
+}
+
+/// A segment of a path or of an outline.
 #[derive(Debug, Clone, Serialize)]
 struct SegmentObject {
     kind: &'static str,
@@ -161,6 +182,7 @@ struct SegmentObject {
     curvature: f64,
     theta_first: f64,
     theta_last: f64,
+    pitch: f64,
 }
 
 /// An event of the show.
@@ -168,6 +190,8 @@ struct SegmentObject {
 struct EventObject {
     event: &'static str,
     time: f64,
+    bench_a: Option<u32>,
+    bench_b: Option<u32>,
 }
 
 /// A cue of the show.
@@ -179,37 +203,62 @@ struct StageCueObject {
     pauses: bool,
 }
 
-impl From<&Stage> for StageObject {
-    fn from(stage: &Stage) -> Self {
-        let Stage { run_id, pitch, start_turn, hole_inset, head_length, body_length, width, .. } = *stage;
-        let Stage { freeze_time, benches, .. } = *stage;
-        let segment = |segment: &StageSegment| {
-            let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, .. } = *segment;
-            let kind = segment.kind_name();
-            SegmentObject { kind, x, y, heading, length, curvature, theta_first, theta_last }
+impl From<&StageSegment> for SegmentObject {
+    fn from(segment: &StageSegment) -> Self {
+        let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, pitch, .. } = *segment;
+        Self { kind: segment.kind_name(), x, y, heading, length, curvature, theta_first, theta_last, pitch }
+    }
+}
+
+impl From<&StageEvent> for EventObject {
+    fn from(event: &StageEvent) -> Self {
+        let StageEvent { time, state: _, bench_a, bench_b, reserved: _ } = *event;
+        let [bench_a, bench_b] = [bench_a, bench_b].map(|bench| (bench != NO_BENCH).then_some(bench));
+        Self { event: event.kind().map_or("unknown", EventKind::name), time, bench_a, bench_b }
+    }
+}
+
+impl From<&StageCue> for StageCueObject {
+    fn from(cue: &StageCue) -> Self {
+        let StageCue { time, number, pauses, ref name } = *cue;
+        Self { number, name: name.as_str().to_owned(), time, pauses: pauses == 1 }
+    }
+}
+
+impl From<&StageMessage> for StageObject {
+    fn from(message: &StageMessage) -> Self {
+        let Stage { run_id, freeze_time, ref dragons, ref obstacles, ref events, ref cue_list, .. } = message.stage;
+        let dragon = |dragon: &StageDragon| {
+            let StageDragon { head_length, body_length, width, hole_inset, pitch, start_turn, .. } = *dragon;
+            let StageDragon { first_handle, benches, first_segment: _, segments: _, ref name, .. } = *dragon;
+            let (name, path) = (name.as_str().to_owned(), message.path(dragon).iter().map(Into::into).collect());
+            DragonObject {
+                name,
+                first_handle,
+                benches,
+                pitch,
+                start_turn,
+                hole_inset,
+                head_length,
+                body_length,
+                width,
+                path,
+            }
         };
-        let event = |event: &StageEvent| EventObject {
-            event: event.kind().map_or("unknown", EventKind::name),
-            time: event.time,
-        };
-        let cue = |cue: &StageCue| {
-            let StageCue { time, number, pauses, ref name } = *cue;
-            StageCueObject { number, name: name.as_str().to_owned(), time, pauses: pauses == 1 }
+        let obstacle = |obstacle: &StageObstacle| ObstacleObject {
+            name: obstacle.name.as_str().to_owned(),
+            kind: obstacle.kind_name(),
+            keep_out: obstacle.keep_out,
+            outline: message.outline(obstacle).iter().map(Into::into).collect(),
         };
         Self {
             run_id: Exact(run_id),
-            pitch,
-            start_turn,
-            hole_inset,
-            head_length,
-            body_length,
-            width,
-            benches,
-            scene_hash: stage.scene_hash_digits(),
-            path: stage.path_in_use().iter().map(segment).collect(),
+            dragons: dragons.iter().map(dragon).collect(),
+            obstacles: obstacles.iter().map(obstacle).collect(),
+            scene_hash: message.stage.scene_hash_digits(),
             freeze_time,
-            events: stage.events_in_use().iter().map(event).collect(),
-            cues: stage.cues_in_use().iter().map(cue).collect(),
+            events: events.iter().map(Into::into).collect(),
+            cues: cue_list.iter().map(Into::into).collect(),
         }
     }
 }

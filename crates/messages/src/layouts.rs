@@ -5,7 +5,7 @@
 //! little-endian, `#[repr(C)]` and without implicit padding. A type's name ends in the version of its layout, so that a
 //! subscriber built for another layout is refused instead of reading nonsense.
 //!
-//! `msgs/msg` and `examples/python/bench_dragon_messages.py` are generated from this file, doc comments included, by
+//! `msgs/msg` and `packaging/python/bench_dragon/layouts.py` are generated from this file, doc comments included, by
 //! `BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::`. The comments are therefore for readers of all three languages. Facts
 //! of iceoryx2 alone stand in a paragraph that begins with "Over iceoryx2", which `msgs/msg` leaves out. A link to a
 //! constant or to an enum of [`state`](crate::state) gives the ROS 2 message those constants.
@@ -256,6 +256,9 @@ impl SceneName {
     /// The greatest length of a name, bytes in UTF-8.
     pub const CAPACITY: usize = SCENE_NAME_BYTES;
 
+    /// The name without a letter.
+    pub(crate) const EMPTY: Self = Self([0; SCENE_NAME_BYTES]);
+
     /// Creates a name, cut to the bytes that there is room for.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; SCENE_NAME_BYTES];
@@ -273,7 +276,7 @@ impl SceneName {
 
 impl Default for SceneName {
     fn default() -> Self {
-        Self([0; SCENE_NAME_BYTES])
+        Self::EMPTY
     }
 }
 

@@ -1,12 +1,12 @@
 //! Alerts in words, for people. Benches are counted from 1, and the sentence states this.
 //!
-//! In: a [`CollisionAlert`] and the number of benches. Out: a sentence. Called by `run`, `watch` and the stage
+//! In: a [`CollisionAlert`] and the [`Stage`] with the names. Out: a sentence. Called by `run`, `watch` and the stage
 //! picture's server, so that all of them print the same.
 
 use std::fmt::Display;
 use std::io;
 
-use super::layouts::{ChaseStatus, CollisionAlert, Cue};
+use super::layouts::{ChaseStatus, CollisionAlert, Cue, NO_BENCH, Stage};
 use crate::chase::{ChaseSource, ChaseState};
 use crate::state::EventKind;
 use crate::state::{FrameState, Level};
@@ -60,17 +60,63 @@ pub fn bench_name(bench: u32, benches: u32) -> String {
     }
 }
 
-/// Returns an alert of a team of `benches` benches as a sentence. A past event is in the past tense, since the show may
-/// continue. For a coming event, its place and the two benches that are nearest now are separate.
-pub fn alert_sentence(alert: &CollisionAlert, benches: u32, figures: Figures) -> String {
+/// Returns the name of a bench or an obstacle of a show by its number, for people.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon_messages::sentence::name_in;
+/// use bench_dragon_messages::{List, SceneName, Stage, StageDragon, StageObstacle};
+///
+/// let gold = StageDragon { benches: 4, name: SceneName::new("gold"), ..StageDragon::default() };
+/// let jade = StageDragon { first_handle: 5, benches: 3, name: SceneName::new("jade"), ..StageDragon::default() };
+/// let well = StageObstacle { name: SceneName::new("well"), ..StageObstacle::default() };
+/// let stage = Stage { dragons: List::of([gold, jade]), obstacles: List::of([well]), ..Stage::default() };
+/// assert_eq!(name_in(&stage, 1), "bench 2 of gold");
+/// assert_eq!(name_in(&stage, 5), "bench 1 (the head) of jade");
+/// // Nine handles come before the obstacles.
+/// assert_eq!(name_in(&stage, 9), "the well");
+/// ```
+pub fn name_in(stage: &Stage, number: u32) -> String {
+    let of = |first: u32, benches: u32| number.checked_sub(first).filter(|bench| *bench < benches);
+    for dragon in stage.dragons.iter() {
+        if let Some(bench) = of(dragon.first_handle, dragon.benches) {
+            let name = bench_name(bench, dragon.benches);
+            let dragon = dragon.name.as_str();
+            return if dragon.is_empty() { name } else { format!("{name} of {dragon}") };
+        }
+    }
+    let Some(obstacle) = obstacle_number(stage, number) else { return format!("bench {}", u64::from(number) + 1) };
+    match stage.obstacles.get(obstacle as usize) {
+        Some(named) => format!("the {}", named.name.as_str()),
+        None => format!("obstacle {}", u64::from(obstacle) + 1),
+    }
+}
+
+/// Returns the name of the obstacle that an alert is about: that of its event, or else the nearest one; `None` if it is
+/// about boards alone.
+pub fn obstacle_in<'a>(stage: &'a Stage, alert: &CollisionAlert) -> Option<&'a str> {
+    let of = |number: u32| stage.obstacles.get(obstacle_number(stage, number)? as usize);
+    of(alert.event_bench_b).or_else(|| of(alert.bench_b)).map(|obstacle| obstacle.name.as_str())
+}
+
+/// Returns the number of an obstacle, from 0, of a number that follows the handles.
+fn obstacle_number(stage: &Stage, number: u32) -> Option<u32> {
+    let handles = stage.dragons.iter().map(|dragon| dragon.first_handle.saturating_add(dragon.benches)).max()?;
+    number.checked_sub(handles.saturating_add(1)).filter(|_| number != NO_BENCH)
+}
+
+/// Returns an alert of a show as a sentence; the stage has the names. A past event is in the past tense, since the show
+/// may continue. For a coming event, its place and the two benches that are nearest now are separate.
+pub fn alert_sentence(alert: &CollisionAlert, stage: &Stage, figures: Figures) -> String {
     let happened = alert.alert_level().is_some_and(Level::has_happened);
     let sentence = match (happened, alert.event_kind()) {
-        (true, Some(kind)) => happening(alert, kind, benches),
+        (true, Some(kind)) => happening(alert, kind, stage),
         (true, None) => "at an unknown place".to_owned(),
         (false, kind) => {
-            let coming = kind.map(|kind| coming(alert, kind, benches, figures));
+            let coming = kind.map(|kind| coming(alert, kind, stage, figures));
             let coming = coming.unwrap_or_else(|| "no contact, stall or lock ahead".to_owned());
-            match nearest(alert, benches, figures) {
+            match nearest(alert, stage, figures) {
                 Some(nearest) => format!("{coming}; {nearest}"),
                 None => coming,
             }
@@ -87,12 +133,12 @@ pub fn state_sentence(state: FrameState) -> Option<&'static str> {
     }
 }
 
-fn happening(alert: &CollisionAlert, kind: EventKind, benches: u32) -> String {
-    let who = names(alert.event_benches(), benches);
+fn happening(alert: &CollisionAlert, kind: EventKind, stage: &Stage) -> String {
+    let who = names(alert.event_benches(), stage);
     let (time, place) = (alert.event_time, place(alert));
     match kind {
         EventKind::Obstacle => {
-            let [bench, obstacle] = [alert.event_bench_a, alert.event_bench_b].map(|of| bench_name(of, benches));
+            let [bench, obstacle] = [alert.event_bench_a, alert.event_bench_b].map(|of| name_in(stage, of));
             format!("{bench} met {obstacle} at {place}, t = {time:.6} s")
         }
         EventKind::Contact => format!("{who} touched at {place}, t = {time:.6} s"),
@@ -110,8 +156,8 @@ fn place(alert: &CollisionAlert) -> String {
     format!("({:.3}, {:.3}) m", alert.event_x, alert.event_y)
 }
 
-fn coming(alert: &CollisionAlert, kind: EventKind, benches: u32, figures: Figures) -> String {
-    let who = names(alert.event_benches(), benches);
+fn coming(alert: &CollisionAlert, kind: EventKind, stage: &Stage, figures: Figures) -> String {
+    let who = names(alert.event_benches(), stage);
     let when = match figures {
         Figures::Shown { time_scale } => format!(" {}", time_until(alert.time_to_event, time_scale)),
         Figures::Omitted => String::new(),
@@ -145,9 +191,9 @@ pub fn rounded(value: f64, decimals: usize) -> String {
 }
 
 /// Removes the sign of zero: the clearance of a touch is solved to the last bits, on either side.
-fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<String> {
+fn nearest(alert: &CollisionAlert, stage: &Stage, figures: Figures) -> Option<String> {
     alert.nearest_benches().next()?;
-    let nearest = format!("nearest now are {}", names(alert.nearest_benches(), benches));
+    let nearest = format!("nearest now are {}", names(alert.nearest_benches(), stage));
     if figures == Figures::Omitted {
         return Some(nearest);
     }
@@ -157,14 +203,14 @@ fn nearest(alert: &CollisionAlert, benches: u32, figures: Figures) -> Option<Str
     Some(format!("{nearest}, {apart}"))
 }
 
-fn names(concerned: impl Iterator<Item = u32>, benches: u32) -> String {
-    concerned.map(|bench| bench_name(bench, benches)).collect::<Vec<_>>().join(" and ")
+fn names(concerned: impl Iterator<Item = u32>, stage: &Stage) -> String {
+    concerned.map(|bench| name_in(stage, bench)).collect::<Vec<_>>().join(" and ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::NO_BENCH;
+    use crate::{List, NO_BENCH, SceneName, StageDragon, StageObstacle};
 
     const SHOWN: Figures = Figures::Shown { time_scale: 2.0 };
 
@@ -186,11 +232,36 @@ mod tests {
         }
     }
 
+    /// The stage of one team.
+    fn team(benches: u32) -> Stage {
+        Stage { dragons: List::of([StageDragon { benches, ..StageDragon::default() }]), ..Stage::default() }
+    }
+
+    #[test]
+    fn an_obstacle_is_named() {
+        let lamp = StageObstacle { name: SceneName::new("stone lamp"), ..StageObstacle::default() };
+        let stage = Stage { obstacles: List::of([lamp]), ..team(12) };
+        let met = CollisionAlert { event_bench_b: 13, ..alert(Level::Obstacle, Some(EventKind::Obstacle)) };
+        let sentence = alert_sentence(&met, &stage, SHOWN);
+        assert!(sentence.starts_with("bench 1 (the head) met the stone lamp at (1.250, -0.500) m"), "{sentence}");
+        assert_eq!(obstacle_in(&stage, &met), Some("stone lamp"));
+        let near = CollisionAlert { bench_b: 13, ..alert(Level::Approaching, None) };
+        let sentence = alert_sentence(&near, &stage, SHOWN);
+        assert!(
+            sentence.contains("nearest now are bench 1 (the head) and the stone lamp, 0.0031 m apart"),
+            "{sentence}"
+        );
+        assert_eq!(obstacle_in(&stage, &alert(Level::Approaching, None)), None);
+        // A number that the stage does not list, and a stage that has not come.
+        assert_eq!(name_in(&stage, 14), "obstacle 2");
+        assert_eq!(name_in(&Stage::default(), 14), "bench 15");
+    }
+
     #[test]
     fn what_comes_has_its_kind_its_benches_and_its_time() {
         let coming = alert(Level::Approaching, Some(EventKind::Contact));
         let nearest = "nearest now are bench 1 (the head) and bench 10, 0.0031 m apart (counting from 1)";
-        let sentence = |figures| alert_sentence(&coming, 223, figures);
+        let sentence = |figures| alert_sentence(&coming, &team(223), figures);
         assert_eq!(
             sentence(SHOWN),
             format!("contact: bench 1 (the head) and bench 9 at (1.250, -0.500) m in 6.5 s; {nearest}")
@@ -205,29 +276,29 @@ mod tests {
             ..alert(Level::Clear, Some(EventKind::Stall))
         };
         assert_eq!(
-            alert_sentence(&stall, 2, SHOWN),
+            alert_sentence(&stall, &team(2), SHOWN),
             "stall: bench 1 (the head) at (1.250, -0.500) m in 6.5 s (counting from 1)"
         );
         let nothing = alert(Level::Approaching, None);
-        assert_eq!(alert_sentence(&nothing, 223, SHOWN), format!("no contact, stall or lock ahead; {nearest}"));
+        assert_eq!(alert_sentence(&nothing, &team(223), SHOWN), format!("no contact, stall or lock ahead; {nearest}"));
     }
 
     #[test]
     fn what_has_happened_has_its_place_and_its_time() {
         let contact = alert(Level::Contact, Some(EventKind::Contact));
         assert_eq!(
-            alert_sentence(&contact, 9, SHOWN),
+            alert_sentence(&contact, &team(9), SHOWN),
             "bench 1 (the head) and bench 9 (the tail) touched at (1.250, -0.500) m, t = 412.473838 s (counting from 1)"
         );
         let lock = CollisionAlert { event_bench_b: NO_BENCH, ..alert(Level::Lock, Some(EventKind::Lock)) };
-        let sentence = alert_sentence(&lock, 223, SHOWN);
+        let sentence = alert_sentence(&lock, &team(223), SHOWN);
         assert!(sentence.starts_with("bench 1 (the head) locked, its rear handle at (1.250, -0.500) m"), "{sentence}");
     }
 
     #[test]
     fn a_show_that_stands_still_comes_to_no_event() {
         let contact = alert(Level::Approaching, Some(EventKind::Contact));
-        let sentence = alert_sentence(&contact, 9, Figures::Shown { time_scale: 0.0 });
+        let sentence = alert_sentence(&contact, &team(9), Figures::Shown { time_scale: 0.0 });
         assert!(
             sentence.starts_with(
                 "contact: bench 1 (the head) and bench 9 (the tail) at (1.250, -0.500) m not while paused"
@@ -239,6 +310,6 @@ mod tests {
     #[test]
     fn an_alert_about_nothing_names_no_bench() {
         let nothing = CollisionAlert::default();
-        assert_eq!(alert_sentence(&nothing, 2, SHOWN), "no contact, stall or lock ahead");
+        assert_eq!(alert_sentence(&nothing, &team(2), SHOWN), "no contact, stall or lock ahead");
     }
 }

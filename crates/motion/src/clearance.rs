@@ -4,6 +4,7 @@
 //! handle never count. Both methods evaluate a pair with the same function on the same numbers, so they agree to the
 //! last bit.
 
+mod between;
 mod bounds;
 mod cells;
 mod grid;
@@ -22,6 +23,7 @@ use crate::model::separation::{closest_points_board_board, signed_distance_board
 use crate::model::team::Team;
 use crate::solve::Chain;
 use crate::solve::table::FollowerTable;
+pub use between::{BetweenMonitor, nearest_between_all_pairs};
 use bounds::BoundTable;
 pub use obstacles::ObstacleMonitor;
 use search::{CarriedBounds, ClearanceSearch};

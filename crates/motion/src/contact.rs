@@ -44,6 +44,7 @@
 //! whole team keeps its shape. Followers are solved only as far back as they can reach the boards that matter
 //! (`reach`).
 
+pub mod between;
 mod broad_phase;
 mod configuration;
 mod displacement;

@@ -7,6 +7,7 @@
 
 pub mod clearance;
 pub mod contact;
+pub mod ensemble;
 pub mod event;
 pub mod ground;
 pub mod linkage;

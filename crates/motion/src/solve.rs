@@ -48,6 +48,28 @@ impl Chain {
     pub fn handles(&self) -> usize {
         self.x.len()
     }
+
+    /// Sets all velocities to 0; those that are not computed stay NaN.
+    pub fn stand(&mut self) {
+        for number in self.speed.iter_mut().chain(&mut self.vx).chain(&mut self.vy) {
+            *number = if number.is_nan() { *number } else { 0.0 };
+        }
+    }
+
+    /// Copies the handles of another chain to those from `first` on.
+    ///
+    /// # Panics
+    /// If this chain has fewer handles.
+    pub fn put(&mut self, first: usize, other: &Self) {
+        let Self { x, y, heading, speed, vx, vy } = other;
+        let to = first..first + other.handles();
+        self.x[to.clone()].copy_from_slice(x);
+        self.y[to.clone()].copy_from_slice(y);
+        self.heading[to.clone()].copy_from_slice(heading);
+        self.speed[to.clone()].copy_from_slice(speed);
+        self.vx[to.clone()].copy_from_slice(vx);
+        self.vy[to].copy_from_slice(vy);
+    }
 }
 
 /// A request to compute speeds and velocities, or to omit them.

@@ -42,6 +42,8 @@ pub struct TimedObstacleClearance {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
     events: Vec<TimedEvent>,
+    /// The path ends of dragons that stand while others go on, in order of time.
+    standing: Vec<TimedEvent>,
     searched_until: Option<f64>,
 }
 
@@ -55,12 +57,30 @@ impl Timeline {
             let by_time = a.time.total_cmp(&b.time).then(a.event.kind.cmp(&b.event.kind));
             ends(a).cmp(&ends(b)).then(by_time).then(a.event.bench_b.cmp(&b.event.bench_b))
         });
-        Self { events, searched_until }
+        Self { events, standing: Vec::new(), searched_until }
+    }
+
+    /// Returns the timeline with the path ends of dragons that stand while others go on. They change no state.
+    pub fn with_standing(mut self, mut standing: Vec<TimedEvent>) -> Self {
+        standing.sort_by(|a, b| a.time.total_cmp(&b.time));
+        self.standing = standing;
+        self
+    }
+
+    /// Returns all events in order of time: also the path ends of dragons that stand while others go on.
+    pub fn all(&self) -> Vec<TimedEvent> {
+        let mut all = self.events.clone();
+        for end in &self.standing {
+            let at = all.partition_point(|timed| timed.time <= end.time).min(all.len() - 1);
+            all.insert(at, *end);
+        }
+        all
     }
 
     /// Returns the timeline with the last event only.
     pub fn end_only(mut self) -> Self {
         self.events.drain(..self.events.len() - 1);
+        self.standing.clear();
         self
     }
 

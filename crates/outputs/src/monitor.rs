@@ -136,7 +136,7 @@ impl Monitor {
                 self.alert = None;
                 self.chase = None;
             }
-            FeedEvent::Started { .. } | FeedEvent::Stage(_) | FeedEvent::Scene { .. } | FeedEvent::Cue(_) => (),
+            FeedEvent::Started { .. } | FeedEvent::Stage { .. } | FeedEvent::Scene { .. } | FeedEvent::Cue(_) => (),
         }
     }
 

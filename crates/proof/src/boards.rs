@@ -130,6 +130,36 @@ impl<'a> Board<'a> {
         best_direction(|n| self.rough_gap(other, n)).is_some_and(|n| self.is_apart_along(n, metres, other))
     }
 
+    /// Returns a point that is on the same side of each line of Lemma 2 as the board.
+    pub fn inner_point(&self) -> &Vector {
+        &self.front.point
+    }
+
+    /// Returns true if the board is shown to be further than `metres` from the convex hull of some points.
+    pub fn is_clear_of(&self, points: &[Vector], metres: &Interval) -> bool {
+        self.is_roughly_clear_of(points, metres) || {
+            let (rough, at) = (metres.rough(), rough_points(points));
+            best_direction(|n| self.rough.gap_to(&at, n) - rough)
+                .is_some_and(|n| self.is_clear_along(n, points, metres))
+        }
+    }
+
+    /// Returns true if one of a few directions shows the board to be further than `metres` from the convex hull of some
+    /// points.
+    pub fn is_roughly_clear_of(&self, points: &[Vector], metres: &Interval) -> bool {
+        let (rough, at) = (metres.rough(), rough_points(points));
+        let best = (self.rough.directions_to(&at).into_iter())
+            .map(|n| (n, self.rough.gap_to(&at, n) - rough))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        best.is_some_and(|(n, gap)| gap > 0.0 && self.is_clear_along(n, points, metres))
+    }
+
+    fn is_clear_along(&self, n: [f64; 2], points: &[Vector], metres: &Interval) -> bool {
+        let axis = Axis::new(n);
+        let most = self.extent(&axis) + axis.norm * metres;
+        points.iter().all(|point| most.is_below(&axis.n.dot(point)))
+    }
+
     fn rough_gap(&self, other: &Self, n: [f64; 2]) -> f64 {
         -self.rough.extent(n) - other.rough.extent([-n[0], -n[1]])
     }
@@ -139,6 +169,10 @@ impl<'a> Board<'a> {
         let opposite = Axis { n: Vector { x: -axis.n.x, y: -axis.n.y }, norm: axis.norm };
         (self.extent(&axis) + other.extent(&opposite) + axis.norm * metres).is_negative()
     }
+}
+
+fn rough_points(points: &[Vector]) -> Vec<[f64; 2]> {
+    points.iter().map(|point| [point.x.rough(), point.y.rough()]).collect()
 }
 
 /// Returns the direction with the greatest distance by doubles, if that distance is positive: the best of directions
@@ -223,6 +257,31 @@ impl Rough {
                 + norm * (self.front.sag + self.rear.sag))
                 / self.length;
         ahead.max(behind) + self.half_width * norm.min(across)
+    }
+
+    /// Returns the distance from the board to points along a unit vector.
+    fn gap_to(&self, points: &[[f64; 2]], n: [f64; 2]) -> f64 {
+        points.iter().map(|point| dot(n, *point)).fold(f64::INFINITY, f64::min) - self.extent(n)
+    }
+
+    /// Returns directions in which points may be apart from the board: the normals of its edges and of a side, and
+    /// those between the nearest corners and between the middles.
+    fn directions_to(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let [x, y] = self.direction();
+        let mut directions = vec![[x, y], [-y, x], [-x, -y], [y, -x]];
+        if let [from, to] = points {
+            let side = [to[0] - from[0], to[1] - from[1]];
+            directions.extend([[-side[1], side[0]], [side[1], -side[0]]]);
+        }
+        let between = |from: [f64; 2], to: [f64; 2]| [to[0] - from[0], to[1] - from[1]];
+        let pairs = self.corners().into_iter().flat_map(|corner| points.iter().map(move |to| between(corner, *to)));
+        directions.extend(pairs.min_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b))));
+        let count = points.len() as f64;
+        let middle = points.iter().fold([0.0; 2], |sum, point| [sum[0] + point[0] / count, sum[1] + point[1] / count]);
+        let own = [0, 1].map(|axis| 0.5 * (self.front.point[axis] + self.rear.point[axis]));
+        directions.push(between(own, middle));
+        let unit = |[x, y]: [f64; 2]| [x / x.hypot(y), y / x.hypot(y)];
+        directions.into_iter().map(unit).filter(|n| n[0].is_finite() && n[1].is_finite()).collect()
     }
 
     fn corners(&self) -> [[f64; 2]; 4] {

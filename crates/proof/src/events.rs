@@ -16,6 +16,8 @@ pub(super) struct Events {
     pub contact: Option<([usize; 2], Place)>,
     /// The link that has stalled, and the place of the head, as above.
     pub stall: Option<(usize, Place)>,
+    /// The obstacles that were reached, each with the bench and the place of the head, as above.
+    pub reached: Vec<(usize, usize, Place)>,
     /// The end of the motion.
     pub finish: Option<Finish>,
     /// Two benches, and metres that they are no further apart at a place of the motion.
@@ -87,6 +89,45 @@ impl Events {
             }
         }
         self.contact = Some((benches, from));
+        Ok(())
+    }
+
+    /// Checks and adds a board that has come to an obstacle: Lemma 9, *Reached*.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn add_reached(
+        &mut self,
+        scene: &Scene,
+        steps: &Steps,
+        (number, bench): (usize, usize),
+        head: Span,
+        spans: &[Span],
+        point: [f64; 2],
+    ) -> Result<(), String> {
+        if self.reached.iter().any(|(other, ..)| *other == number) {
+            return Err(format!("obstacle {number} was reached before"));
+        }
+        let obstacle = scene.obstacles.get(number).ok_or_else(|| format!("the scene has no obstacle {number}"))?;
+        if bench >= spans.len() {
+            return Err(format!("bench {bench} is not listed"));
+        }
+        let chain = Chain::check(scene, head, spans)?;
+        let Span(from, to) = head;
+        check_is_in_motion(scene, to)?;
+        match steps.end {
+            Some(end) if end != to => return Err("it is not where the last step ended".to_owned()),
+            None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
+                return Err("no step precedes it, and it begins beyond the start".to_owned());
+            }
+            _ => {}
+        }
+        let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
+        let board = Board::new(front, rear, *scene.team.link(bench), &scene.team);
+        if !obstacle.is_reached_by(&board, &Vector::new(point[0], point[1])) {
+            return Err(format!("bench {bench} may be clear of obstacle {number} (Lemma 9)"));
+        }
+        self.reached.push((number, bench, from));
         Ok(())
     }
 

@@ -13,6 +13,7 @@ mod events;
 mod far;
 mod first_order;
 mod greatest;
+mod ground;
 mod interval;
 mod lines;
 mod link;
@@ -53,7 +54,8 @@ pub struct Proved {
     pub scene: String,
     /// The version of the program that wrote the certificate.
     pub version: String,
-    /// The results for contact, stall, lock and path end, in this order; none in a certificate of another question.
+    /// The results for contact, stall, lock and path end, in this order, and for each obstacle; none in a certificate
+    /// of another question.
     pub results: Vec<ProvedEvent>,
     /// The least clearance, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -101,14 +103,18 @@ pub fn scene_hash(text: &str) -> [u8; 32] {
     *blake3::hash(text.as_bytes()).as_bytes()
 }
 
-/// Returns the text of a certificate's scene from the first line. The rest is not checked.
+/// Returns the text of a scene from the first line of the certificate of its events. The rest is not checked.
 ///
 /// # Errors
-/// [`Refused::Form`] for a line that is not the first of a certificate.
+/// [`Refused::Form`] for a line that is not the first of a certificate of events.
 pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
     let form = |problem: String| Refused::Form { line: 1, problem };
     let parsed = serde_json::from_slice(first_line).map_err(|error| form(error.to_string()))?;
-    Ok(Checker::begin(parsed).map_err(form)?.proved.scene)
+    let Checker { about, proved, .. } = Checker::begin(parsed).map_err(form)?;
+    if about == About::Events {
+        return Ok(proved.scene);
+    }
+    Err(form("it is a certificate of another question, expected one of events (events --certify)".to_owned()))
 }
 
 /// Checks a certificate. `progress` receives the number of bytes read.
@@ -138,7 +144,7 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
     match checker {
         Some(checker) if checker.is_complete() => Ok(checker.finished()),
         Some(Checker { about: About::Events, .. }) => {
-            Err(Refused::Form { line: 1, problem: "the file ends before its four results".to_owned() })
+            Err(Refused::Form { line: 1, problem: "the file ends before its results".to_owned() })
         }
         Some(_) => Err(Refused::Form { line: 1, problem: "the file ends before its result".to_owned() }),
         None => Err(Refused::Form { line: 1, problem: "the file is empty".to_owned() }),
@@ -165,6 +171,9 @@ impl Checker {
             return Err(format!("a certificate of format {format}, expected {FORMAT}"));
         }
         let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
+        if about != About::Events && !scene.obstacles.is_empty() {
+            return Err("the scene has obstacles, of which this kind of certificate proves nothing".to_owned());
+        }
         let (results, steps, links, pairs) = (Vec::new(), 0, 0, 0);
         let proved = Proved {
             scene: text,
@@ -184,7 +193,7 @@ impl Checker {
     /// Returns true if all results of the question are there.
     fn is_complete(&self) -> bool {
         match self.about {
-            About::Events => self.proved.results.len() == 4,
+            About::Events => self.proved.results.len() == 4 + self.scene.obstacles.len(),
             About::LeastClearance => self.proved.least_clearance.is_some(),
             About::GreatestSpeed => self.proved.greatest_speed.is_some(),
             About::LeastPitch => self.proved.least_pitch.is_some(),
@@ -211,8 +220,8 @@ impl Checker {
         }
         match line {
             ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
-            ParsedLine::Step { links, from, to, moving, clear, spans, apart, at } => {
-                let step = Step { links, head: Span(from, to), moving, clear, spans, apart, at };
+            ParsedLine::Step { links, from, to, moving, clear, spans, free, apart, at } => {
+                let step = Step { links, head: Span(from, to), moving, clear, spans, free, apart, at };
                 match pitch {
                     Some(pitch) => pitch.add_step(step),
                     None => steps.add(scene, step),
@@ -223,6 +232,9 @@ impl Checker {
             }
             ParsedLine::Contact { benches, from, to, spans, point } => {
                 events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
+            }
+            ParsedLine::Reached { obstacle, bench, from, to, spans, point } => {
+                events.add_reached(scene, steps, (obstacle, bench), Span(from, to), &spans, point)
             }
             ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
             ParsedLine::Lock { link, to, spans, last, window, jump } => {

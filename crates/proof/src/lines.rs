@@ -23,6 +23,8 @@ pub(super) enum ParsedLine {
         clear: bool,
         spans: Vec<Span>,
         #[serde(default)]
+        free: Vec<usize>,
+        #[serde(default)]
         apart: Option<f64>,
         #[serde(default)]
         at: Vec<Place>,
@@ -37,6 +39,14 @@ pub(super) enum ParsedLine {
     },
     Contact {
         benches: [usize; 2],
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        point: [f64; 2],
+    },
+    Reached {
+        obstacle: usize,
+        bench: usize,
         from: Place,
         to: Place,
         spans: Vec<Span>,
@@ -127,6 +137,8 @@ pub enum EventKind {
     Lock,
     /// The path ends.
     PathEnd,
+    /// A board comes within the keep-out of an obstacle.
+    Obstacle,
 }
 
 /// The status of a result.
@@ -161,6 +173,9 @@ pub struct ProvedEvent {
     /// The second bench.
     #[serde(default)]
     pub bench_b: Option<usize>,
+    /// The number of the obstacle on the stage, from 0; the boundary is the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<usize>,
     /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not checked.
     #[serde(default)]
     pub because: Option<String>,

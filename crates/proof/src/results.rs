@@ -31,17 +31,21 @@ pub(super) fn check(
     outcome: &ProvedEvent,
     earlier: &[ProvedEvent],
 ) -> Result<(), String> {
-    let Some(expected) = ORDER.get(earlier.len()) else { return Err("a result too many, expected four".to_owned()) };
-    if outcome.event != *expected {
-        return Err("the results are not contact, stall, lock and path_end in this order".to_owned());
+    let obstacle = earlier.len().checked_sub(ORDER.len());
+    let expected = ORDER.get(earlier.len()).copied().unwrap_or(EventKind::Obstacle);
+    if obstacle.is_some_and(|number| number >= scene.obstacles.len()) {
+        return Err("a result too many, expected four and one for each obstacle".to_owned());
     }
-    let known = known(scene, steps, events, *expected);
+    if outcome.event != expected || outcome.obstacle != obstacle {
+        return Err("the results are not contact, stall, lock, path_end and the obstacles in this order".to_owned());
+    }
+    let known = known(scene, steps, events, (expected, obstacle.unwrap_or(0)));
     let ProvedEvent { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
     let begins = |lo: f64| lo.is_finite() && lo >= 0.0 && Interval::new(lo).is_at_most(&known.not_before);
     match (outcome.status, time_lo, time_hi) {
         (Status::None, lo, None) if known.never && bench_a.is_none() && bench_b.is_none() => {
             // Between the last step and the lock nothing is known, so a claim must state up to when it holds.
-            let up_to_a_lock = matches!(events.finish, Some(Finish::Lock(..))) && *expected != EventKind::PathEnd;
+            let up_to_a_lock = matches!(events.finish, Some(Finish::Lock(..))) && expected != EventKind::PathEnd;
             match lo {
                 Some(lo) if up_to_a_lock && begins(*lo) => Ok(()),
                 None if !up_to_a_lock => Ok(()),
@@ -115,7 +119,7 @@ pub(super) fn check_clearance(
     }
 }
 
-fn known(scene: &Scene, steps: &Steps, events: &Events, event: EventKind) -> Known {
+fn known(scene: &Scene, steps: &Steps, events: &Events, (event, obstacle): (EventKind, usize)) -> Known {
     let zero = Interval::new(0.0);
     let seconds = |place: Place| (scene.path.travelled(place) / scene.head_speed).max(&zero);
     let after = |place: Option<Place>| place.map_or_else(|| zero, seconds);
@@ -139,6 +143,15 @@ fn known(scene: &Scene, steps: &Steps, events: &Events, event: EventKind) -> Kno
             },
             never: matches!(events.finish, Some(Finish::PathEnd)),
         },
+        EventKind::Obstacle => {
+            let (end, all_free) = steps.free(obstacle);
+            let reached = events.reached.iter().find(|(number, ..)| *number == obstacle);
+            Known {
+                not_before: after(end),
+                by: reached.map(|(_, bench, at)| (seconds(*at), Some(*bench), None)),
+                never: finished && all_free,
+            }
+        }
         EventKind::PathEnd => {
             let seconds = (scene.path.length / scene.head_speed).max(&zero);
             let reached = matches!(events.finish, Some(Finish::PathEnd));

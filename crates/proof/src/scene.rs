@@ -4,6 +4,7 @@
 use serde::Deserialize;
 
 use super::elementary;
+use super::ground::{Obstacle, PlacementText, StageText};
 use super::interval::{Interval, Vector};
 use super::path::{Curve, Path, PathEnd, Segment};
 
@@ -16,6 +17,8 @@ pub(super) struct Scene {
     pub path: Path,
     /// Metres per second.
     pub head_speed: Interval,
+    /// The obstacles in the path's own coordinates, the boundary last.
+    pub obstacles: Vec<Obstacle>,
 }
 
 /// The team of benches.
@@ -45,7 +48,8 @@ struct Text {
     team: TeamText,
     path: PathText,
     motion: MotionText,
-    stage: Option<serde::de::IgnoredAny>,
+    placement: Option<PlacementText>,
+    stage: Option<StageText>,
 }
 
 #[derive(Deserialize)]
@@ -134,11 +138,13 @@ impl Scene {
         if text.motion.solver.as_deref() == Some("paper") {
             return Err("the scene names the solver \"paper\", whose motion is not the exact one".to_owned());
         }
-        if text.stage.is_some() {
-            return Err("the scene has a table [stage], of which no proof knows".to_owned());
-        }
         let head_speed = positive("motion.head_speed", text.motion.head_speed)?;
-        Ok(Self { team, path, head_speed })
+        let start = if let PathText::Pieces { start, .. } = &text.path { *start } else { [0.0; 2] };
+        let obstacles = match &text.stage {
+            Some(stage) => stage.read(&text.placement.unwrap_or_default(), start)?,
+            None => Vec::new(),
+        };
+        Ok(Self { team, path, head_speed, obstacles })
     }
 }
 
@@ -164,7 +170,7 @@ impl Scene {
         let zero = Interval::new(0.0);
         let inward = Segment { curve: Curve::Inward { a }, begin: None, end: Some(zero) };
         let path = Path::new(vec![inward], zero, PathEnd::Coordinate(zero), zero);
-        Self { team, path, head_speed: self.head_speed }
+        Self { team, path, head_speed: self.head_speed, obstacles: Vec::new() }
     }
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Step {
     pub moving: bool,
     pub clear: bool,
     pub spans: Vec<Span>,
+    /// The obstacles of which all boards are said to stay clear.
+    pub free: Vec<usize>,
     /// Metres that boards are said to be more apart.
     pub apart: Option<f64>,
     /// Places of all listed handles with the head at one place.
@@ -39,6 +41,8 @@ pub(super) struct Steps {
     pub all_apart: bool,
     /// Metres by which boards were apart in all steps up to `apart_end`.
     pub apart: f64,
+    /// By obstacle: the end of the last step that stays clear of it, and true if all steps did.
+    free: Vec<(Option<Place>, bool)>,
     /// Spans of the last step.
     pub spans: Vec<Span>,
     /// Lemma 4: S is not beyond this place, the end of handle 1's span in the first step.
@@ -64,6 +68,7 @@ impl Steps {
             all_clear: true,
             all_apart: true,
             apart: f64::INFINITY,
+            free: Vec::new(),
             spans: Vec::new(),
             start_of_second: None,
             has_come: false,
@@ -84,7 +89,7 @@ impl Steps {
     /// # Errors
     /// The condition that does not follow.
     pub fn add(&mut self, scene: &Scene, step: Step) -> Result<(), String> {
-        let Step { links, head, moving, clear, spans, apart, at } = step;
+        let Step { links, head, moving, clear, spans, free, apart, at } = step;
         let Span(from, to) = head;
         span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
         match self.end {
@@ -104,6 +109,7 @@ impl Steps {
         }
         self.add_moving(moving, to, &chain)?;
         self.add_clear(scene, links, clear, to, &chain)?;
+        self.add_free(scene, links, &free, to, &chain)?;
         self.add_apart(scene, links, (apart, &at), to, &chain)?;
         self.steps += 1;
         self.links += chain.products.len() as u64;
@@ -169,6 +175,55 @@ impl Steps {
         }
         self.pairs += check_clear(scene, links, chain)?;
         self.clear_end = Some(to);
+        Ok(())
+    }
+
+    /// Returns the end of the last step that stays clear of an obstacle, and true if all steps so far did.
+    pub fn free(&self, obstacle: usize) -> (Option<Place>, bool) {
+        self.free.get(obstacle).copied().unwrap_or((None, true))
+    }
+
+    /// Checks that all boards stay clear of some obstacles (Lemma 9).
+    fn add_free(
+        &mut self,
+        scene: &Scene,
+        links: Links,
+        free: &[usize],
+        to: Place,
+        chain: &Chain,
+    ) -> Result<(), String> {
+        if scene.obstacles.is_empty() && free.is_empty() {
+            return Ok(());
+        }
+        if let Some(obstacle) = free.iter().find(|obstacle| **obstacle >= scene.obstacles.len()) {
+            return Err(format!("it names the obstacle {obstacle}, which the scene has not"));
+        }
+        self.free.resize(scene.obstacles.len(), (None, true));
+        let team = &scene.team;
+        let mut boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
+            .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
+            .collect();
+        let last = chain.last();
+        let run = (links == Links::All && last < team.benches).then(|| straight_run(scene, chain, last));
+        match &run {
+            Some((front, rear, length)) => boards.push(Board::new(front, rear, *length, team)),
+            None if links == Links::Front => boards.truncate(2),
+            None => {}
+        }
+        for (number, obstacle) in scene.obstacles.iter().enumerate() {
+            let (end, all) = &mut self.free[number];
+            if !free.contains(&number) {
+                *all = false;
+                continue;
+            }
+            if !*all {
+                return Err(format!("it claims to be clear of obstacle {number} after a step that does not"));
+            }
+            if let Some(bench) = boards.iter().position(|board| !obstacle.is_avoided_by(board)) {
+                return Err(format!("bench {bench}, or one behind it, may be at obstacle {number} (Lemma 9)"));
+            }
+            *end = Some(to);
+        }
         Ok(())
     }
 

@@ -9,7 +9,7 @@ pub mod iceoryx2;
 use crate::live::control::CommandSender;
 use crate::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_client::shared_memory::OpenError;
-use bench_dragon_messages::Stage;
+use bench_dragon_messages::StageMessage;
 use bench_dragon_show::scene::{Scene, SinglePrecision};
 
 /// The settings of a run for every transport.
@@ -32,15 +32,15 @@ pub struct TransportConfig<'a> {
     /// The text of the scene, whose hash is in the stage; empty if it is not known.
     pub scene: &'a str,
     /// The stage.
-    pub stage: Stage,
+    pub stage: &'a StageMessage,
 }
 
 impl<'a> TransportConfig<'a> {
     /// Returns the settings of a scene, published under `name` without its text.
-    pub fn of(name: &'a str, scene: &'a Scene, stage: Stage) -> Self {
+    pub fn of(name: &'a str, scene: &'a Scene, stage: &'a StageMessage) -> Self {
         Self {
             name,
-            handles: scene.team().handles(),
+            handles: scene.handles(),
             alerts: scene.alerts.is_some(),
             cues: scene.cues.len(),
             single_precision: scene.single_precision,
@@ -78,6 +78,7 @@ impl From<OpenError> for TransportError {
             | OpenError::TooManyPublishers(_)
             | OpenError::Incomplete(_)
             | OpenError::Incompatible(_)
+            | OpenError::OtherLayout { .. }
             | OpenError::OtherAttributes(_)
             | OpenError::OtherLimits(_) => Self::NameInUse(sentence),
             _ => Self::Failed(sentence),

@@ -13,7 +13,9 @@ use std::time::{Duration, Instant};
 
 use crate::mcap::recorder::{RecordError, Recorded, Recorder};
 use bench_dragon_client::feed::FeedEvent;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, QUEUE_BYTES, Stage};
+use bench_dragon_messages::{
+    CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, QUEUE_BYTES, Stage, StageMessage,
+};
 
 /// The interval of the thread's periodic work.
 const MAINTAIN_INTERVAL: Duration = Duration::from_millis(50);
@@ -27,7 +29,7 @@ const FINISH_INTERVAL: Duration = Duration::from_millis(10);
 /// An item of the queue.
 enum Item {
     Frame { header: FrameHeader, handles: Vec<HandlePose>, missed: u64 },
-    Stage(Box<Stage>),
+    Stage(Box<StageMessage>),
     Scene { run_id: u64, text: String },
     Alert(CollisionAlert),
     Cue(Cue),
@@ -105,7 +107,9 @@ impl RecordQueue {
                 copy.extend_from_slice(handles);
                 Item::Frame { header: **header, handles: copy, missed: *missed }
             }
-            FeedEvent::Stage(stage) => Item::Stage(Box::new(**stage)),
+            FeedEvent::Stage { stage, segments } => {
+                Item::Stage(Box::new(StageMessage { stage: **stage, segments: segments.to_vec() }))
+            }
             FeedEvent::Scene { header, text } => Item::Scene { run_id: header.run_id, text: (*text).to_owned() },
             FeedEvent::Alert(alert) => Item::Alert(**alert),
             FeedEvent::Cue(cue) => Item::Cue(**cue),
@@ -156,7 +160,8 @@ fn bytes(item: &Item) -> usize {
     match item {
         Item::Frame { handles, .. } => size_of::<Item>() + size_of_val(&handles[..]),
         Item::Scene { text, .. } => size_of::<Item>() + text.len(),
-        _ => size_of::<Item>() + size_of::<Stage>(),
+        Item::Stage(message) => size_of::<Item>() + size_of::<Stage>() + size_of_val(&message.segments[..]),
+        _ => size_of::<Item>() + size_of::<LoopStatus>(),
     }
 }
 

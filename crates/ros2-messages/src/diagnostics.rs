@@ -1,12 +1,13 @@
-//! diagnostic_msgs: the health of the loop and of the dragon, once a second.
+//! diagnostic_msgs: the health of the loop, of the dragon and of a chase, once a second.
 
 use serde::Serialize;
 
 use super::{HasStamp, Header, Time, level_of};
 use crate::settings::DiagnosticLimits;
-use bench_dragon_messages::state::EventKind;
-use bench_dragon_messages::state::Severity;
-use bench_dragon_messages::{CollisionAlert, LoopStatus};
+use bench_dragon_messages::chase::{ChaseSource, ChaseState};
+use bench_dragon_messages::sentence::chase_sentence;
+use bench_dragon_messages::state::{EventKind, Severity};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, LoopStatus};
 
 /// diagnostic_msgs/KeyValue.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -37,7 +38,7 @@ pub struct DiagnosticStatus {
 pub struct DiagnosticArray {
     /// The time of the status.
     pub header: Header,
-    /// The loop and the dragon.
+    /// The loop, the dragon and, where one runs or has died, the chase.
     pub status: Vec<DiagnosticStatus>,
 }
 
@@ -45,6 +46,9 @@ pub struct DiagnosticArray {
 const OK: u8 = 0;
 const WARN: u8 = 1;
 const ERROR: u8 = 2;
+
+/// Nanoseconds without a status after which a chase has died: it sends five a second.
+const CHASE_SILENCE_NS: u64 = 2_000_000_000;
 
 /// The input of a second's diagnostics besides the status.
 #[derive(Debug, Clone, Copy)]
@@ -141,6 +145,38 @@ impl DiagnosticArray {
         };
         Self { header: Header::of(status.stamp_ns), status: vec![the_loop, dragon] }
     }
+
+    /// Adds the latest status of a chase to the diagnostics of `loop_status`.
+    pub fn with_chase(mut self, name: &str, loop_status: &LoopStatus, chase: &ChaseStatus) -> Self {
+        let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
+        let state = chase.chase_state();
+        let is_over = state == Some(ChaseState::Ended);
+        let has_died = !is_over && loop_status.stamp_ns.saturating_sub(chase.stamp_ns) >= CHASE_SILENCE_NS;
+        let is_locked = state == Some(ChaseState::Locked) && !has_died;
+        let (level, message) = match state {
+            _ if has_died => (ERROR, "has died; the show stays at its last rate".to_owned()),
+            Some(ChaseState::Locked | ChaseState::Ended) => (OK, chase_sentence(chase)),
+            Some(ChaseState::Lost) => (ERROR, chase_sentence(chase)),
+            _ => (WARN, chase_sentence(chase)),
+        };
+        let mut values = vec![
+            value("source", chase.chase_source().map_or("unknown", ChaseSource::name).to_owned()),
+            value("locked", is_locked.to_string()),
+            value("state", state.map_or("unknown", ChaseState::name).to_owned()),
+            value("timecode", chase.label().unwrap_or_default()),
+        ];
+        let figures = [("error (s)", chase.error), ("rate", chase.rate), ("distance (m)", chase.distance)];
+        let known = figures.into_iter().filter(|(_, figure)| !has_died && figure.is_finite());
+        values.extend(known.map(|(key, figure)| value(key, format!("{figure:.6}"))));
+        self.status.push(DiagnosticStatus {
+            level,
+            name: format!("{name}: chase"),
+            message,
+            hardware_id: name.to_owned(),
+            values,
+        });
+        self
+    }
 }
 
 impl HasStamp for DiagnosticArray {
@@ -192,5 +228,34 @@ mod tests {
         let contact = LoopStatus { unforeseen_contacts: 1, ..status(0) };
         assert_eq!(level(status(0), contact, default, [0, 0]).0, ERROR);
         assert_eq!(level(contact, contact, default, [0, 0]), (OK, "on time".to_owned()));
+    }
+
+    #[test]
+    fn a_chase_is_judged_by_its_state_and_its_silence() {
+        let told = |state: ChaseState, age_ns: u64| {
+            let now = LoopStatus { stamp_ns: 9_000_000_000, ..LoopStatus::default() };
+            let chase = ChaseStatus {
+                state: state as u32,
+                stamp_ns: now.stamp_ns - age_ns,
+                error: 0.001,
+                minutes: 5,
+                frame_rate: 2,
+                ..ChaseStatus::default()
+            };
+            let second =
+                LoopSecond { before: &now, discarded: 0, discarded_before: 0, limits: DiagnosticLimits::default() };
+            let array = DiagnosticArray::of("d", &now, None, &second).with_chase("d", &now, &chase);
+            let [_, _, chase] = array.status.try_into().unwrap();
+            assert_eq!(chase.name, "d: chase");
+            let value = |key: &str| chase.values.iter().find(|of| of.key == key).map(|of| of.value.clone());
+            assert_eq!(value("timecode").as_deref(), Some("00:05:00:00"));
+            (chase.level, value("locked").unwrap(), value("error (s)"))
+        };
+        let error = || Some("0.001000".to_owned());
+        assert_eq!(told(ChaseState::Locked, 200_000_000), (OK, "true".to_owned(), error()));
+        assert_eq!(told(ChaseState::Freewheeling, 200_000_000), (WARN, "false".to_owned(), error()));
+        assert_eq!(told(ChaseState::Lost, 200_000_000).0, ERROR);
+        assert_eq!(told(ChaseState::Locked, 2_000_000_000), (ERROR, "false".to_owned(), None));
+        assert_eq!(told(ChaseState::Ended, 8_000_000_000).0, OK);
     }
 }

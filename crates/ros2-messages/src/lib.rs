@@ -14,7 +14,7 @@ mod types;
 use serde::{Deserialize, Serialize};
 
 use bench_dragon_messages::state::Level;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
 pub use types::{MessageType, fields};
 
 /// The frame of all coordinates: metres, x to the right, y up, origin at the centre.
@@ -83,10 +83,10 @@ impl Stamped<LoopStatus> {
     }
 }
 
-impl Stamped<Stage> {
+impl Stamped<StageMessage> {
     /// Creates the message of a stage.
-    pub fn stage(stage: Stage) -> Self {
-        Self { header: Header::of(stage.stamp_ns), layout: stage }
+    pub fn stage(message: StageMessage) -> Self {
+        Self { header: Header::of(message.stage.stamp_ns), layout: message }
     }
 }
 

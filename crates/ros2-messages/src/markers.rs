@@ -3,10 +3,11 @@
 
 use serde::Serialize;
 
+use super::path::poses;
 use super::{HasStamp, Header, Pose, Time, Xyz, level_of};
-use bench_dragon_messages::sentence::{Figures, alert_sentence, bench_name, state_sentence};
+use bench_dragon_messages::sentence::{Figures, alert_sentence, name_in, state_sentence};
 use bench_dragon_messages::state::{FrameState, Severity};
-use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, FrameHeader, HandlePose, Stage, StageDragon, StageMessage};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 
@@ -112,9 +113,10 @@ pub struct Marker {
     pub mesh_use_embedded_materials: bool,
 }
 
-/// Marker.CUBE, Marker.SPHERE, Marker.LINE_LIST and Marker.TEXT_VIEW_FACING.
+/// Marker.CUBE, Marker.SPHERE, Marker.LINE_STRIP, Marker.LINE_LIST and Marker.TEXT_VIEW_FACING.
 const CUBE: i32 = 1;
 const SPHERE: i32 = 2;
+const LINE_STRIP: i32 = 4;
 const LINE_LIST: i32 = 5;
 const TEXT: i32 = 9;
 /// Marker.ADD and Marker.DELETE.
@@ -128,6 +130,10 @@ const RING_RADIUS: f64 = 2.5;
 /// The lifetime of a marker: this number of periods, and at least this number of seconds.
 const LIFETIME_PERIODS: f64 = 5.0;
 const LEAST_LIFETIME: f64 = 1.0;
+/// The width of the line of an obstacle's outline, metres.
+const OUTLINE_WIDTH: f64 = 0.08;
+/// The height of an obstacle's name, metres.
+const NAME_HEIGHT: f64 = 0.5;
 /// The most benches named at once: two of the event, and the two nearest.
 const MOST_NAMED: usize = 4;
 
@@ -162,10 +168,11 @@ impl Marker {
 }
 
 /// visualization_msgs/MarkerArray: a cube for each bench, a sphere at a contact, a dashed ring at the coming event, the
-/// sentence of `run`, `watch` and the stage picture, the names of the benches in it.
+/// sentence of `run`, `watch` and the stage picture, the names of the benches in it. Of each obstacle its outline, its
+/// keep-out as a wide faint line about the outline, and its name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarkerArray {
-    /// The benches from the head on, then `contact`, `coming`, `sentence` and the `numbers`.
+    /// The benches from the head on, then `contact`, `coming`, `sentence`, the `numbers` and the ground.
     pub markers: Vec<Marker>,
     /// The deadline of the latest frame, nanoseconds; 0 before the first.
     #[serde(skip)]
@@ -174,11 +181,13 @@ pub struct MarkerArray {
 
 impl MarkerArray {
     /// Creates the markers of a stage, without positions.
-    pub fn of(stage: &Stage) -> Self {
-        let width = stage.width;
-        let bench = |bench: u32| {
-            let length = if bench == 0 { stage.head_length } else { stage.body_length };
-            Marker { scale: Xyz { x: length, y: width, z: BENCH_HEIGHT }, ..Marker::new("benches", bench as i32, CUBE) }
+    pub fn of(message: &StageMessage) -> Self {
+        let stage = &message.stage;
+        let width = stage.first_dragon().width;
+        let bench = |of: &StageDragon, bench: u32| {
+            let length = if bench == 0 { of.head_length } else { of.body_length };
+            let number = (of.first_handle + bench) as i32;
+            Marker { scale: Xyz { x: length, y: of.width, z: BENCH_HEIGHT }, ..Marker::new("benches", number, CUBE) }
         };
         let sign = |ns, shape, scale| Marker { scale, color: colour(Severity::Error), ..Marker::new(ns, 0, shape) };
         // Text has only a height.
@@ -186,9 +195,11 @@ impl MarkerArray {
         let contact = sign("contact", SPHERE, Xyz { x: width, y: width, z: width });
         let coming =
             Marker { points: ring(width), ..sign("coming", LINE_LIST, Xyz { x: 0.3 * width, y: 0.0, z: 0.0 }) };
-        let mut markers: Vec<Marker> = (0..stage.benches).map(bench).collect();
+        let of_all = stage.dragons.iter().flat_map(|of| (0..of.benches).map(move |own| bench(of, own)));
+        let mut markers: Vec<Marker> = of_all.collect();
         markers.extend([contact, coming, words("sentence", 0)]);
         markers.extend((0..MOST_NAMED as i32).map(|id| words("numbers", id)));
+        markers.extend(ground(message));
         Self { markers, latest_deadline_ns: 0 }
     }
 
@@ -211,37 +222,47 @@ impl MarkerArray {
         stage: &Stage,
         alert: Option<&CollisionAlert>,
     ) {
+        let width = stage.first_dragon().width;
         let stamp = Time::of(frame.stamp_ns);
         let lifetime = self.lifetime(frame);
-        self.markers.iter_mut().for_each(|marker| marker.lifetime = lifetime);
+        for marker in &mut self.markers {
+            (marker.lifetime, marker.header.stamp) = (lifetime, stamp);
+        }
         let level = level_of(alert);
         let alert = alert.filter(|_| level.severity() > Severity::Ok);
         let named = alert.map_or_else(Vec::new, |alert| named(alert, level.has_happened()));
-        let (benches, signs) = self.markers.split_at_mut(stage.benches as usize);
-        for (bench, (marker, pair)) in benches.iter_mut().zip(handles.windows(2)).enumerate() {
-            let points = [Point::new(pair[0].x, pair[0].y), Point::new(pair[1].x, pair[1].y)];
-            let centre = Board::from_handles(points[0], points[1], stage.hole_inset, stage.width).centre;
+        let benches: usize = stage.dragons.iter().map(|of| of.benches as usize).sum();
+        let split = benches.min(self.markers.len());
+        let (benches, signs) = self.markers.split_at_mut(split);
+        let numbers = stage.dragons.iter().flat_map(|of| (0..of.benches).map(move |own| (of, own)));
+        for (marker, (of, own)) in benches.iter_mut().zip(numbers) {
+            let number = of.first_handle + own;
+            let Some([front, rear]) = handles.get(number as usize..).and_then(|rest| rest.first_chunk()) else { break };
+            let points = [Point::new(front.x, front.y), Point::new(rear.x, rear.y)];
+            let centre = Board::from_handles(points[0], points[1], of.hole_inset, of.width).centre;
             marker.header.stamp = stamp;
-            marker.pose = Pose::flat(centre.x, centre.y, pair[0].heading);
-            marker.color = match (named.iter().find(|(one, _)| *one == bench as u32), bench) {
+            marker.pose = Pose::flat(centre.x, centre.y, front.heading);
+            marker.color = match (named.iter().find(|(one, _)| *one == number), own) {
                 (Some((_, severity)), _) => colour(*severity),
                 (None, 0) => Color { r: 0.85, g: 0.65, b: 0.13, a: 1.0 },
                 _ => Color { r: 0.55, g: 0.35, b: 0.2, a: 1.0 },
             };
         }
-        let [contact, coming, sentence, numbers @ ..] = signs else { return };
+        let [contact, coming, sentence, rest @ ..] = signs else { return };
+        let numbers = &mut rest[..MOST_NAMED];
         let place = alert.filter(|alert| alert.event_x.is_finite()).map(|alert| (alert.event_x, alert.event_y));
         put(contact, stamp, place.filter(|_| level.has_happened()));
         put(coming, stamp, place.filter(|_| !level.has_happened()));
         sentence.text = words(frame, stage, alert).unwrap_or_default();
         // Above the ring; without one, above the head.
         let head = handles.first().map(|head| (head.x, head.y));
-        let above = place.or(head).map(|(x, y)| (x, y + (RING_RADIUS + 2.0) * stage.width));
+        let above = place.or(head).map(|(x, y)| (x, y + (RING_RADIUS + 2.0) * width));
         put(sentence, stamp, above.filter(|_| !sentence.text.is_empty()));
         for (k, marker) in numbers.iter_mut().enumerate() {
             let bench = named.get(k);
-            marker.text = bench.map_or_else(String::new, |(bench, _)| bench_name(*bench, stage.benches));
-            let at = bench.and_then(|(bench, _)| benches.get(*bench as usize)).map(|marker| &marker.pose.position);
+            marker.text = bench.map_or_else(String::new, |(bench, _)| name_in(stage, *bench));
+            let of = |(bench, _): &(u32, Severity)| benches.iter().find(|marker| marker.id as u32 == *bench);
+            let at = bench.and_then(of).map(|marker| &marker.pose.position);
             put(marker, stamp, at.map(|place| (place.x, place.y)));
         }
     }
@@ -251,6 +272,32 @@ impl HasStamp for MarkerArray {
     fn set_stamp(&mut self, stamp: Time) {
         self.markers.iter_mut().for_each(|marker| marker.header.stamp = stamp);
     }
+}
+
+/// Returns the markers of the obstacles: the outlines, the keep-outs and the names.
+fn ground(message: &StageMessage) -> Vec<Marker> {
+    let mut markers = Vec::new();
+    for (id, obstacle) in (0..).zip(message.stage.obstacles.iter()) {
+        let poses = poses(message.outline(obstacle));
+        let points: Vec<Xyz> = poses.iter().map(|pose| pose.position).collect();
+        let line = |ns, width, alpha| Marker {
+            points: points.clone(),
+            scale: Xyz { x: width, y: 0.0, z: 0.0 },
+            color: Color { r: 0.5, g: 0.5, b: 0.5, a: alpha },
+            ..Marker::new(ns, id, LINE_STRIP)
+        };
+        markers.push(line("obstacles", OUTLINE_WIDTH, 1.0));
+        if obstacle.keep_out > 0.0 {
+            markers.push(line("keep_out", 2.0 * obstacle.keep_out, 0.2));
+        }
+        let Some(first) = points.first() else { continue };
+        let mut pose = Pose::flat(first.x, first.y, 0.0);
+        pose.position.z = 2.0 * BENCH_HEIGHT;
+        let scale = Xyz { x: 0.0, y: 0.0, z: NAME_HEIGHT };
+        let text = obstacle.name.as_str().to_owned();
+        markers.push(Marker { pose, scale, text, ..Marker::new("obstacle_names", id, TEXT) });
+    }
+    markers
 }
 
 /// Shows a marker at a place, or deletes it.
@@ -285,7 +332,7 @@ fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> 
     let of = |alert: &CollisionAlert| {
         // Alerts come once a second, frames more often.
         let now = CollisionAlert { time_to_event: alert.event_time - frame.sim_time, ..*alert };
-        alert_sentence(&now, stage.benches, Figures::Shown { time_scale: frame.time_scale })
+        alert_sentence(&now, stage, Figures::Shown { time_scale: frame.time_scale })
     };
     state.map(str::to_owned).or_else(|| alert.map(of))
 }
@@ -311,11 +358,13 @@ fn colour(severity: Severity) -> Color {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::List;
 
     #[test]
     fn a_marker_lives_some_periods_and_at_least_a_second_of_either_clock() {
-        let stage = Stage { benches: 3, ..Stage::default() };
-        let mut markers = MarkerArray::of(&stage);
+        let dragons = List::of([StageDragon { benches: 3, ..StageDragon::default() }]);
+        let stage = Stage { dragons, ..Stage::default() };
+        let mut markers = MarkerArray::of(&StageMessage { stage, segments: Vec::new() });
         let mut lifetime = |seconds: f64, time_scale: f64| {
             let frame = FrameHeader { deadline_ns: (seconds * 1e9) as u64, time_scale, ..FrameHeader::default() };
             markers.update(&frame, &[HandlePose::default(); 4], &stage, None);

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{HasStamp, Header, Pose, Time};
-use bench_dragon_messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL, Stage, StageSegment};
+use bench_dragon_messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL, StageMessage, StageSegment};
 
 /// The turn between two points, radians: the chord of a circle of 9 m is 9 mm off.
 const TURN: f64 = std::f64::consts::PI / 36.0;
@@ -29,11 +29,11 @@ pub struct Path {
 }
 
 impl Path {
-    /// Creates the path of a stage, with the stage's stamp.
-    pub fn of(stage: &Stage) -> Self {
-        let header = Header::of(stage.stamp_ns);
-        let poses = poses(stage.path_in_use(), stage.pitch);
-        let poses = poses.into_iter().map(|pose| PoseStamped { header: header.clone(), pose }).collect();
+    /// Creates the path of a stage's dragon, with the stage's stamp; with several the paths one after the other.
+    pub fn of(message: &StageMessage) -> Self {
+        let header = Header::of(message.stage.stamp_ns);
+        let poses = message.stage.dragons.iter().flat_map(|dragon| poses(message.path(dragon)));
+        let poses = poses.map(|pose| PoseStamped { header: header.clone(), pose }).collect();
         Self { header, poses }
     }
 }
@@ -46,14 +46,14 @@ impl HasStamp for Path {
 }
 
 /// Returns points along segments with the direction of travel: the ends of every segment, and a point for each turn by
-/// five degrees. `pitch` is the pitch of the spirals, metres per turn.
-fn poses(segments: &[StageSegment], pitch: f64) -> Vec<Pose> {
+/// five degrees.
+pub(super) fn poses(segments: &[StageSegment]) -> Vec<Pose> {
     let turned: f64 = segments.iter().map(turn_of).sum();
     let turn = TURN.max(turned / MOST_POINTS);
     let along = |segment: &StageSegment| {
         let pieces = (turn_of(segment) / turn).ceil().max(1.0) as usize;
         let segment = *segment;
-        (0..=pieces).map(move |piece| pose_at(&segment, pitch, piece as f64 / pieces as f64))
+        (0..=pieces).map(move |piece| pose_at(&segment, piece as f64 / pieces as f64))
     };
     segments.iter().flat_map(along).collect()
 }
@@ -68,8 +68,8 @@ fn turn_of(segment: &StageSegment) -> f64 {
 }
 
 /// Returns the pose at a share, from 0 to 1, of a segment's length or of a spiral's polar angle.
-fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
-    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, kind, reserved: _ } = *segment;
+fn pose_at(segment: &StageSegment, share: f64) -> Pose {
+    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, pitch, kind, .. } = *segment;
     match kind {
         SEGMENT_ARC => {
             let here = heading + share * curvature * length;
@@ -85,7 +85,7 @@ fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
             let (along_x, along_y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
             let side = if kind == SEGMENT_INWARD_SPIRAL { 1.0 } else { -1.0 };
             let own = (side * radius * cosine, side * radius * sine, along_y.atan2(along_x));
-            if curvature.is_nan() { Pose::flat(own.0, own.1, own.2) } else { placed(segment, pitch, own) }
+            if curvature.is_nan() { Pose::flat(own.0, own.1, own.2) } else { placed(segment, own) }
         }
         _ => {
             let (sine, cosine) = heading.sin_cos();
@@ -97,9 +97,9 @@ fn pose_at(segment: &StageSegment, pitch: f64, share: f64) -> Pose {
 /// Returns a pose of a spiral that is placed elsewhere, from its place on the spiral about the origin. Beginning and
 /// heading say where the spiral lies; an inward one bends to the right unless it is mirrored, an outward one to the
 /// left.
-fn placed(segment: &StageSegment, pitch: f64, (x, y, heading): (f64, f64, f64)) -> Pose {
+fn placed(segment: &StageSegment, (x, y, heading): (f64, f64, f64)) -> Pose {
     let unplaced = StageSegment { curvature: f64::NAN, ..*segment };
-    let Pose { position: first, orientation } = pose_at(&unplaced, pitch, 0.0);
+    let Pose { position: first, orientation } = pose_at(&unplaced, 0.0);
     let first_heading = 2.0 * orientation.z.atan2(orientation.w);
     let bend = if segment.kind == SEGMENT_INWARD_SPIRAL { -1.0 } else { 1.0 };
     let side = bend * segment.curvature.signum();
@@ -120,9 +120,9 @@ mod tests {
     use bench_dragon_show::convert::stage_segment;
 
     /// Every pose lies on the path, and looks along it, by the path's own points and tangents.
-    fn check(path: &ModelPath, pitch: f64) {
+    fn check(path: &ModelPath) {
         let segments: Vec<_> = path.outline().iter().map(stage_segment).collect();
-        let poses = poses(&segments, pitch);
+        let poses = poses(&segments);
         assert!(poses.len() > 50 && poses.len() < 2500, "{}", poses.len());
         let mut travelled = 0.0;
         let mut before: Option<Pose> = None;
@@ -151,13 +151,12 @@ mod tests {
     #[test]
     fn the_points_of_a_placed_path_are_the_paths_points_placed() {
         for path in [ModelPath::spiral(0.55, 16.0), ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap()] {
-            let pitch = if path.segments() == 1 { 0.55 } else { 1.7 };
             for (turns, mirror) in [(0.3, false), (0.0, true), (-0.2, true)] {
                 let placement = Placement::new(Vector::new(7.0, -3.0), turns, mirror);
                 let segments = |placement: &Placement| -> Vec<StageSegment> {
                     path.outline().into_iter().map(|segment| stage_segment(&placement.outline(segment))).collect()
                 };
-                let (home, away) = (poses(&segments(&Placement::IDENTITY), pitch), poses(&segments(&placement), pitch));
+                let (home, away) = (poses(&segments(&Placement::IDENTITY)), poses(&segments(&placement)));
                 assert_eq!(home.len(), away.len());
                 for (home, away) in home.iter().zip(&away) {
                     let place = placement.point(Point::new(home.position.x, home.position.y));
@@ -172,9 +171,9 @@ mod tests {
 
     #[test]
     fn the_points_lie_on_the_path_and_look_along_it() {
-        check(&ModelPath::spiral(0.55, 16.0), 0.55);
-        check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap(), 1.7);
+        check(&ModelPath::spiral(0.55, 16.0));
+        check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap());
         let route = ModelPath::route(0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
-        check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap(), f64::NAN);
+        check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap());
     }
 }

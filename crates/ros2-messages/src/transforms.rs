@@ -3,14 +3,14 @@
 use serde::Serialize;
 
 use super::{HasStamp, Header, Pose, Quaternion, Time, Xyz};
-use bench_dragon_messages::{FrameHeader, HandlePose};
+use bench_dragon_messages::{FrameHeader, HandlePose, Stage};
 
 /// geometry_msgs/TransformStamped.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TransformStamped {
     /// The frame's stamp; the frame `stage`.
     pub header: Header,
-    /// `<name>/head` or `<name>/tail`.
+    /// `<name>/head` or `<name>/tail`; with several dragons `<name>/<dragon>/head`.
     pub child_frame_id: String,
     /// Metres.
     pub translation: Xyz,
@@ -21,26 +21,35 @@ pub struct TransformStamped {
 /// tf2_msgs/TFMessage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TfMessage {
-    /// Head and tail.
+    /// Head and tail of each dragon.
     pub transforms: Vec<TransformStamped>,
+    /// The handle of each transform.
+    #[serde(skip)]
+    handles: Vec<usize>,
 }
 
 impl TfMessage {
-    /// Creates the transforms of the publisher `name`, without positions.
-    pub fn of(name: &str) -> Self {
-        let transform = |end: &str| TransformStamped {
+    /// Creates the transforms of the publisher `name` and the dragons of its stage, without positions.
+    pub fn of(name: &str, stage: &Stage) -> Self {
+        let transform = |of: &str, end: &str| TransformStamped {
             header: Header::of(0),
-            child_frame_id: format!("{name}/{end}"),
+            child_frame_id: if of.is_empty() { format!("{name}/{end}") } else { format!("{name}/{of}/{end}") },
             translation: Xyz::default(),
             rotation: Quaternion::of_heading(0.0),
         };
-        Self { transforms: vec![transform("head"), transform("tail")] }
+        let (mut transforms, mut handles) = (Vec::new(), Vec::new());
+        for dragon in stage.dragons.iter() {
+            transforms.extend(["head", "tail"].map(|end| transform(dragon.name.as_str(), end)));
+            let [first, benches] = [dragon.first_handle, dragon.benches].map(|number| number as usize);
+            handles.extend([first, first + benches]);
+        }
+        Self { transforms, handles }
     }
 
-    /// Sets head and tail to the first and the last handle of a frame.
+    /// Sets head and tail to the first and the last handle of each dragon of a frame.
     pub fn update(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
         let stamp = Time::of(frame.stamp_ns);
-        let ends = [handles.first(), handles.last()];
+        let ends = self.handles.iter().map(|handle| handles.get(*handle));
         for (transform, handle) in self.transforms.iter_mut().zip(ends) {
             let Some(Pose { position, orientation }) = handle.map(Pose::of) else { continue };
             transform.header.stamp = stamp;

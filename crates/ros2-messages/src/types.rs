@@ -112,7 +112,7 @@ fn parts(name: &str, definition: &str) -> Vec<String> {
 }
 
 /// All types of the topics. The standard types have their fields in order, on which the bytes depend.
-const DEFINITIONS: [(&str, &str); 32] = [
+const DEFINITIONS: [(&str, &str); 34] = [
     ("bench_dragon_msgs/CollisionAlert", include_str!("../../../msgs/msg/CollisionAlert.msg")),
     ("bench_dragon_msgs/Cue", include_str!("../../../msgs/msg/Cue.msg")),
     ("bench_dragon_msgs/HandlePose", include_str!("../../../msgs/msg/HandlePose.msg")),
@@ -120,7 +120,9 @@ const DEFINITIONS: [(&str, &str); 32] = [
     ("bench_dragon_msgs/LoopStatus", include_str!("../../../msgs/msg/LoopStatus.msg")),
     ("bench_dragon_msgs/Stage", include_str!("../../../msgs/msg/Stage.msg")),
     ("bench_dragon_msgs/StageCue", include_str!("../../../msgs/msg/StageCue.msg")),
+    ("bench_dragon_msgs/StageDragon", include_str!("../../../msgs/msg/StageDragon.msg")),
     ("bench_dragon_msgs/StageEvent", include_str!("../../../msgs/msg/StageEvent.msg")),
+    ("bench_dragon_msgs/StageObstacle", include_str!("../../../msgs/msg/StageObstacle.msg")),
     ("bench_dragon_msgs/StageSegment", include_str!("../../../msgs/msg/StageSegment.msg")),
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n"),
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_client::polling::Handler;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, StageMessage};
 use bench_dragon_ros2_messages::settings::{Ros2Settings, StampClock};
 use bench_dragon_show::scene::Scene;
 
@@ -20,7 +20,7 @@ use crate::commands::ShowCommands;
 use crate::control::{ControlThread, Endpoints};
 use crate::environment::{Network, check_name, other_distribution};
 use crate::matching::Matches;
-use crate::node::{self, Topics};
+use crate::node::{self, EndedTopics, Topics};
 use crate::rate::RateDivider;
 use crate::{Ros2Config, Ros2Error, context, topic_names};
 
@@ -89,7 +89,7 @@ struct ShowBridge {
     /// The settings in place of those of the scene.
     settings: Option<Ros2Settings>,
     connected: bool,
-    stage: Option<Stage>,
+    stage: Option<StageMessage>,
     scene: Option<ShowScene>,
     /// The latest alert and cue of a show whose topics are not open yet.
     alert: Option<CollisionAlert>,
@@ -97,6 +97,8 @@ struct ShowBridge {
     /// The time of the first frame without topics.
     waiting_since: Option<Instant>,
     open: Option<OpenShow>,
+    /// The topics of the run before.
+    ended: Option<EndedTopics>,
     counters: BridgeCounters,
 }
 
@@ -141,12 +143,17 @@ impl<'a> Bridge<'a> {
         Ok(Self { shows, network: DdsNetwork { context, matches, control, stamps }, stop, failure: None, notify })
     }
 
-    /// Closes all topics and leaves the network. Returns the counters of all shows.
+    /// Closes all topics and leaves the network when subscribers have had time to get the last messages. Returns the
+    /// counters of all shows.
     ///
     /// # Errors
     /// The [`Ros2Error`] that ended the bridge.
     pub fn finish(mut self) -> Result<BridgeCounters, Ros2Error> {
         self.shows.iter_mut().for_each(ShowBridge::close);
+        let until = self.shows.iter().filter_map(|show| show.ended.as_ref()).map(|ended| ended.until).max();
+        if let Some(until) = until {
+            std::thread::sleep(until.saturating_duration_since(Instant::now()));
+        }
         let sum = |sum: BridgeCounters, of: &ShowBridge| {
             let BridgeCounters { frames, skipped, discarded } = of.counters;
             BridgeCounters {
@@ -179,9 +186,12 @@ impl Handler for Bridge<'_> {
         }
     }
 
-    fn polled(&mut self, _now: Instant) {
+    fn polled(&mut self, now: Instant) {
         self.network.matches.update();
-        self.shows.iter_mut().filter_map(|show| show.open.as_mut()).for_each(|open| open.topics.service());
+        for show in &mut self.shows {
+            show.open.iter_mut().for_each(|open| open.topics.service());
+            show.ended.take_if(|ended| ended.until <= now);
+        }
     }
 }
 
@@ -197,13 +207,16 @@ impl ShowBridge {
             cue: None,
             waiting_since: None,
             open: None,
+            ended: None,
             counters: BridgeCounters::default(),
         }
     }
 
     fn handle(&mut self, event: FeedEvent<'_>, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
         match event {
-            FeedEvent::Stage(stage) => self.stage = Some(*stage),
+            FeedEvent::Stage { stage, segments } => {
+                self.stage = Some(StageMessage { stage: *stage, segments: segments.to_vec() });
+            }
             FeedEvent::Scene { header, text } => self.scene = Some(ShowScene::of(header.run_id, text)),
             FeedEvent::Started { run_id } => {
                 self.close();
@@ -224,10 +237,12 @@ impl ShowBridge {
                     open.topics.status(status);
                 }
             }
-            FeedEvent::Chase(_) | FeedEvent::Silent => (),
+            FeedEvent::Chase(status) => self.open.iter_mut().for_each(|open| open.topics.chase(*status)),
+            FeedEvent::Silent => (),
             FeedEvent::Gone => {
                 self.close();
-                *self = Self { counters: self.counters, ..Self::new(self.name.clone(), self.settings.clone()) };
+                let (ended, counters) = (self.ended.take(), self.counters);
+                *self = Self { ended, counters, ..Self::new(self.name.clone(), self.settings.clone()) };
                 return Ok(Some(Notice::Gone));
             }
         }
@@ -236,7 +251,7 @@ impl ShowBridge {
 
     /// Drops what belongs to another run than `run_id`.
     fn forget_other_runs(&mut self, run_id: u64) {
-        self.stage = self.stage.filter(|stage| stage.run_id == run_id);
+        self.stage = self.stage.take().filter(|message| message.stage.run_id == run_id);
         self.scene = self.scene.take().filter(|scene| scene.run_id == run_id);
         self.alert = self.alert.filter(|alert| alert.run_id == run_id);
         self.cue = self.cue.filter(|cue| cue.run_id == run_id);
@@ -266,7 +281,7 @@ impl ShowBridge {
 
     fn open(&mut self, header: &FrameHeader, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
         let waited = self.waiting_since.get_or_insert_with(Instant::now).elapsed();
-        let Some(stage) = self.stage else { return Ok(None) };
+        let Some(stage) = self.stage.clone() else { return Ok(None) };
         let scene = match self.scene.take() {
             Some(scene) => scene,
             None if waited < SCENE_TIMEOUT => return Ok(None),
@@ -279,10 +294,12 @@ impl ShowBridge {
         let DdsNetwork { context, matches, control, stamps } = network;
         let settings = self.settings.clone().unwrap_or(settings);
         let settings = Ros2Settings { stamps: stamps.unwrap_or(settings.stamps), ..settings };
-        let (name, cues) = (self.name.clone(), stage.cues as usize);
+        let (name, cues) = (self.name.clone(), stage.stage.cues as usize);
         let rate = settings.greatest_rate();
         let topic_names = topic_names(&name, &settings, alerts, cues);
         let config = Ros2Config { name, handles: header.handles as usize, rate, settings, alerts, cues, stage };
+        // The node of the run before has the same name, and its latest alert would be one more.
+        self.ended = None;
         let mut node = node::open(context, &self.name)?;
         let endpoints = Endpoints::open(&self.name, context, &mut node, *control)?;
         let topics = Topics::open(context.clone(), node, matches.clone(), config)?;
@@ -295,12 +312,12 @@ impl ShowBridge {
         Ok(Some(Notice::Opened { topics: topic_names }))
     }
 
-    /// Closes the topics and services of a run.
+    /// Ends the topics and services of a run.
     fn close(&mut self) {
         let Some(OpenShow { control, topics, .. }) = self.open.take() else { return };
         self.counters.discarded += topics.discarded();
         drop(control);
-        topics.finish();
+        self.ended = topics.finish();
     }
 }
 
@@ -310,7 +327,7 @@ impl ShowScene {
         if text.is_empty() {
             return Self::unknown(run_id);
         }
-        match Scene::parse(text, "the scene of the show", "scene") {
+        match Scene::parse_any(text, "the scene of the show", "scene") {
             Ok(scene) => Self { run_id, alerts: scene.alerts.is_some(), settings: scene.ros2.unwrap_or_default() },
             Err(error) => {
                 log::warn!("{error}: ROS 2 gets the default topics");

@@ -4,8 +4,9 @@
 //! Clients of both RMW implementations are answered, each in its own mapping ([`mapping`]). The requests use
 //! ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's writers. ros2-client's
 //! `Server` does not fit: it speaks one mapping, hides the bytes of a request, and answers at once. A client whose reply
-//! reader is not matched yet would never get that answer, so an answer waits here ([`Matches`]). A dead client, or one that floods the services, costs the loop nothing: this
-//! process takes the requests, and passes a bounded number of commands to the show at once.
+//! reader is not matched yet would never get that answer, so an answer waits here ([`Matches`]). A dead client, or one
+//! that floods the services, costs the loop nothing: this process takes the requests, and passes a bounded number of
+//! commands to the show at once.
 
 mod calls;
 mod endpoints;
@@ -35,9 +36,11 @@ use services::{Call, Response};
 const MOST_CALLS: usize = 16;
 /// The most calls without an answer in all; further calls wait in their readers.
 const MOST_PENDING: usize = 512;
-/// The longest wait of an answer for its client's reply reader. RMW implementations stop after 0.1 s; a loaded machine
-/// takes longer. Other answers do not wait.
-const MATCHING_PATIENCE: Duration = Duration::from_secs(2);
+/// The longest wait of an answer for its client's reply reader: while the client is there, and otherwise. RMW
+/// implementations stop after 0.1 s. On a loaded machine discovery takes longer, and a lost datagram of discovery is
+/// repeated after seconds; an answer that is sent before is lost. Other answers do not wait.
+const MATCHING_PATIENCE: Duration = Duration::from_secs(30);
+const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
@@ -220,7 +223,7 @@ impl Server {
         }
     }
 
-    /// Sends the answers whose clients are matched, or after [`MATCHING_PATIENCE`].
+    /// Sends the answers whose clients are matched, or whose patience is over.
     fn send_answers(&mut self) {
         let (ports, matches) = (&mut self.endpoints.ports, &self.matches);
         self.pending.retain(|Pending { port, client, progress, .. }| {
@@ -228,7 +231,11 @@ impl Server {
             let endpoint = &mut ports[*port];
             let reached =
                 matches.reaches(endpoint.responses_guid, endpoint.requests_guid, client.writer, client.reader);
-            if !reached && since.elapsed() < MATCHING_PATIENCE {
+            let patience = match matches.is_present(endpoint.requests_guid, client.writer) {
+                true => MATCHING_PATIENCE,
+                false => PATIENCE_AFTER_LEAVING,
+            };
+            if !reached && since.elapsed() < patience {
                 return true;
             }
             // A client of the other mapping would read this answer as random numbers. Without a match, all get the answer.

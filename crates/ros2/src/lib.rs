@@ -20,7 +20,7 @@ use std::net::{IpAddr, Ipv4Addr};
 use ros2_client::Context;
 use rustdds::DomainParticipantBuilder;
 
-use bench_dragon_messages::Stage;
+use bench_dragon_messages::StageMessage;
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
 pub use control::mappings_of;
@@ -59,7 +59,7 @@ struct Ros2Config {
     /// The cues of the scene.
     cues: usize,
     /// The stage.
-    stage: Stage,
+    stage: StageMessage,
 }
 
 /// The facts of a show for [`describe`].

@@ -11,7 +11,7 @@ use ros2_client::Context;
 use rustdds::policy::Durability;
 use rustdds::{DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
 
-use super::retransmission;
+use super::retransmission::FirstMessages;
 
 /// The matches of one participant, shared by its threads.
 #[derive(Clone)]
@@ -44,6 +44,8 @@ struct Ends {
     writers: BTreeSet<(GUID, GUID)>,
     /// Remote readers that request the history.
     transient_local: BTreeSet<GUID>,
+    /// New writers whose first messages are requested.
+    first_messages: Vec<FirstMessages>,
 }
 
 impl Matches {
@@ -52,7 +54,8 @@ impl Matches {
         let participant = context.domain_participant();
         let events = participant.status_listener();
         let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
-        let ends = Ends { participant, events, readers, writers, transient_local: BTreeSet::new() };
+        let (transient_local, first_messages) = (BTreeSet::new(), Vec::new());
+        let ends = Ends { participant, events, readers, writers, transient_local, first_messages };
         Self { ends: Arc::new(Mutex::new(ends)) }
     }
 
@@ -102,6 +105,11 @@ impl Matches {
 }
 
 impl Matches {
+    /// Returns true if `client`, the writer of requests to the local reader `requests`, is still there.
+    pub(super) fn is_present(&self, requests: GUID, client: GUID) -> bool {
+        self.with(|ends| ends.writers.contains(&(requests, client)))
+    }
+
     /// Returns the readers of a local writer in the process of `client`.
     pub(super) fn readers_in_process(&self, writer: GUID, client: GUID) -> Vec<GUID> {
         self.with(|ends| {
@@ -121,7 +129,7 @@ impl Ends {
                 }
                 Event::RemoteWriterMatched { local_reader, remote_writer } => {
                     self.writers.insert((local_reader, remote_writer));
-                    retransmission::request_first(&self.participant, local_reader, remote_writer);
+                    self.first_messages.extend(FirstMessages::of(local_reader, remote_writer));
                 }
                 // RustDDS sends this before the matches of that reader.
                 Event::ReaderDetected { reader } => {
@@ -133,14 +141,20 @@ impl Ends {
                     self.readers.retain(|(_, reader)| *reader != guid);
                     self.transient_local.remove(&guid);
                 }
-                Event::WriterLost { guid, .. } => self.writers.retain(|(_, writer)| *writer != guid),
+                Event::WriterLost { guid, .. } => {
+                    self.writers.retain(|(_, writer)| *writer != guid);
+                    self.first_messages.retain(|of| of.writer() != guid);
+                }
                 Event::ParticipantLost { id, .. } => {
                     self.readers.retain(|(_, reader)| reader.prefix != id);
                     self.transient_local.retain(|reader| reader.prefix != id);
                     self.writers.retain(|(_, writer)| writer.prefix != id);
+                    self.first_messages.retain(|of| of.writer().prefix != id);
                 }
                 _ => {}
             }
         }
+        let participant = &self.participant;
+        self.first_messages.retain_mut(|of| of.serve(participant));
     }
 }

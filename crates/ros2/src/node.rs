@@ -3,7 +3,7 @@
 //! The bridge creates and drops all objects of ros2-client on its thread.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 
@@ -13,7 +13,7 @@ use super::topic_writer::{EVENT_BYTES, Serviced, Stream, TopicWriter, WriterFact
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon_messages::state::Severity;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
@@ -25,18 +25,19 @@ use bench_dragon_ros2_messages::{Clock, HandlePoses, HasStamp, PoseArray, Stampe
 const PATH_POSE_BYTES: usize = 88;
 /// An upper bound of the bytes of the transforms of head and tail, for any name.
 const TRANSFORMS_BYTES: usize = 1000;
-/// The time for reliable subscribers to get the last messages.
-const LINGER: Duration = Duration::from_millis(100);
+/// The time for reliable subscribers to get the last messages. RustDDS notices the loss of a writer's last message with
+/// its next heartbeat, up to a second later.
+const LINGER: Duration = Duration::from_millis(1500);
 
 /// The writers that the scene requests, and their messages, whose memory is reused.
 pub(super) struct Topics {
     name: String,
-    stage: Stage,
+    stage: StageMessage,
     handles: Option<Stream<HandlePoses>>,
     poses: Option<Stream<PoseArray>>,
     markers: Option<Stream<MarkerArray>>,
     alerts: Option<TopicWriter<Stamped<CollisionAlert>>>,
-    stages: Option<TopicWriter<Stamped<Stage>>>,
+    stages: Option<TopicWriter<Stamped<StageMessage>>>,
     status: Option<TopicWriter<Stamped<LoopStatus>>>,
     diagnostics: Option<TopicWriter<DiagnosticArray>>,
     cues: Option<TopicWriter<Stamped<Cue>>>,
@@ -46,6 +47,7 @@ pub(super) struct Topics {
     rosout: Rosout,
     stamps: StampClock,
     latest_alert: Option<CollisionAlert>,
+    latest_chase: Option<ChaseStatus>,
     /// Simulated seconds per second, of the latest frame.
     time_scale: f64,
     /// The latest status, and the messages discarded up to it.
@@ -73,33 +75,35 @@ pub(super) fn open(context: &Context, name: &str) -> Result<Node, Ros2Error> {
 
 impl Topics {
     pub(super) fn open(context: Context, node: Node, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
-        let Ros2Config { stage, handles, .. } = config;
+        let Ros2Config { ref stage, handles, .. } = config;
         let mut maker = WriterFactory { context, node, config: &config };
         let rosout = Rosout::open(&maker.context, &mut maker.node, &config.name)?;
         // Stage and path hold at any simulated time.
         let stamps = config.settings.stamps;
-        let unchanging = stamps.at(stage.stamp_ns, 0.0);
-        let path = Arc::new(Path::of(&stage).at(unchanging));
+        let unchanging = stamps.at(stage.stage.stamp_ns, 0.0);
+        let path = Arc::new(Path::of(stage).at(unchanging));
         let path_bytes = EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES;
+        let stage_bytes = EVENT_BYTES + size_of_val(&stage.segments[..]);
         let mut topics = Self {
             name: config.name.clone(),
-            stage,
+            stage: stage.clone(),
             handles: maker.stream(Topic::Handles, 40, || HandlePoses::of(handles))?,
             poses: maker.stream(Topic::Poses, 56, || PoseArray::of(handles))?,
-            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(&stage))?,
+            markers: maker.stream(Topic::Markers, 300, || MarkerArray::of(stage))?,
             alerts: if config.alerts { maker.port(Topic::Alerts, EVENT_BYTES, 1.0)? } else { None },
-            stages: maker.port(Topic::Stage, EVENT_BYTES, 1.0)?,
+            stages: maker.port(Topic::Stage, stage_bytes, 1.0)?,
             status: maker.port(Topic::Status, EVENT_BYTES, 1.0)?,
             diagnostics: maker.port(Topic::Diagnostics, EVENT_BYTES, 1.0)?,
             cues: if config.cues > 0 { maker.port(Topic::Cues, EVENT_BYTES, 1.0)? } else { None },
             clock: maker.port(Topic::Clock, EVENT_BYTES, config.rate)?,
             transforms: maker
-                .port(Topic::Tf, TRANSFORMS_BYTES, config.rate)?
-                .map(|port| port.stream(TfMessage::of(&config.name))),
+                .port(Topic::Tf, TRANSFORMS_BYTES * stage.stage.dragons.len().max(1), config.rate)?
+                .map(|port| port.stream(TfMessage::of(&config.name, &stage.stage))),
             path: maker.port(Topic::Path, path_bytes, 1.0)?,
             rosout,
             stamps,
             latest_alert: None,
+            latest_chase: None,
             time_scale: 1.0,
             diagnosed: (LoopStatus::default(), 0),
             limits: config.settings.diagnostics,
@@ -109,7 +113,7 @@ impl Topics {
         };
         // The messages that do not change.
         if let Some(port) = &mut topics.stages {
-            port.send(Arc::new(Stamped::stage(stage).at(unchanging)), &mut topics.discarded);
+            port.send(Arc::new(Stamped::stage(stage.clone()).at(unchanging)), &mut topics.discarded);
         }
         if let Some(port) = &mut topics.path {
             port.send(path, &mut topics.discarded);
@@ -123,6 +127,10 @@ impl Topics {
     pub(super) fn service(&mut self) {
         self.matches.update();
         self.rosout.send_queued();
+        self.for_each_writer(|writer, matches, node| writer.service(matches, node));
+    }
+
+    fn for_each_writer(&mut self, mut act: impl FnMut(&mut dyn Serviced, &Matches, &mut Node)) {
         fn end<T: Serviced>(end: &mut Option<T>) -> Option<&mut dyn Serviced> {
             end.as_mut().map(|end| end as &mut dyn Serviced)
         }
@@ -130,7 +138,7 @@ impl Topics {
         let events = [end(&mut self.alerts), end(&mut self.cues), end(&mut self.stages), end(&mut self.path)];
         let others = [end(&mut self.status), end(&mut self.diagnostics), end(&mut self.clock)];
         for end in streams.into_iter().chain(events).chain(others).flatten() {
-            end.service(&self.matches, &mut self.node);
+            act(end, &self.matches, &mut self.node);
         }
     }
 
@@ -153,7 +161,7 @@ impl Topics {
         }
         if let Some(stream) = &mut self.markers {
             let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
-            stream.publish(discarded, stamp, |message| message.update(header, handles, stage, alert));
+            stream.publish(discarded, stamp, |message| message.update(header, handles, &stage.stage, alert));
         }
     }
 
@@ -162,7 +170,7 @@ impl Topics {
         self.latest_alert = Some(alert);
         if let Some(level) = alert.alert_level() {
             let figures = Figures::Shown { time_scale: self.time_scale };
-            let sentence = alert_sentence(&alert, self.stage.benches, figures);
+            let sentence = alert_sentence(&alert, &self.stage.stage, figures);
             self.rosout.tell(level.severity(), format!("{}: {sentence}", level.name()));
         }
         if let Some(port) = &mut self.alerts {
@@ -180,6 +188,11 @@ impl Topics {
         }
     }
 
+    /// Keeps the status of a chase for the diagnostics.
+    pub(super) fn chase(&mut self, status: ChaseStatus) {
+        self.latest_chase = Some(status);
+    }
+
     /// Sends the loop's status, and the diagnostics that follow from it.
     pub(super) fn status(&mut self, status: &LoopStatus) {
         let stamp = self.stamps.at(status.stamp_ns, status.sim_time);
@@ -191,6 +204,10 @@ impl Topics {
             let (discarded, limits) = (self.discarded, self.limits);
             let second = LoopSecond { before: &before, discarded, discarded_before, limits };
             let message = DiagnosticArray::of(&self.name, status, self.latest_alert.as_ref(), &second);
+            let message = match &self.latest_chase {
+                Some(chase) => message.with_chase(&self.name, status, chase),
+                None => message,
+            };
             port.send(Arc::new(message.at(stamp)), &mut self.discarded);
         }
     }
@@ -200,11 +217,20 @@ impl Topics {
         self.discarded
     }
 
-    /// Leaves the network after the time for reliable subscribers to get the last messages.
-    pub(super) fn finish(mut self) {
+    /// Ends the sending. Returns the topics if they have subscribers, which may still request the last messages.
+    pub(super) fn finish(mut self) -> Option<EndedTopics> {
         self.service();
-        std::thread::sleep(LINGER);
+        let mut is_read = false;
+        self.for_each_writer(|writer, matches, _| is_read |= writer.is_read(matches));
+        is_read.then(|| EndedTopics { _topics: self, until: Instant::now() + LINGER })
     }
+}
+
+/// The topics of a run that has ended. They leave the network when this value is dropped.
+pub(super) struct EndedTopics {
+    _topics: Topics,
+    /// The time until which subscribers may request the last messages.
+    pub until: Instant,
 }
 
 #[cfg(test)]
@@ -215,7 +241,9 @@ mod tests {
 
     use super::*;
     use crate::topic_writer::HEADER_BYTES;
-    use bench_dragon_messages::{SEGMENT_ARC, SceneName, StageSegment};
+    use bench_dragon_messages::{
+        List, SEGMENT_ARC, SceneName, Stage, StageCue, StageDragon, StageEvent, StageObstacle, StageSegment,
+    };
 
     fn bytes<Message: Serialize>(message: &Message) -> usize {
         CDRSerializerAdapter::<Message>::to_bytes(message).unwrap().len()
@@ -234,10 +262,22 @@ mod tests {
         };
         let limits = DiagnosticLimits { lateness_warn: 0.0, ..DiagnosticLimits::default() };
         let second = LoopSecond { before: &status, discarded: u64::MAX, discarded_before: 0, limits };
+        let name = SceneName::new(&"n".repeat(100));
+        let stage = Stage {
+            dragons: List::of([StageDragon { name, ..StageDragon::default() }; 100]),
+            obstacles: List::of([StageObstacle { name, ..StageObstacle::default() }; 100]),
+            events: List::of([StageEvent::default(); 1000]),
+            cue_list: List::of([StageCue { name, ..StageCue::default() }; 100]),
+            ..Stage::default()
+        };
+        let stage = StageMessage { stage, segments: Vec::new() };
         // iceoryx2 takes no longer name.
-        let diagnostics = DiagnosticArray::of(&"n".repeat(255), &worst, Some(&alert), &second);
+        let name = "n".repeat(255);
+        let diagnostics = DiagnosticArray::of(&name, &worst, Some(&alert), &second);
+        let diagnostics =
+            diagnostics.with_chase(&name, &worst, &ChaseStatus { frame_rate: 2, ..ChaseStatus::default() });
         let events = [
-            bytes(&Stamped::stage(Stage::default())),
+            bytes(&Stamped::stage(stage)),
             bytes(&Stamped::status(status)),
             bytes(&Stamped::alert(alert)),
             bytes(&diagnostics),
@@ -245,11 +285,12 @@ mod tests {
             bytes(&Clock::of(&FrameHeader::default())),
         ];
         assert!(events.iter().all(|bytes| *bytes < EVENT_BYTES), "{events:?} bytes of {EVENT_BYTES}");
-        let mut stage = Stage { segments: 1, ..Stage::default() };
-        stage.path[0] = StageSegment { length: 10.0, curvature: 10.0, kind: SEGMENT_ARC, ..StageSegment::default() };
-        let path = Path::of(&stage);
+        let arc = StageSegment { length: 10.0, curvature: 10.0, kind: SEGMENT_ARC, ..StageSegment::default() };
+        let name = SceneName::new(&"n".repeat(100));
+        let dragons = List::of([StageDragon { segments: 1, name, ..StageDragon::default() }]);
+        let path = Path::of(&StageMessage { stage: Stage { dragons, ..Stage::default() }, segments: vec![arc] });
         assert!(path.poses.len() > 1000 && bytes(&path) < EVENT_BYTES + path.poses.len() * PATH_POSE_BYTES);
-        let transforms = bytes(&TfMessage::of(&"n".repeat(255)));
+        let transforms = bytes(&TfMessage::of(&"n".repeat(255), &Stage { dragons, ..Stage::default() }));
         assert!(transforms < TRANSFORMS_BYTES, "{transforms}");
         assert!(bytes(&HandlePoses::of(224)) < HEADER_BYTES + 224 * size_of::<HandlePose>());
     }

@@ -2,12 +2,17 @@
 //!
 //! A Fast DDS client matches a service at once and sends its first request within a millisecond. RustDDS drops the
 //! request if its discovery thread has not matched the client's writer by then. RustDDS then sends an ACKNACK without
-//! requests, which Fast DDS answers after its heartbeat period of 3 s. RustDDS has no call for anything else. So this
-//! file sends one datagram for each match: a NACK_FRAG submessage (RTPS 2.5, section 9.4.5.14) that requests the first
-//! messages of the writer. A writer retransmits those that it has and ignores the rest, and the counter of NACK_FRAG
-//! is not that of the ACKNACKs of RustDDS. Called by the matches.
+//! requests, which Fast DDS answers after its heartbeat period of 3 s, and has no call for anything else. So this file
+//! sends datagrams after each match: a NACK_FRAG submessage (RTPS 2.5, section 9.4.5.14) for each of the first messages
+//! of the writer. Called by the matches.
+//!
+//! It stays while RustDDS has no such call: without it half of all first calls take 3 s, and a `hold` must not. It is
+//! harmless: a writer retransmits the messages that it has and that are not acknowledged, RustDDS drops one that comes
+//! twice, and the counter of NACK_FRAG is not that of the ACKNACKs of RustDDS. If it fails, the request comes after the
+//! heartbeat period of Fast DDS.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
 
 use rustdds::{DomainParticipant, GUID};
 
@@ -26,31 +31,63 @@ const INFO_DST: u8 = 0x0e;
 const NACK_FRAG: u8 = 0x12;
 const LITTLE_ENDIAN: u8 = 1;
 
-/// Requests the first messages of `writer` for the local `reader` if `writer` is that of a Fast DDS client.
-///
-/// If the datagram is lost, the request arrives after the heartbeat period of Fast DDS.
-pub(super) fn request_first(participant: &DomainParticipant, reader: GUID, writer: GUID) {
-    if !writer.to_bytes().starts_with(&FAST_DDS) {
-        return;
+/// The times after a match at which the messages are requested. The first one usually suffices; a datagram can be lost,
+/// and discovery can tell the writer's address late.
+const TIMES: [Duration; 4] =
+    [Duration::ZERO, Duration::from_millis(50), Duration::from_millis(250), Duration::from_millis(1000)];
+
+/// A request for the first messages of a Fast DDS writer.
+pub(super) struct FirstMessages {
+    reader: GUID,
+    writer: GUID,
+    matched: Instant,
+    /// The number of [`TIMES`] that are over.
+    rounds: usize,
+}
+
+impl FirstMessages {
+    /// Creates the request for the local `reader` if `writer` is one of Fast DDS.
+    pub(super) fn of(reader: GUID, writer: GUID) -> Option<Self> {
+        let is_fast_dds = writer.to_bytes().starts_with(&FAST_DDS);
+        is_fast_dds.then(|| Self { reader, writer, matched: Instant::now(), rounds: 0 })
     }
-    let writers = participant.discovered_writers();
-    let Some(data) = writers.into_iter().find(|data| data.writer_proxy.remote_writer_guid == writer) else { return };
-    if !data.publication_topic_data.topic_name.starts_with(REQUEST_PREFIX) {
-        return;
+
+    /// Returns the writer.
+    pub(super) fn writer(&self) -> GUID {
+        self.writer
     }
-    let datagram = datagram(reader.to_bytes(), writer.to_bytes());
-    let locators = data.writer_proxy.unicast_locator_list.into_iter().filter(|locator| locator.is_udp());
-    for address in locators.map(SocketAddr::from) {
-        let any = if address.is_ipv4() { IpAddr::from(Ipv4Addr::UNSPECIFIED) } else { Ipv6Addr::UNSPECIFIED.into() };
-        let sent = UdpSocket::bind((any, 0)).and_then(|socket| socket.send_to(&datagram, address));
-        if let Err(error) = sent {
-            log::debug!("ROS 2: no retransmission is requested from {address}: {error}");
+
+    /// Sends the request if it is due. Returns true if it must be sent again later.
+    pub(super) fn serve(&mut self, participant: &DomainParticipant) -> bool {
+        if self.matched.elapsed() >= TIMES[self.rounds] {
+            let mut writers = participant.discovered_writers().into_iter();
+            if let Some(data) = writers.find(|data| data.writer_proxy.remote_writer_guid == self.writer) {
+                if !data.publication_topic_data.topic_name.starts_with(REQUEST_PREFIX) {
+                    return false;
+                }
+                let locators = data.writer_proxy.unicast_locator_list.into_iter().filter(|locator| locator.is_udp());
+                self.send(locators.map(SocketAddr::from));
+            }
+            self.rounds += 1;
+        }
+        self.rounds < TIMES.len()
+    }
+
+    fn send(&self, addresses: impl Iterator<Item = SocketAddr>) {
+        let datagram = datagram(self.reader.to_bytes(), self.writer.to_bytes(), self.rounds as u32);
+        for address in addresses {
+            let any =
+                if address.is_ipv4() { IpAddr::from(Ipv4Addr::UNSPECIFIED) } else { Ipv6Addr::UNSPECIFIED.into() };
+            let sent = UdpSocket::bind((any, 0)).and_then(|socket| socket.send_to(&datagram, address));
+            if let Err(error) = sent {
+                log::debug!("ROS 2: no retransmission is requested from {address}: {error}");
+            }
         }
     }
 }
 
-/// Returns the message of `reader` to `writer`.
-fn datagram(reader: [u8; 16], writer: [u8; 16]) -> Vec<u8> {
+/// Returns the message of `reader` to `writer`. `round` counts the messages of this kind from 0.
+fn datagram(reader: [u8; 16], writer: [u8; 16], round: u32) -> Vec<u8> {
     let [(own_prefix, reader), (prefix, writer)] = [reader, writer].map(|guid| {
         let (prefix, entity) = guid.split_at(12);
         (prefix.to_vec(), entity.to_vec())
@@ -62,7 +99,7 @@ fn datagram(reader: [u8; 16], writer: [u8; 16]) -> Vec<u8> {
         bytes.extend([NACK_FRAG, LITTLE_ENDIAN, 32, 0]);
         bytes.extend([reader.as_slice(), &writer].concat());
         // The sequence number (high, low), the set of the first fragment alone (base, bits, bitmap), and the counter.
-        for word in [0, sequence, 1, 1, 1 << 31, sequence] {
+        for word in [0, sequence, 1, 1, 1 << 31, round * FIRST_MESSAGES + sequence] {
             bytes.extend(word.to_le_bytes());
         }
     }
@@ -85,8 +122,11 @@ mod tests {
             0x12, 1, 32, 0, 0, 0, 21, 4, 0, 0, 22, 3, 0, 0, 0, 0, 1, 0, 0, 0,
             1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 128, 1, 0, 0, 0,
         ];
-        let bytes = datagram(reader, writer);
+        let bytes = datagram(reader, writer, 0);
         assert_eq!(bytes[..expected.len()], expected);
         assert_eq!(bytes.len(), expected.len() + 3 * 36);
+        // A writer ignores a counter that does not grow. It is the last word of each submessage.
+        let counters = |round| datagram(reader, writer, round)[36..].chunks(36).map(|of| of[32]).collect::<Vec<u8>>();
+        assert_eq!([counters(0), counters(1)], [[1, 2, 3, 4], [5, 6, 7, 8]]);
     }
 }

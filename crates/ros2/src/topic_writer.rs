@@ -4,7 +4,9 @@
 //! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first; with
 //! Fast DDS also a volatile one, since RustDDS does not read the durability of a subscriber. So a message without
 //! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. A
-//! subscriber that joins others still gets all that RustDDS keeps, the latest last.
+//! subscriber that joins others still gets all that RustDDS keeps, the latest last. To end that, RustDDS would have to
+//! send a GAP to a new subscriber that is volatile; it does so only if the writer is volatile. A second, volatile writer
+//! is no remedy: a volatile subscriber matches both, and a transient-local one would report the second as incompatible.
 
 use std::sync::Arc;
 
@@ -109,6 +111,8 @@ pub(super) trait Serviced {
     /// Sends the held message to new subscribers, and drops the history after the last subscriber has left. Must be
     /// called often.
     fn service(&mut self, matches: &Matches, node: &mut Node);
+    /// Returns true if there is a subscriber.
+    fn is_read(&self, matches: &Matches) -> bool;
 }
 
 impl<Message: Serialize> Serviced for TopicWriter<Message> {
@@ -134,11 +138,19 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
         // A subscriber that matches this publisher later requests the message when it does.
         self.write(latest);
     }
+
+    fn is_read(&self, matches: &Matches) -> bool {
+        matches.readers(self.publisher.guid()).any()
+    }
 }
 
 impl<Message: Serialize> Serviced for Stream<Message> {
     fn service(&mut self, matches: &Matches, node: &mut Node) {
         self.port.service(matches, node);
+    }
+
+    fn is_read(&self, matches: &Matches) -> bool {
+        self.port.is_read(matches)
     }
 }
 

@@ -2,25 +2,31 @@
 //! that a new field cannot be lost.
 
 use crate::alerts::Alert;
+use crate::scene::Scene;
 use crate::{Frame, Outcome, ReachedCue, Show};
-use bench_dragon_messages::state::FrameState;
+use bench_dragon_messages::state::{EventKind, FrameState};
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::clearance::PairClearance;
+use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::event::Event;
+use bench_dragon_motion::ground::Obstacle;
+use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon_motion::model::shape::{Shape, ShapeKind};
 use bench_dragon_motion::model::spiral::Direction;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::TimedEvent;
 
 use bench_dragon_messages::{
-    CollisionAlert, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, MOST_CUES, MOST_EVENTS, MOST_SEGMENTS,
-    NO_BENCH, SCENE_HASH_BYTES, SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneName,
-    Stage, StageCue, StageEvent, StageSegment,
+    CollisionAlert, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32, List, MOST_OBSTACLES, NO_BENCH,
+    OBSTACLE_BOUNDARY, OBSTACLE_CIRCLE, OBSTACLE_LINE, OBSTACLE_POLYGON, SCENE_HASH_BYTES, SEGMENT_ARC,
+    SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, SceneName, Stage, StageCue, StageDragon, StageEvent,
+    StageMessage, StageObstacle, StageSegment,
 };
 
-/// A stage has room for a route of the most steps and the line on which its team stands.
-const _: () = assert!(crate::scene::path::MOST_STEPS < MOST_SEGMENTS);
+/// A stage has room for the most obstacles of a scene and its boundary.
+const _: () = assert!(crate::scene::stage::MOST_OBSTACLES < MOST_OBSTACLES);
 
 /// The header fields that the publisher sets: they do not follow from the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -212,77 +218,163 @@ pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
     ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
 }
 
-/// Returns the stage of a motion with the events and cues of its show. `scene_hash` is BLAKE3 of the scene's text, or
+/// The dragons on a stage.
+pub enum OnStage<'a> {
+    /// The only one of a show.
+    One(&'a Motion),
+    /// Several.
+    Several(&'a Ensemble),
+}
+
+impl<'a> From<&'a Motion> for OnStage<'a> {
+    fn from(motion: &'a Motion) -> Self {
+        Self::One(motion)
+    }
+}
+
+impl<'a> From<&'a Scene> for OnStage<'a> {
+    fn from(scene: &'a Scene) -> Self {
+        scene.ensemble.as_ref().map_or(Self::One(&scene.motion), Self::Several)
+    }
+}
+
+/// Returns the stage of a motion, or of a scene's dragons, with the events and cues of its show. `scene_hash` is BLAKE3 of the scene's text, or
 /// zeros without a text.
-pub fn stage(run_id: u64, stamp_ns: u64, scene_hash: [u8; SCENE_HASH_BYTES], motion: &Motion, show: &Show) -> Stage {
+pub fn stage<'a>(
+    run_id: u64,
+    stamp_ns: u64,
+    scene_hash: [u8; SCENE_HASH_BYTES],
+    of: impl Into<OnStage<'a>>,
+    show: &Show,
+) -> StageMessage {
+    let mut segments = Vec::new();
+    let of = of.into();
+    let (dragons, events, ground): (Vec<StageDragon>, _, _) = match of {
+        OnStage::One(motion) => {
+            (vec![stage_dragon(motion, ("", 0), &mut segments)], first_events(show), motion.ground())
+        }
+        OnStage::Several(ensemble) => {
+            let of = |(k, dragon): (usize, &Dragon)| {
+                let first = ensemble.handles_of(k).start as u32;
+                stage_dragon(&dragon.motion, (&dragon.name, first), &mut segments)
+            };
+            (ensemble.dragons().iter().enumerate().map(of).collect(), show.timeline().all(), ensemble.ground())
+        }
+    };
+    let obstacles = ground.obstacles().iter().map(|obstacle| stage_obstacle(obstacle, &mut segments));
+    let stage = Stage {
+        run_id,
+        stamp_ns,
+        freeze_time: show.freeze_time(),
+        cues: show.cues().len() as u32,
+        reserved: 0,
+        scene_hash,
+        dragons: List::of(dragons),
+        obstacles: List::of(obstacles),
+        events: List::of(events.iter().map(stage_event)),
+        cue_list: List::of(show.cues().iter().map(stage_cue)),
+    };
+    StageMessage { stage, segments }
+}
+
+/// Returns a dragon with its name and the number of its first handle, and appends the segments of its path.
+fn stage_dragon(motion: &Motion, (name, first_handle): (&str, u32), segments: &mut Vec<StageSegment>) -> StageDragon {
     let Team { benches, head_length, body_length, width, hole_inset } = *motion.team();
-    let mut path = [StageSegment::default(); MOST_SEGMENTS];
-    let (mut segments, mut pitch, mut start_turn) = (0, f64::NAN, f64::NAN);
-    for (slot, outline) in path.iter_mut().zip(motion.outline()) {
-        *slot = stage_segment(&outline);
+    let (mut pitch, mut start_turn) = (f64::NAN, f64::NAN);
+    let first_segment = segments.len() as u32;
+    for outline in motion.outline() {
         if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } = outline.kind {
             (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
         }
-        segments += 1;
+        segments.push(stage_segment(&outline));
     }
-    let mut timeline = [StageEvent::default(); MOST_EVENTS];
-    // Of several obstacles the first event only.
-    let all = show.timeline().events();
-    let is_first =
-        |timed: &&TimedEvent| show.timeline().find(timed.event.kind).is_some_and(|first| std::ptr::eq(first, *timed));
-    let events: Vec<&TimedEvent> = all.iter().filter(is_first).collect();
-    for (slot, timed) in timeline.iter_mut().zip(&events) {
-        let TimedEvent { time, event: Event { kind, travelled: _, bench_a: _, bench_b: _, place: _ } } = **timed;
-        *slot = StageEvent { time, state: FrameState::from(kind) as u32, reserved: 0 };
-    }
-    let mut cue_list = [StageCue::default(); MOST_CUES];
-    for (slot, cue) in cue_list.iter_mut().zip(show.cues()) {
-        *slot = stage_cue(cue);
-    }
-    Stage {
-        run_id,
-        stamp_ns,
-        pitch,
-        start_turn,
-        hole_inset,
+    StageDragon {
         head_length,
         body_length,
         width,
-        freeze_time: show.freeze_time(),
+        hole_inset,
+        pitch,
+        start_turn,
+        first_handle,
         benches: benches as u32,
-        segments,
-        events: events.len().min(MOST_EVENTS) as u32,
-        cues: show.cues().len() as u32,
-        scene_hash,
-        path,
-        timeline,
-        cue_list,
+        first_segment,
+        segments: segments.len() as u32 - first_segment,
+        name: SceneName::new(name),
     }
+}
+
+/// Returns an obstacle, and appends the segments of its outline.
+fn stage_obstacle(obstacle: &Obstacle, segments: &mut Vec<StageSegment>) -> StageObstacle {
+    let Obstacle { name, shape, keep_out } = obstacle;
+    let kind = match shape.kind() {
+        ShapeKind::Circle => OBSTACLE_CIRCLE,
+        ShapeKind::Polygon => OBSTACLE_POLYGON,
+        ShapeKind::Line => OBSTACLE_LINE,
+        ShapeKind::Boundary => OBSTACLE_BOUNDARY,
+    };
+    let first_segment = segments.len() as u32;
+    match shape.kind() {
+        ShapeKind::Circle => segments.push(circle(shape)),
+        _ => segments.extend(shape.sides().map(|(from, to)| side(from, to))),
+    }
+    let count = segments.len() as u32 - first_segment;
+    StageObstacle { keep_out: *keep_out, kind, first_segment, segments: count, reserved: 0, name: SceneName::new(name) }
+}
+
+/// Returns the outline of a circle: an arc of a full turn, to the left, from its rightmost point.
+fn circle(shape: &Shape) -> StageSegment {
+    let (centre, radius) = (shape.points()[0], shape.radius());
+    let (start, heading) = (Point::new(centre.x + radius, centre.y), std::f64::consts::FRAC_PI_2);
+    let kind = OutlineKind::Arc { curvature: 1.0 / radius };
+    stage_segment(&SegmentOutline { kind, start, heading, length: std::f64::consts::TAU * radius })
+}
+
+/// Returns a side of a shape.
+fn side(from: Point, to: Point) -> StageSegment {
+    let along = to - from;
+    let (heading, length) = (along.y.atan2(along.x), along.norm());
+    stage_segment(&SegmentOutline { kind: OutlineKind::Line, start: from, heading, length })
+}
+
+/// Returns the first event of each kind, and the first of each obstacle.
+fn first_events(show: &Show) -> Vec<TimedEvent> {
+    let all = show.timeline().events();
+    let same = |one: &Event, other: &Event| {
+        one.kind == other.kind && (one.kind != EventKind::Obstacle || one.bench_b == other.bench_b)
+    };
+    let is_first = |at: usize| !all[..at].iter().any(|before| same(&before.event, &all[at].event));
+    (0..all.len()).filter(|at| is_first(*at)).map(|at| all[at]).collect()
+}
+
+fn stage_event(timed: &TimedEvent) -> StageEvent {
+    let TimedEvent { time, event: Event { kind, travelled: _, bench_a, bench_b, place: _ } } = *timed;
+    let [bench_a, bench_b] = [bench_a, bench_b].map(|bench| bench.unwrap_or(NO_BENCH));
+    StageEvent { time, state: FrameState::from(kind) as u32, bench_a, bench_b, reserved: 0 }
 }
 
 /// Returns the stage segment of a path segment.
 pub fn stage_segment(outline: &SegmentOutline) -> StageSegment {
     let SegmentOutline { kind, start, heading, length } = *outline;
-    let (kind, curvature, theta_first, theta_last) = match kind {
-        OutlineKind::Line => (SEGMENT_LINE, 0.0, f64::NAN, f64::NAN),
-        OutlineKind::Arc { curvature } => (SEGMENT_ARC, curvature, f64::NAN, f64::NAN),
-        OutlineKind::Spiral { direction, pitch: _, first, last, curvature } => {
+    let (kind, curvature, theta_first, theta_last, pitch) = match kind {
+        OutlineKind::Line => (SEGMENT_LINE, 0.0, f64::NAN, f64::NAN, f64::NAN),
+        OutlineKind::Arc { curvature } => (SEGMENT_ARC, curvature, f64::NAN, f64::NAN, f64::NAN),
+        OutlineKind::Spiral { direction, pitch, first, last, curvature } => {
             let kind = match direction {
                 Direction::Inward => SEGMENT_INWARD_SPIRAL,
                 Direction::Outward => SEGMENT_OUTWARD_SPIRAL,
             };
-            (kind, curvature, first, last)
+            (kind, curvature, first, last, pitch)
         }
     };
-    StageSegment { x: start.x, y: start.y, heading, length, curvature, theta_first, theta_last, kind, reserved: 0 }
+    let (x, y) = (start.x, start.y);
+    StageSegment { x, y, heading, length, curvature, theta_first, theta_last, pitch, kind, reserved: 0 }
 }
 
 #[cfg(test)]
 mod tests {
-    use bench_dragon_messages::state::{EventKind, Level};
+    use bench_dragon_messages::state::Level;
 
     use super::*;
-    use bench_dragon_motion::model::Point;
 
     const NEAREST: PairClearance = PairClearance {
         value: 0.25,

@@ -8,6 +8,7 @@ pub mod clock;
 pub mod convert;
 mod playback;
 pub mod scene;
+mod several;
 #[cfg(test)]
 mod tests;
 
@@ -23,6 +24,8 @@ use bench_dragon_motion::placement::Placement;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 use bench_dragon_motion::{Choice, Method};
+
+use several::{Closest, Several};
 
 use alerts::{Alert, LevelTracker};
 use bench_dragon_messages::control::{COMMANDS_PER_FRAME, Code, Command, CommandRecord};
@@ -144,6 +147,8 @@ pub struct Show {
     /// The nearest two boards of the solution, or a board that is nearer to an obstacle.
     closest: Option<PairClearance>,
     placement: Placement,
+    /// The dragons of a scene with several, in place of `solver`, `clearance`, `obstacles` and `placement`.
+    several: Option<Box<Several>>,
     /// The cues in the order of their times.
     cues: Vec<ReachedCue>,
     missing_cues: Vec<String>,
@@ -172,17 +177,23 @@ impl Show {
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         let freeze_time = timeline.freeze(stops).time;
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
+        let several = scene.ensemble.as_ref().map(|ensemble| Box::new(Several::new(scene, ensemble)));
         // The clearance has more digits in the path's own coordinates.
         let own = scene.motion.in_own_frame();
         let choice = own.solver(scene.velocities);
         let clearance = scene.alerts.map(|_| own.clearance_monitor(&choice));
         let obstacles = scene.alerts.and_then(|_| own.obstacle_monitor(&choice));
-        let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + choice.clearance_error(scene.team());
+        let error = choice.clearance_error(scene.team());
+        let error = several.as_ref().map_or(error, |several| several.clearance_error.max(error));
+        let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + error;
         let Choice { solver, reason, .. } = choice;
+        let reason = several.as_ref().map_or(reason, |several| several.reason.clone());
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
         let (cues, missing_cues) = timed_cues(scene, &timeline);
         let cue_times = cues.iter().map(|cue| CueTime { time: cue.time, pauses: cue.pauses }).collect();
-        let frame = Frame { cues: Vec::with_capacity(2 * cues.len()), ..Frame::new(scene.team().handles()) };
+        let mut frame = Frame { cues: Vec::with_capacity(2 * cues.len()), ..Frame::new(scene.handles()) };
+        // Each event announces at most one alert.
+        frame.alerts.reserve(timeline.events().len() + 1);
         Ok(Self {
             clock: ShowClock::new(&playback, freeze_time, cue_times),
             solver,
@@ -198,6 +209,7 @@ impl Show {
             nearest_boards: None,
             closest: None,
             placement: *scene.motion.placement(),
+            several,
             cues,
             missing_cues,
             commands: Vec::with_capacity(COMMANDS_PER_FRAME),
@@ -233,7 +245,10 @@ impl Show {
 
     /// Returns the number of pairs of boards tested so far: 0 for a scene without alerts.
     pub fn pairs_tested(&self) -> u64 {
-        self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
+        match &self.several {
+            Some(several) => several.pairs_tested(),
+            None => self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs),
+        }
     }
 
     /// Executes a command at the beginning of the period `tick`, before its frame. Returns `None` for a step:
@@ -311,6 +326,16 @@ impl Show {
             return;
         }
         self.solved = Some((sim_time, moves));
+        if let Some(several) = &mut self.several {
+            match several.solve(sim_time, moves, &mut self.frame.chain) {
+                Ok(Closest { boards, any }) => {
+                    (self.nearest_boards, self.closest) = (boards, any);
+                    self.frame.min_clearance = any.map_or(f64::NAN, |least| least.value);
+                }
+                Err(_) => self.frame.unsolved_frames += 1,
+            }
+            return;
+        }
         match solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain) {
             Ok(solved_at) => {
                 self.measure_clearance(solved_at);
@@ -327,11 +352,7 @@ impl Show {
     fn measure_clearance(&mut self, solved_at: f64) {
         let travelled = self.metres_per_second * solved_at;
         let Some(clearance) = &mut self.clearance else { return };
-        let placed = |pair: PairClearance| PairClearance {
-            point_a: self.placement.point(pair.point_a),
-            point_b: self.placement.point(pair.point_b),
-            ..pair
-        };
+        let placed = |pair: PairClearance| placed(&self.placement, pair);
         let boards = clearance.least_clearance(&self.frame.chain, travelled);
         self.nearest_boards = boards.map(placed);
         self.closest = self.nearest_boards;
@@ -382,6 +403,11 @@ impl Show {
             frame.state = level.current().into();
         }
     }
+}
+
+/// Returns a pair on the stage of a pair in a path's own coordinates.
+fn placed(placement: &Placement, pair: PairClearance) -> PairClearance {
+    PairClearance { point_a: placement.point(pair.point_a), point_b: placement.point(pair.point_b), ..pair }
 }
 
 /// Returns the cues of a scene in the order of their times, and the names of the cues without a time.

@@ -5,10 +5,11 @@
 
 pub mod accepted;
 pub mod cue;
+mod dragons;
 pub mod path;
 pub mod precision;
 pub mod ros2;
-mod stage;
+pub(crate) mod stage;
 mod text;
 
 use std::path::Path as FilePath;
@@ -18,18 +19,25 @@ use toml::Spanned;
 
 pub use self::accepted::Accepted;
 use self::cue::{Cue, RawCue};
+pub use self::dragons::{MOST_DRAGON_NAME, MOST_DRAGONS};
+use self::dragons::{Probe, RawSeveral};
 use self::path::RawPath;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::RawRos2;
 use self::stage::RawStage;
 pub use self::text::{SceneText, printable};
+use bench_dragon_messages::Roster;
+use bench_dragon_motion::ensemble::{Dragon, Ensemble};
+use bench_dragon_motion::event::Event;
+use bench_dragon_motion::ground::{Ground, Obstacle};
 use bench_dragon_motion::model::Vector;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::placement::Placement;
-use bench_dragon_motion::solve::Velocities;
 use bench_dragon_motion::solve::paper::PaperRules;
+use bench_dragon_motion::solve::{Solver, Velocities};
+use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_motion::{Method, Motion, MotionError};
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
@@ -106,8 +114,11 @@ pub struct AlertRules {
 pub struct Scene {
     /// The scene's name; by default the stem of its file.
     pub name: String,
-    /// The team on its path, with the accuracy.
+    /// The team on its path, with the accuracy. With several dragons that of the first alone: only code that looks at
+    /// `ensemble` first may use it.
     pub motion: Motion,
+    /// The dragons of a scene with `[[dragons]]`; `None` for a scene with `[team]`.
+    pub ensemble: Option<Ensemble>,
     /// Where the path's coordinates stand on the stage, if the scene states it. The motion's own placement contains it.
     pub placement: Option<Placement>,
     /// The reaction to a contact.
@@ -149,22 +160,101 @@ impl Scene {
         SceneText::load(file)?.parse()
     }
 
-    /// Reads a scene from TOML text. `file` is the file's name in errors, `stem` the scene's name if the text gives
-    /// none.
+    /// Reads a scene of one dragon from TOML text. `file` is the file's name in errors, `stem` the scene's name if the
+    /// text gives none.
+    ///
+    /// # Errors
+    /// One sentence that names the file, the line, the field and the expected value. A scene of several dragons is
+    /// refused.
+    pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
+        let source = Source { text, file, dragon: None };
+        match several(text) {
+            Some(dragons) => Err(source.field_error(
+                &dragons,
+                "the scene has several dragons, which this command does not take, expected one dragon in [team] and \
+                 [path]",
+            )),
+            None => source.read::<RawScene>()?.validated(&source, stem),
+        }
+    }
+
+    /// Reads a scene of one dragon or of several, as [`Scene::parse`].
     ///
     /// # Errors
     /// One sentence that names the file, the line, the field and the expected value.
-    pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
-        let source = Source { text, file };
-        let deserializer = toml::Deserializer::parse(text).map_err(|error| source.toml_error(&error, ""))?;
-        let raw: RawScene = serde_path_to_error::deserialize(deserializer)
-            .map_err(|error| source.toml_error(error.inner(), &error.path().to_string()))?;
-        raw.validated(&source, stem)
+    pub fn parse_any(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
+        let source = Source { text, file, dragon: None };
+        match several(text) {
+            Some(_) => source.read::<RawSeveral>()?.validated(&source, stem),
+            None => source.read::<RawScene>()?.validated(&source, stem),
+        }
     }
 
-    /// Returns the team.
+    /// Returns the team of a scene of one dragon.
     pub fn team(&self) -> &Team {
         self.motion.team()
+    }
+
+    /// Returns the number of benches of all dragons.
+    pub fn benches(&self) -> usize {
+        self.ensemble.as_ref().map_or(self.motion.team().benches, Ensemble::benches)
+    }
+
+    /// Returns the number of handles of a frame: those of all dragons.
+    pub fn handles(&self) -> usize {
+        self.ensemble.as_ref().map_or(self.motion.team().handles(), Ensemble::handles)
+    }
+
+    /// Returns the obstacles, in stage coordinates.
+    pub fn ground(&self) -> &Ground {
+        self.ensemble.as_ref().map_or(self.motion.ground(), Ensemble::ground)
+    }
+
+    /// Returns the obstacle that an event reaches; `None` for other kinds.
+    pub fn obstacle_of(&self, event: &Event) -> Option<&Obstacle> {
+        self.ensemble.as_ref().map_or_else(|| self.motion.obstacle_of(event), |all| all.obstacle_of(event))
+    }
+
+    /// Returns the names of the benches and obstacles, for people.
+    pub fn roster(&self) -> Roster {
+        let obstacles = self.ground().obstacles().iter().map(|obstacle| obstacle.name.clone()).collect();
+        let dragons = match &self.ensemble {
+            Some(ensemble) => {
+                let of = |dragon: &Dragon| (dragon.name.clone(), dragon.motion.team().benches as u32);
+                ensemble.dragons().iter().map(of).collect()
+            }
+            None => vec![(String::new(), self.team().benches as u32)],
+        };
+        Roster::new(dragons, obstacles)
+    }
+
+    /// Returns a bench's name for people, counted from 1 within its dragon.
+    pub fn bench_name(&self, bench: u32) -> String {
+        self.roster().bench(bench)
+    }
+
+    /// Returns all events of the scene, as [`Motion::timeline`].
+    pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
+        match &self.ensemble {
+            Some(ensemble) => ensemble.timeline(progress),
+            None => self.motion.timeline(progress),
+        }
+    }
+
+    /// Returns the events of the scene without those that cost a search.
+    pub fn timeline_without_contact(&self) -> Timeline {
+        match &self.ensemble {
+            Some(ensemble) => ensemble.timeline_without_contact(),
+            None => self.motion.timeline_without_contact(),
+        }
+    }
+
+    /// Returns the scene's solver; its chains are placed on the stage and hold all dragons.
+    pub fn solver(&self) -> Box<dyn Solver> {
+        match &self.ensemble {
+            Some(ensemble) => Box::new(ensemble.solver(self.velocities)),
+            None => self.motion.solver(self.velocities).solver,
+        }
     }
 
     /// Returns true if a show of this scene stops at a contact. Without alerts no contact is computed.
@@ -173,13 +263,29 @@ impl Scene {
     }
 }
 
+/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is no TOML has none: its
+/// errors are those of a scene of one.
+fn several(text: &str) -> Option<Spanned<serde::de::IgnoredAny>> {
+    // Most scenes have one, and are read once.
+    text.contains("dragons").then(|| toml::from_str::<Probe>(text).ok()?.dragons).flatten()
+}
+
 /// The text being read, for line numbers.
+#[derive(Clone, Copy)]
 struct Source<'a> {
     text: &'a str,
     file: &'a str,
+    /// The dragon whose tables are checked, if there are several.
+    dragon: Option<&'a str>,
 }
 
 impl Source<'_> {
+    fn read<T: for<'de> Deserialize<'de>>(&self) -> Result<T, SceneError> {
+        let deserializer = toml::Deserializer::parse(self.text).map_err(|error| self.toml_error(&error, ""))?;
+        serde_path_to_error::deserialize(deserializer)
+            .map_err(|error| self.toml_error(error.inner(), &error.path().to_string()))
+    }
+
     fn line(&self, offset: usize) -> usize {
         self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
     }
@@ -201,7 +307,8 @@ impl Source<'_> {
     }
 
     fn field_error_at(&self, offset: usize, sentence: &str) -> SceneError {
-        SceneError(format!("{}, line {}: {sentence}", self.file, self.line(offset)))
+        let whose = self.dragon.map_or(String::new(), |dragon| format!("dragon \"{dragon}\": "));
+        SceneError(format!("{}, line {}: {whose}{sentence}", self.file, self.line(offset)))
     }
 
     /// Returns a name without control characters, since it is printed unchanged.
@@ -282,6 +389,24 @@ struct RawMotion {
     end_hold: Option<Spanned<f64>>,
 }
 
+/// The fields of `[motion]` that a show has once, also with several dragons.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawEnds {
+    on_contact: Option<OnContact>,
+    at_end: Option<AtEnd>,
+    end_hold: Option<Spanned<f64>>,
+}
+
+/// The tables that a scene has once, also with several dragons.
+struct SharedTables {
+    name: Option<Spanned<String>>,
+    alerts: Option<RawAlerts>,
+    cues: Vec<RawCue>,
+    publish: RawPublish,
+    ends: RawEnds,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawPaper {
@@ -312,31 +437,55 @@ struct RawPublish {
 
 impl RawScene {
     fn validated(self, source: &Source, stem: &str) -> Result<Scene, SceneError> {
-        let team = self.team.validated(source)?;
-        let description = self.path.validated(source, &team)?;
-        let head_speed = source.check("motion.head_speed", &self.motion.head_speed, Accepted::SPEED)?;
-        let method = self.motion.method(source)?;
-        if let (Method::Paper(rules), PathDescription::Spiral { pitch, start_turn }) = (method, &description)
-            && path::is_folded_after(*pitch, *start_turn, head_speed * rules.time_step, &team)
-        {
-            return Err(self.motion.first_step_error(source, rules.time_step));
-        }
-        let motion = Motion::new(description, team, head_speed, method).map_err(|error| {
-            match (&error, &self.motion.solver) {
-                (MotionError::PaperElsewhere, Some(given)) => source.field_error(
-                    given,
-                    "motion.solver is \"paper\", which follows spirals only, expected another solver or no such field",
-                ),
-                _ => self.path.error(source, &error.to_string()),
-            }
-        })?;
-        let placement = self.placement.as_ref().map(|placement| placement.validated(source)).transpose()?;
-        let start = self.path.start(source)?;
-        let motion = motion.placed(placement.unwrap_or(Placement::IDENTITY).after_moving_by(start));
-        let motion = match &self.stage {
-            Some(stage) => motion.on_ground(stage.validated(source)?),
-            None => motion,
+        let Self { name, team, path, placement, stage, motion, alerts, cues, publish } = self;
+        let (checked, placement) = motion_of(source, &team, &path, &motion, placement.as_ref())?;
+        let checked = match &stage {
+            Some(stage) => checked.on_ground(stage.validated(source)?),
+            None => checked,
         };
+        SharedTables { name, alerts, cues, publish, ends: motion.ends() }.validated(source, stem, checked, placement)
+    }
+}
+
+/// Checks the tables of a dragon. Returns its motion, and the placement that the scene states.
+fn motion_of(
+    source: &Source,
+    team: &RawTeam,
+    path: &RawPath,
+    motion: &RawMotion,
+    placement: Option<&RawPlacement>,
+) -> Result<(Motion, Option<Placement>), SceneError> {
+    let team = team.validated(source)?;
+    let description = path.validated(source, &team)?;
+    let head_speed = source.check("motion.head_speed", &motion.head_speed, Accepted::SPEED)?;
+    let method = motion.method(source)?;
+    if let (Method::Paper(rules), PathDescription::Spiral { pitch, start_turn }) = (method, &description)
+        && path::is_folded_after(*pitch, *start_turn, head_speed * rules.time_step, &team)
+    {
+        return Err(motion.first_step_error(source, rules.time_step));
+    }
+    let checked =
+        Motion::new(description, team, head_speed, method).map_err(|error| match (&error, &motion.solver) {
+            (MotionError::PaperElsewhere, Some(given)) => source.field_error(
+                given,
+                "motion.solver is \"paper\", which follows spirals only, expected another solver or no such field",
+            ),
+            _ => path.error(source, &error.to_string()),
+        })?;
+    let placement = placement.map(|placement| placement.validated(source)).transpose()?;
+    let start = path.start(source)?;
+    Ok((checked.placed(placement.unwrap_or(Placement::IDENTITY).after_moving_by(start)), placement))
+}
+
+impl SharedTables {
+    /// Checks the tables. Returns the scene of a motion.
+    fn validated(
+        &self,
+        source: &Source,
+        stem: &str,
+        motion: Motion,
+        placement: Option<Placement>,
+    ) -> Result<Scene, SceneError> {
         let name = match &self.name {
             None => stem.to_owned(),
             Some(name) if name.get_ref().trim().is_empty() => {
@@ -352,15 +501,15 @@ impl RawScene {
             source.check_count("publish.subscribers", subscribers, Accepted::SUBSCRIBERS)
         })?;
         let velocities = self.publish.velocities.unwrap_or(true);
+        let RawEnds { on_contact, at_end, end_hold } = &self.ends;
         Ok(Scene {
             name,
             motion,
+            ensemble: None,
             placement,
-            on_contact: self.motion.on_contact.unwrap_or(OnContact::Stop),
-            at_end: self.motion.at_end.unwrap_or(AtEnd::Hold),
-            end_hold: self
-                .motion
-                .end_hold
+            on_contact: on_contact.unwrap_or(OnContact::Stop),
+            at_end: at_end.unwrap_or(AtEnd::Hold),
+            end_hold: end_hold
                 .as_ref()
                 .map_or(Ok(DEFAULT_END_HOLD), |seconds| source.check("motion.end_hold", seconds, Accepted::END_HOLD))?,
             cues: self.cues.iter().map(|cue| cue.validated(source, self.alerts.is_some())).collect::<Result<_, _>>()?,
@@ -412,7 +561,24 @@ impl RawPlacement {
     }
 }
 
+impl RawEnds {
+    /// Returns the name of the first field that is given.
+    fn first_given(&self) -> Option<&'static str> {
+        let fields = [
+            ("on_contact", self.on_contact.is_some()),
+            ("at_end", self.at_end.is_some()),
+            ("end_hold", self.end_hold.is_some()),
+        ];
+        fields.into_iter().find_map(|(field, given)| given.then_some(field))
+    }
+}
+
 impl RawMotion {
+    /// Returns the fields that a show has once.
+    fn ends(&self) -> RawEnds {
+        RawEnds { on_contact: self.on_contact, at_end: self.at_end, end_hold: self.end_hold.clone() }
+    }
+
     /// Returns the error of a first step that is too long. The paper's rules are one step ahead of the time: the first
     /// frame is at the end of the first step.
     fn first_step_error(&self, source: &Source, time_step: f64) -> SceneError {

@@ -81,7 +81,7 @@ impl Observer {
     pub fn handle(&mut self, event: &FeedEvent<'_>, received_ns: u64) {
         match *event {
             FeedEvent::Started { .. } => self.seen.runs += 1,
-            FeedEvent::Stage(stage) => self.stage(stage),
+            FeedEvent::Stage { stage, .. } => self.stage(stage),
             FeedEvent::Frame { header, handles, missed } => {
                 self.seen.missed += missed;
                 self.frame(header, handles, received_ns);
@@ -96,7 +96,8 @@ impl Observer {
 
     /// Takes the length of the links from the stage.
     fn stage(&mut self, stage: &Stage) {
-        self.links = Some([stage.head_length, stage.body_length].map(|length| length - 2.0 * stage.hole_inset));
+        let dragon = stage.first_dragon();
+        self.links = Some([dragon.head_length, dragon.body_length].map(|length| length - 2.0 * dragon.hole_inset));
     }
 
     /// Stores a status, whose rate determines the phase.
@@ -201,6 +202,7 @@ impl Observer {
 mod tests {
     use super::*;
     use bench_dragon_client::feed::sequence::SequenceTracker;
+    use bench_dragon_messages::{List, StageDragon};
 
     const PERIOD_NS: u64 = 1_000_000;
 
@@ -232,8 +234,9 @@ mod tests {
     impl Received {
         fn new() -> Self {
             let mut received = Self::default();
-            let stage = Stage { head_length: 3.5, body_length: 1.5, hole_inset: 0.25, ..Stage::default() };
-            received.observer.handle(&FeedEvent::Stage(&stage), 0);
+            let dragon = StageDragon { head_length: 3.5, body_length: 1.5, hole_inset: 0.25, ..StageDragon::default() };
+            let stage = Stage { dragons: List::of([dragon]), ..Stage::default() };
+            received.observer.handle(&FeedEvent::Stage { stage: &stage, segments: &[] }, 0);
             received
         }
 

@@ -96,11 +96,14 @@ pub fn reason(shown: &str, refused: &Refused) -> String {
 
 /// Returns a sentence on what is proved of an event.
 fn sentence(outcome: &ProvedEvent) -> String {
-    let event = match outcome.event {
-        EventKind::Contact => "contact",
-        EventKind::Stall => "stall",
-        EventKind::Lock => "lock",
-        EventKind::PathEnd => "path end",
+    let event = match (outcome.event, outcome.obstacle) {
+        (EventKind::Contact, _) => "contact".to_owned(),
+        (EventKind::Stall, _) => "stall".to_owned(),
+        (EventKind::Lock, _) => "lock".to_owned(),
+        (EventKind::PathEnd, _) => "path end".to_owned(),
+        (EventKind::Obstacle, number) => {
+            format!("touch of obstacle {} (counting from 1, the boundary last)", number.unwrap_or(0) + 1)
+        }
     };
     let seconds = |time: Option<f64>| time.map_or("?".to_owned(), |time| format!("{time} s"));
     let (lo, hi) = (seconds(outcome.time_lo), seconds(outcome.time_hi));

@@ -32,13 +32,13 @@ pub(super) fn verify(common: &Common, file: &Path) -> Result<(), CommandError> {
         )));
     };
     let name = contents.scene.clone().unwrap_or_else(|| "scene".to_owned());
-    let scene = Scene::parse(&text, &format!("{shown}, scene.toml"), &name)?;
+    let scene = Scene::parse_any(&text, &format!("{shown}, scene.toml"), &name)?;
     let hash = scene_hash(&text);
-    if hash != contents.stage.scene_hash {
+    if hash != contents.stage.stage.scene_hash {
         return Err(CommandError::Failed(format!(
             "{shown}: its scene has BLAKE3 {} and its stage names {}: the scene is not that of the show",
             hexadecimal(&hash),
-            hexadecimal(&contents.stage.scene_hash)
+            hexadecimal(&contents.stage.stage.scene_hash)
         )));
     }
     let bar = progress_bar(recording.chunks() as u64, common).with_message("computing again");

@@ -99,7 +99,7 @@ impl Keyboard {
             FeedEvent::Frame { header, .. } if header.time_scale > 0.0 && self.unanswered == 0 => {
                 self.rate = Some(header.time_scale);
             }
-            FeedEvent::Stage(stage) => self.end = stage.freeze_time,
+            FeedEvent::Stage { stage, .. } => self.end = stage.freeze_time,
             FeedEvent::Gone => (self.rate, self.end) = (None, f64::INFINITY),
             _ => (),
         }

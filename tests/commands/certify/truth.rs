@@ -44,6 +44,7 @@ pub fn is_true(outcome: &ProvedEvent, timeline: &Timeline) -> bool {
         EventKind::Stall => Kind::Stall,
         EventKind::Lock => Kind::Lock,
         EventKind::PathEnd => Kind::PathEnd,
+        EventKind::Obstacle => Kind::Obstacle,
     };
     let found = timeline.events().iter().find(|event| event.event.kind == kind).map(|event| event.time);
     match (outcome.status, found, outcome.time_lo, outcome.time_hi) {

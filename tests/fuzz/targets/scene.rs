@@ -133,7 +133,9 @@ fn play(scene: &Scene) {
     // A show that begins where it ends is refused.
     let Ok(mut show) = Show::new(scene, timeline, Playback { time_scale, ..playback }) else { return };
     let stage = stage(1, 0, [0; 32], &scene.motion, &show);
-    let sizes = [stage.hole_inset, stage.head_length, stage.body_length, stage.width, stage.freeze_time];
+    let stage = stage.stage;
+    let dragon = stage.first_dragon();
+    let sizes = [dragon.hole_inset, dragon.head_length, dragon.body_length, dragon.width, stage.freeze_time];
     assert!(sizes.iter().all(|number| number.is_finite()), "{stage:?}");
     let mut last = 0.0;
     for tick in 0..FRAMES {
@@ -144,7 +146,7 @@ fn play(scene: &Scene) {
         let header = frame_header(frame, Stamps { run_id: 1, sequence: tick, stamp_ns: 0, deadline_ns: 0 });
         let figures = Figures::Shown { time_scale: frame.time_scale };
         for alert in &frame.alerts {
-            let sentence = alert_sentence(&collision_alert(&header, alert), stage.benches, figures);
+            let sentence = alert_sentence(&collision_alert(&header, alert), &stage, figures);
             assert!(!sentence.contains("NaN") && !sentence.contains("inf"), "{sentence}");
         }
     }

@@ -1,37 +1,57 @@
-//! `examples/python/bench_dragon_messages.py`: generated down to a line, written by hand below it.
+//! `packaging/python/bench_dragon/layouts.py`: the layouts as classes of ctypes, with type hints.
 
 use crate::msgs::render::{ENUMS, NOTICE, Target, comment, targets, wrapped};
 use crate::msgs::source::{Docs, Enumeration, Kind, Layout, Source, links, without_links};
 
-/// First line of the part that is written by hand.
-pub const BY_HAND: &str = "# From here on written by hand.\n";
-
 const HEAD: &str = r#""""The memory layouts of bench-dragon's messages, once, for every Python subscriber.
 
 Each class is what iceoryx2 compares with the publisher's type: its name ends in the layout's version, so that a
-publisher with another layout is refused. `HANDLE_POSE` and `HANDLE_POSE_32` are the numpy views
-of a frame's handles.
+publisher with another layout is refused.
 """
 
-import ctypes
+from __future__ import annotations
 
-import numpy as np
+import ctypes
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 "#;
 
 const BASE: &str = r#"
 
-class _Message(ctypes.Structure):
-    LAYOUT = 1
+class Message(ctypes.Structure):
+    """A message in memory, or a part of one."""
+
+    # The version of the layout.
+    LAYOUT: ClassVar[int]
 
     @classmethod
     def type_name(cls) -> str:
+        """Returns the name that iceoryx2 compares with the publisher's."""
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+
+
+def _list(element: type[Message], most: int) -> type[ctypes.Structure]:
+    """Returns the type of a list with room for `most` elements. `len()`, an index and `for` see those in use."""
+
+    class List(ctypes.Structure):
+        ELEMENT = element
+        length: int
+        items: ctypes.Array[Any]
+        _fields_ = [("length", ctypes.c_uint32), ("reserved", ctypes.c_uint32), ("items", element * most)]
+
+        def __len__(self) -> int:
+            return min(self.length, most)
+
+        def __getitem__(self, index: int) -> Any:
+            return self.items[: len(self)][index]
+
+    return List
 "#;
 
-/// Returns the generated part, with [`BY_HAND`] as its last line.
+/// Returns the module.
 pub fn module(source: &Source) -> String {
-    let mut text = format!("{NOTICE}# What stands below MESSAGES is written by hand.\n{HEAD}");
+    let mut text = format!("{NOTICE}{HEAD}");
     let names: Vec<_> = source.layouts.iter().map(|layout| layout.name.as_str()).collect();
     let mut groups = Vec::new();
     for target in targets(source, &names) {
@@ -63,9 +83,14 @@ pub fn module(source: &Source) -> String {
     for layout in &source.layouts {
         text += &class(source, layout);
     }
-    let is_part = |name: &str| source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name));
+    let is_part = |name: &str| {
+        // The elements of a list are no message; the segments are the payload of the stage.
+        name == "StageSegment" || source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name))
+    };
     let sent: Vec<_> = names.into_iter().filter(|name| !is_part(name)).collect();
-    text + &format!("\n\nMESSAGES = ({})\n\n{BY_HAND}", sent.join(", "))
+    text += "\n\n# Every message that is sent as a whole.\nMESSAGES: tuple[type[Message], ...] = (\n";
+    sent.into_iter().for_each(|name| text += &format!("    {name},\n"));
+    text + ")\n"
 }
 
 /// Returns the fields whose comments have this link.
@@ -80,7 +105,7 @@ impl Kind {
     fn holds(&self, layout: &str) -> bool {
         match self {
             Kind::Layout(name) => name == layout,
-            Kind::Array(element, _) => element.holds(layout),
+            Kind::Array(element, _) | Kind::List(element, _) => element.holds(layout),
             Kind::Number(_) | Kind::Text(_) => false,
         }
     }
@@ -109,19 +134,25 @@ fn events(source: &Source, item: &Enumeration) -> String {
 }
 
 fn class(source: &Source, layout: &Layout) -> String {
-    let mut text = format!("\n\nclass {}(_Message):\n", layout.name);
-    let docs: Vec<_> = plain(source, Some(layout), &layout.docs).iter().map(|text| wrapped(text, "    ")).collect();
+    let mut text = format!("\n\nclass {}(Message):\n", layout.name);
+    let mut docs = plain(source, Some(layout), &layout.docs);
+    docs[0].insert_str(0, "\"\"\"");
+    let docs: Vec<_> = docs.iter().map(|text| wrapped(text, "    ")).collect();
     let docs = docs.join("\n");
     // The quotes are on a separate line after a text of more than one line.
     let one_line = docs.trim();
-    if docs.lines().count() == 1 && one_line.len() + 10 <= 120 {
-        text += &format!("    \"\"\"{one_line}\"\"\"\n");
+    if docs.lines().count() == 1 && one_line.len() + 7 <= 120 {
+        text += &format!("    {one_line}\"\"\"\n");
     } else {
-        text += &format!("    \"\"\"{one_line}\n    \"\"\"\n");
+        text += &format!("    {one_line}\n    \"\"\"\n");
     }
-    text += &format!("\n    LAYOUT = {}\n    _fields_ = [\n", layout.version);
+    text += &format!("\n    LAYOUT = {}\n", layout.version);
     for field in &layout.fields {
-        text += &comment(&plain(source, Some(layout), &field.docs), "        ");
+        text += &comment(&plain(source, Some(layout), &field.docs), "    ");
+        text += &format!("    {}: {}\n", field.name, type_hint(&field.kind));
+    }
+    text += "    _fields_ = [\n";
+    for field in &layout.fields {
         text += &format!("        (\"{}\", {}),\n", field.name, type_name(&field.kind));
     }
     text + "    ]\n"
@@ -147,5 +178,18 @@ fn type_name(kind: &Kind) -> String {
         Kind::Text(bytes) => format!("ctypes.c_uint8 * {bytes}"),
         Kind::Layout(name) => name.clone(),
         Kind::Array(element, length) => format!("{} * {length}", type_name(element)),
+        Kind::List(element, most) => format!("_list({}, {most})", type_name(element)),
+    }
+}
+
+/// Returns the type that Python has for the value of a field.
+fn type_hint(kind: &Kind) -> String {
+    match kind {
+        Kind::Number(primitive) if primitive.rust.starts_with('f') => "float".to_owned(),
+        Kind::Number(_) => "int".to_owned(),
+        Kind::Text(_) => "ctypes.Array[ctypes.c_uint8]".to_owned(),
+        Kind::Layout(name) => name.clone(),
+        Kind::Array(element, _) => format!("ctypes.Array[{}]", type_name(element)),
+        Kind::List(element, _) => format!("Sequence[{}]", type_name(element)),
     }
 }

@@ -11,7 +11,7 @@ pub struct Message {
     has_header: bool,
 }
 
-pub const MESSAGES: [Message; 9] = [
+pub const MESSAGES: [Message; 11] = [
     Message { name: "HandlePose", layout: "HandlePose", has_header: false },
     Message { name: "HandlePoses", layout: "FrameHeader", has_header: true },
     Message { name: "CollisionAlert", layout: "CollisionAlert", has_header: true },
@@ -19,6 +19,8 @@ pub const MESSAGES: [Message; 9] = [
     Message { name: "Stage", layout: "Stage", has_header: true },
     Message { name: "Cue", layout: "Cue", has_header: true },
     Message { name: "StageSegment", layout: "StageSegment", has_header: false },
+    Message { name: "StageDragon", layout: "StageDragon", has_header: false },
+    Message { name: "StageObstacle", layout: "StageObstacle", has_header: false },
     Message { name: "StageEvent", layout: "StageEvent", has_header: false },
     Message { name: "StageCue", layout: "StageCue", has_header: false },
 ];
@@ -49,6 +51,9 @@ pub fn interface_file(source: &Source, message: &Message) -> String {
     for field in &layout.fields {
         let docs = comment(&plain(source, layout, &field.docs), "");
         text += &format!("{docs}{} {}\n", type_name(&field.kind), field.name);
+    }
+    if message.name == "Stage" {
+        text += "# The segments of all paths, then of all outlines.\nStageSegment[] segments\n";
     }
     if message.name == "HandlePoses" {
         text += "# The handles, the head first.\nHandlePose[] poses\n";
@@ -134,5 +139,6 @@ fn type_name(kind: &Kind) -> String {
         Kind::Text(_) => "string".to_owned(),
         Kind::Layout(name) => name.clone(),
         Kind::Array(element, length) => format!("{}[{length}]", type_name(element)),
+        Kind::List(element, _) => format!("{}[]", type_name(element)),
     }
 }

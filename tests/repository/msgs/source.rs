@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use syn::{Attribute, Expr, Fields, Item, ItemEnum, ItemStruct, Lit, Meta, Type};
+use syn::{Attribute, Expr, Fields, GenericArgument, Item, ItemEnum, ItemStruct, Lit, Meta, PathArguments, Type};
 
 /// A number type of a layout, with its name in each language.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +32,8 @@ pub enum Kind {
     /// Another layout.
     Layout(String),
     Array(Box<Kind>, u64),
+    /// A list of at most this many.
+    List(Box<Kind>, u64),
 }
 
 /// The paragraphs of a doc comment, without its examples, which are for Rust alone.
@@ -260,10 +262,24 @@ fn kind(of: &Type, texts: &BTreeMap<String, u64>, lengths: &BTreeMap<String, u64
         };
         return Kind::Array(Box::new(kind(&array.elem, texts, lengths)), length);
     }
+    if let Some((element, most)) = list(of) {
+        return Kind::List(Box::new(kind(element, texts, lengths)), lengths[&most]);
+    }
     let name = type_name(of).expect("a type with a name");
     match PRIMITIVES.iter().find(|primitive| primitive.rust == name) {
         Some(primitive) => Kind::Number(*primitive),
         None => texts.get(&name).map_or(Kind::Layout(name), |bytes| Kind::Text(*bytes)),
+    }
+}
+
+/// Returns the type of the elements of a `List`, and the constant with the most elements.
+fn list(of: &Type) -> Option<(&Type, String)> {
+    let Type::Path(path) = of else { return None };
+    let segment = path.path.segments.last().filter(|segment| segment.ident == "List")?;
+    let PathArguments::AngleBracketed(arguments) = &segment.arguments else { return None };
+    match (arguments.args.first()?, arguments.args.last()?) {
+        (GenericArgument::Type(element), GenericArgument::Type(most)) => Some((element, type_name(most)?)),
+        _ => None,
     }
 }
 

@@ -7,6 +7,7 @@ pub type Line = (&'static str, &'static str);
 /// Commands that are not run.
 pub const NOT_HERE: &[Line] = &[
     (".venv/bin/python benches/", "measures for minutes"),
+    ("apt install ./target/packaging/", "changes the machine: tests/packages/debian.sh does it on a clean Debian"),
     ("apt-get install", "changes the machine"),
     ("bench-dragon chase ltc show.wav", "the reader's own recording"),
     ("bench-dragon chase mtc /dev/snd/", "needs a MIDI device: tests/processes/chase.rs pipes the bytes of mido"),
@@ -25,6 +26,8 @@ pub const NOT_HERE: &[Line] = &[
         "java -cp HdrHistogram.jar",
         "needs Java and HdrHistogram: tests/processes/soak.rs reads the file by HdrHistogram's Python",
     ),
+    ("pip install maturin", "another program"),
+    ("pip install target/packaging/", "needs the wheel: tests/packages/debian.sh installs it"),
     ("python3 benches/", "measures for minutes"),
     ("python3 examples/python/ros2_", "needs ROS 2"),
     ("python3 tests/python/conduct_peer.py", "measures: tests/browser/conduct.rs runs it"),
@@ -36,6 +39,7 @@ pub const NOT_HERE: &[Line] = &[
     ("ssh HERE", "needs two machines"),
     ("sudo env \"PATH=$PATH\" tests/newcomer/debian.sh", "half an hour, with a mirror of Debian"),
     ("stress-ng", "loads the machine for hours"),
+    ("tar -xf target/packaging/", "needs the tarball that packaging/build makes"),
     ("tests/run", "runs this test itself"),
 ];
 

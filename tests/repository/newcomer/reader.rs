@@ -140,13 +140,14 @@ fn resident_kind(command: &str) -> Option<String> {
     let arguments = command.strip_prefix("bench-dragon ").or(command.strip_prefix("cargo run --release -- "))?;
     let words = Vec::from_iter(arguments.split(' '));
     let ends = ["--duration", "--recover", "--help", "--version"].iter().any(|option| words.contains(option));
-    let subcommand =
-        words.iter().find(|word| ["run", "replay", "watch", "view", "record", "send", "metrics"].contains(word));
+    let subcommand = words
+        .iter()
+        .find(|word| ["run", "replay", "watch", "view", "record", "send", "chase", "metrics"].contains(word));
     let name = words.iter().skip_while(|word| **word != "--name").nth(1).unwrap_or(&"bench_dragon");
     match *subcommand? {
         _ if ends => None,
         "run" | "replay" => Some(format!("publisher {name}")),
-        "send" => Some(format!("send {}", words.iter().skip_while(|word| **word != "send").nth(1)?)),
+        kind @ ("send" | "chase") => Some(format!("{kind} {}", words.iter().skip_while(|word| **word != kind).nth(1)?)),
         other => Some(other.to_owned()),
     }
 }
@@ -180,9 +181,12 @@ fn check_out(root: &Path, checkout: &Path) {
         let name = name.as_str();
         let copy = checkout.join(name);
         std::fs::create_dir_all(copy.parent().unwrap()).unwrap();
+        let file = root.join(name);
         // A file that was deleted is still listed.
-        if root.join(name).exists() {
-            std::fs::copy(root.join(name), copy).unwrap();
+        if file.is_symlink() {
+            symlink(std::fs::read_link(file).unwrap(), copy).unwrap();
+        } else if file.exists() {
+            std::fs::copy(file, copy).unwrap();
         }
     }
 }

@@ -13,6 +13,14 @@ pub fn look_up(root: &Path, command: &str) -> Result<(), String> {
                 let folder = if word == "--test" { "tests" } else { "benches" };
                 text += &source(root, folder, name).ok_or_else(|| format!("{command}: there is no {name}"))?;
             }
+            "--package" => {
+                let name = words.next().unwrap_or_default();
+                let sources = root.join(name.replacen("bench-dragon-", "crates/", 1)).join("src");
+                if !sources.is_dir() {
+                    return Err(format!("{command}: there is no {name}"));
+                }
+                text += &texts(files_below(&sources)).ok_or_else(|| format!("{command}: {name} cannot be read"))?;
+            }
             option if option.starts_with('-') => (),
             name => names.push(name),
         }
@@ -33,6 +41,10 @@ fn source(root: &Path, folder: &str, name: &str) -> Option<String> {
     let file = stated.map_or(root.join(folder).join(name).with_extension("rs"), |path| root.join(path));
     let folder = root.join(folder).join(name);
     let files = if folder.is_dir() { files_below(&folder) } else { Vec::from([file]) };
+    texts(files)
+}
+
+fn texts(files: Vec<PathBuf>) -> Option<String> {
     let text = |file: PathBuf| Some(format!("{}\n{}", file.display(), std::fs::read_to_string(&file).ok()?));
     files.into_iter().map(text).collect()
 }

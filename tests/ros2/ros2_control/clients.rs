@@ -24,7 +24,7 @@ fn a_hundred_new_clients_of_each_kind_get_the_answer_to_their_first_call() {
         for _ in 0..2 {
             threads.spawn(|| {
                 for _ in 0..calls / 2 {
-                    let peer = Process::start(&mut peer(name, &["--fresh", "1", "--seconds", "10", "get_rate"]));
+                    let peer = Process::start(&mut peer(name, &["--fresh", "1", "--seconds", "60", "get_rate"]));
                     let output = peer.output_within(120);
                     let answers: Vec<_> = json_lines(&output).iter().map(|line| line["response"].clone()).collect();
                     assert_eq!(answers, [json!({"rate": 1.0})], "{}: {}", output.status, text(&output.stderr));

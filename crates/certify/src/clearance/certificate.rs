@@ -27,14 +27,12 @@ impl Descent<'_, '_> {
         }
     }
 
-    /// Writes that two boards overlap with the head at `point`, the end of the last step. Returns true if that is shown.
-    pub(super) fn write_contact(&mut self, point: &GridPoint, benches: [usize; 2]) -> bool {
-        let found = (self.chain.spans(&mut point.clone(), &mut point.clone(), benches[1] + 1))
-            .and_then(|handles| Some((self.chain.common_point(&handles, benches)?, handles)));
-        let Some((common, handles)) = found else { return false };
+    /// Returns the line that shows two boards to overlap with the head at `point`, the end of the last step.
+    pub(super) fn overlap(&self, point: &GridPoint, benches: [usize; 2]) -> Option<CertificateLine<'static>> {
+        let handles = self.chain.spans(&mut point.clone(), &mut point.clone(), benches[1] + 1)?;
+        let common = self.chain.common_point(&handles, benches)?;
         let (from, to) = (point.head, point.head);
-        self.write(&CertificateLine::Contact { benches, from, to, spans: spans_of(&handles), point: common });
-        true
+        Some(CertificateLine::Contact { benches, from, to, spans: spans_of(&handles), point: common })
     }
 
     /// Writes that two boards are near, at a place that the steps have come to. Returns the upper bound.

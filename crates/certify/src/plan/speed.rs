@@ -86,7 +86,7 @@ fn asked(scene: &Scene, timeline: &Timeline, limit: f64) -> Result<(f64, f64), P
         )));
     }
     // A little less, since the two speeds are rounded away from each other.
-    Ok((show_end.event.travelled, 0.999 * TOLERANCE / limit.clamp(1.0, LARGE)))
+    Ok((show_end.event.travelled, 0.99 * TOLERANCE / limit.clamp(1.0, LARGE)))
 }
 
 fn answer(scene: &Scene, limit: f64, found: GreatestRatio) -> GreatestSpeed {

@@ -9,7 +9,7 @@ use iceoryx2::service::header::payload_header::PayloadHeader;
 use iceoryx2::service::header::publish_subscribe::Header;
 use iceoryx2::service::port_factory::PortFactory;
 
-use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, LoopStatus, Stage};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, LoopStatus, SceneHeader, Stage};
 
 /// The ports of a service.
 type Ports = DynamicConfig<<ipc::Service as Service>::Bag>;
@@ -60,4 +60,4 @@ macro_rules! of_run {
     };
 }
 
-of_run!(ChaseStatus, CollisionAlert, Cue, LoopStatus, Stage);
+of_run!(ChaseStatus, CollisionAlert, Cue, LoopStatus, SceneHeader, Stage);

@@ -73,6 +73,19 @@ pub enum OpenError {
          name"
     )]
     Incompatible(String),
+    /// A service of this name has messages of another layout.
+    #[error(
+        "the service \"{service}\" exists with another layout of its messages: its publisher has {theirs}, this program \
+         has {own}; use the publisher's version of bench-dragon (--version prints its layouts), or choose another name"
+    )]
+    OtherLayout {
+        /// The service.
+        service: String,
+        /// Names of its layouts.
+        theirs: String,
+        /// Names of this program's.
+        own: String,
+    },
     /// A service of this name exists with other attributes.
     #[error(
         "the service \"{0}\" exists with other attributes: a tunnel brings it from another machine, or a subscriber keeps \

@@ -1,13 +1,11 @@
-//! The layout of the stage: the team, the path, the time line.
+//! The layout of the stage: the dragons, their paths, the obstacles, the time line.
 
 use iceoryx2_bb_derive_macros::ZeroCopySend;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 use super::SceneName;
-
-/// The most segments of a path that a [`Stage`] has room for.
-pub const MOST_SEGMENTS: usize = 32;
+use crate::List;
 
 /// Straight on.
 pub const SEGMENT_LINE: u32 = 0;
@@ -18,9 +16,12 @@ pub const SEGMENT_INWARD_SPIRAL: u32 = 2;
 /// Outward along that spiral, turned by half a turn about the centre.
 pub const SEGMENT_OUTWARD_SPIRAL: u32 = 3;
 
-/// One segment of the path in a [`Stage`].
+/// One segment of a path, or of an obstacle's outline. A circle is an arc of a full turn; a polygon's last line ends
+/// where the first begins.
+///
+/// Over iceoryx2 the payload of `<name>/stage` is a slice of these. Layout 6 added the pitch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/StageSegment/3")]
+#[type_name("bench_dragon/StageSegment/6")]
 #[repr(C)]
 pub struct StageSegment {
     /// Its beginning, metres right of the centre.
@@ -40,6 +41,8 @@ pub struct StageSegment {
     pub theta_first: f64,
     /// Of a spiral, the polar angle at which it ends, radians; else NaN.
     pub theta_last: f64,
+    /// Of a spiral, metres per turn; else NaN.
+    pub pitch: f64,
     /// The kind of curve: one of [`SEGMENT_*`](SEGMENT_LINE).
     pub kind: u32,
     /// Always 0.
@@ -60,8 +63,12 @@ impl StageSegment {
     }
 }
 
-/// The most events of a motion: the first of each kind.
-pub const MOST_EVENTS: usize = 4;
+/// The most dragons of a show.
+pub const MOST_DRAGONS: usize = 16;
+/// The most obstacles of a show, the boundary included.
+pub const MOST_OBSTACLES: usize = 65;
+/// The most events that a [`Stage`] has room for: the first of each kind of each dragon and of each obstacle.
+pub const MOST_EVENTS: usize = 160;
 /// The most cues that a [`Stage`] has room for.
 pub const MOST_CUES: usize = 32;
 
@@ -97,15 +104,92 @@ pub fn hexadecimal(hash: &[u8]) -> String {
     hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// A disc.
+pub const OBSTACLE_CIRCLE: u32 = 0;
+/// A polygon with its interior.
+pub const OBSTACLE_POLYGON: u32 = 1;
+/// An open line: a barrier.
+pub const OBSTACLE_LINE: u32 = 2;
+/// The boundary: boards stay inside.
+pub const OBSTACLE_BOUNDARY: u32 = 3;
+
+/// A dragon of the show in a [`Stage`].
+///
+/// The head's board and the other boards can differ in length. The team may stand further back than the first segment
+/// begins, on the same spiral or line.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
+#[type_name("bench_dragon/StageDragon/6")]
+#[repr(C)]
+pub struct StageDragon {
+    /// Metres along the head's board.
+    pub head_length: f64,
+    /// Metres along every other board.
+    pub body_length: f64,
+    /// Metres across every board.
+    pub width: f64,
+    /// Metres from the centre of a handle's hole to the nearest end of the board.
+    pub hole_inset: f64,
+    /// Metres per turn of the spiral on which the head starts, or else of the first one; NaN if the path has none.
+    pub pitch: f64,
+    /// The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
+    pub start_turn: f64,
+    /// The number of its first handle. Bench i joins handles i and i + 1, so it is the head's number too.
+    pub first_handle: u32,
+    /// The number of its benches; one less than the number of its handles.
+    pub benches: u32,
+    /// The index of the first segment of its path in the list of segments. They are in the order of travel.
+    pub first_segment: u32,
+    /// The number of segments of its path.
+    pub segments: u32,
+    /// Its name; empty if it is the only dragon of the show.
+    pub name: SceneName,
+}
+
+/// An obstacle of the show in a [`Stage`], or its boundary.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
+#[type_name("bench_dragon/StageObstacle/6")]
+#[repr(C)]
+pub struct StageObstacle {
+    /// Metres that every board has to stay away.
+    pub keep_out: f64,
+    /// The kind of shape: one of [`OBSTACLE_*`](OBSTACLE_CIRCLE).
+    pub kind: u32,
+    /// The index of the first segment of its outline in the list of segments.
+    pub first_segment: u32,
+    /// The number of segments of its outline.
+    pub segments: u32,
+    /// Always 0.
+    pub reserved: u32,
+    /// Its name.
+    pub name: SceneName,
+}
+
+impl StageObstacle {
+    /// Returns the name of its kind: `circle`, `polygon`, `line`, `boundary`, or `unknown` for a later layout's.
+    pub fn kind_name(&self) -> &'static str {
+        match self.kind {
+            OBSTACLE_CIRCLE => "circle",
+            OBSTACLE_POLYGON => "polygon",
+            OBSTACLE_LINE => "line",
+            OBSTACLE_BOUNDARY => "boundary",
+            _ => "unknown",
+        }
+    }
+}
+
 /// An event of the show in a [`Stage`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/StageEvent/4")]
+#[type_name("bench_dragon/StageEvent/6")]
 #[repr(C)]
 pub struct StageEvent {
     /// Simulated seconds at which it happens.
     pub time: f64,
     /// The event, as the state that it leads to: one of [`FrameState`](crate::state::FrameState).
     pub state: u32,
+    /// The first bench of the event, from 0; 4294967295 if it has none.
+    pub bench_a: u32,
+    /// The second bench, or the number of an obstacle; 4294967295 if it has none.
+    pub bench_b: u32,
     /// Always 0.
     pub reserved: u32,
 }
@@ -127,15 +211,18 @@ pub struct StageCue {
 
 /// The geometry and the time line of a show, for drawing them. Sent at the start and kept for late joiners.
 ///
-/// The head's board and the other boards can differ in length. The team may stand further back than the first segment
-/// begins, on the same spiral or line.
+/// The segments of all paths and outlines stand in one list: first those of the dragons, then those of the obstacles.
+/// Handles are numbered through all dragons. In the bench fields of alerts and events the number of handles plus j is
+/// the obstacle j, from 0.
 ///
-/// Over iceoryx2 the payload of `<name>/stage`. Layout 2 added the segments of the path, layout 3 gave them their name,
-/// layout 4 added the time line: the freeze time, the events and the cues, layout 5 the hash of the scene's text.
+/// Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments of
+/// the path, layout 3 gave them their name, layout 4 added the time line: the freeze time, the events and the cues,
+/// layout 5 the hash of the scene's text, layout 6 the dragons, the obstacles and a path of any length.
 ///
 /// # Examples
 ///
 /// ```
+/// use bench_dragon_messages::StageMessage;
 /// use bench_dragon_messages::state::EventKind;
 /// use bench_dragon_show::scene::Scene;
 /// use bench_dragon_show::{Playback, Show};
@@ -143,71 +230,63 @@ pub struct StageCue {
 ///
 /// let scene = Scene::paper();
 /// let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
-/// let stage = stage(1, 0, [0; 32], &scene.motion, &show);
-/// assert_eq!((stage.benches, stage.path_in_use()[0].kind_name()), (223, "inward_spiral"));
-/// assert_eq!(stage.events_in_use()[0].kind(), Some(EventKind::Contact));
+/// let message = stage(1, 0, [0; 32], &scene.motion, &show);
+/// let StageMessage { stage, .. } = &message;
+/// assert_eq!((stage.dragons.len(), stage.first_dragon().benches), (1, 223));
+/// assert_eq!(message.path(stage.first_dragon())[0].kind_name(), "inward_spiral");
+/// assert_eq!(stage.events[0].kind(), Some(EventKind::Contact));
 /// assert!((stage.freeze_time - 412.473_837_682).abs() < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/Stage/5")]
+#[type_name("bench_dragon/Stage/6")]
 #[repr(C)]
 pub struct Stage {
     /// The run, as [`FrameHeader::run_id`](super::FrameHeader::run_id).
     pub run_id: u64,
     /// CLOCK_REALTIME in nanoseconds when this was written.
     pub stamp_ns: u64,
-    /// Metres per turn of the spiral or spirals; NaN if the path has none.
-    pub pitch: f64,
-    /// The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
-    pub start_turn: f64,
-    /// Metres from the centre of a handle's hole to the nearest end of the board.
-    pub hole_inset: f64,
-    /// Metres along the head's board.
-    pub head_length: f64,
-    /// Metres along every other board.
-    pub body_length: f64,
-    /// Metres across every board.
-    pub width: f64,
     /// Simulated seconds at which the show freezes: a seek reaches no later time.
     pub freeze_time: f64,
-    /// The number of benches; one less than the number of handles.
-    pub benches: u32,
-    /// The number of segments in use, at most [`MOST_SEGMENTS`].
-    pub segments: u32,
-    /// The number of events in use, at most [`MOST_EVENTS`]; a scene without `[alerts]` has its last one only.
-    pub events: u32,
-    /// The number of cues in the show; the first [`MOST_CUES`] of them are listed.
+    /// The number of cues in the show; the first 32 of them are listed.
     pub cues: u32,
+    /// Always 0.
+    pub reserved: u32,
     /// BLAKE3 of the scene's text, as `verify` prints it of a certificate: the proofs of that text hold for this show.
     /// All zero if it is not known.
     pub scene_hash: [u8; SCENE_HASH_BYTES],
-    /// The segments of the path in the order of travel; those not in use are zero.
-    pub path: [StageSegment; MOST_SEGMENTS],
-    /// The events in order of time; those not in use are zero. Those after the freeze time are not reached.
-    pub timeline: [StageEvent; MOST_EVENTS],
-    /// The cues in order of time; those not in use are zero.
-    pub cue_list: [StageCue; MOST_CUES],
+    /// The dragons in the order of their handles.
+    pub dragons: List<StageDragon, MOST_DRAGONS>,
+    /// The obstacles in the order of the scene; the boundary, if there is one, stands last.
+    pub obstacles: List<StageObstacle, MOST_OBSTACLES>,
+    /// The events in order of time: the first of each kind of each dragon and of each obstacle. Those after the freeze
+    /// time are not reached. A scene without `[alerts]` has its last one only.
+    pub events: List<StageEvent, MOST_EVENTS>,
+    /// The cues in order of time.
+    pub cue_list: List<StageCue, MOST_CUES>,
 }
 
 impl Stage {
-    /// Returns the segments of the path that are in use.
-    pub fn path_in_use(&self) -> &[StageSegment] {
-        &self.path[..(self.segments as usize).min(MOST_SEGMENTS)]
-    }
-
     /// Returns the hash of the scene's text in hexadecimal digits; `None` if it is not known.
     pub fn scene_hash_digits(&self) -> Option<String> {
         let is_known = self.scene_hash.iter().any(|byte| *byte != 0);
         is_known.then(|| hexadecimal(&self.scene_hash))
     }
 
-    /// Returns the events that are in use.
-    pub fn events_in_use(&self) -> &[StageEvent] {
-        &self.timeline[..(self.events as usize).min(MOST_EVENTS)]
-    }
-
-    /// Returns the cues that are listed.
-    pub fn cues_in_use(&self) -> &[StageCue] {
-        &self.cue_list[..(self.cues as usize).min(MOST_CUES)]
+    /// Returns the first dragon; one without benches if none is listed.
+    pub fn first_dragon(&self) -> &StageDragon {
+        const NONE: &StageDragon = &StageDragon {
+            head_length: 0.0,
+            body_length: 0.0,
+            width: 0.0,
+            hole_inset: 0.0,
+            pitch: f64::NAN,
+            start_turn: f64::NAN,
+            first_handle: 0,
+            benches: 0,
+            first_segment: 0,
+            segments: 0,
+            name: SceneName::EMPTY,
+        };
+        self.dragons.first().unwrap_or(NONE)
     }
 }

@@ -57,6 +57,14 @@ pub enum RouteStep {
 }
 
 impl PathDescription {
+    /// Returns the pitch of the path's spirals, metres per turn; `None` for a route.
+    pub fn pitch(&self) -> Option<f64> {
+        match self {
+            Self::Spiral { pitch, .. } | Self::Turnaround { pitch, .. } => Some(*pitch),
+            Self::Route { .. } => None,
+        }
+    }
+
     /// Builds the path in doubles.
     ///
     /// # Errors

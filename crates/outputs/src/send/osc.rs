@@ -7,6 +7,7 @@
 use rosc::encoder::encode;
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType};
 
+use bench_dragon_messages::sentence::obstacle_in;
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, NO_BENCH, Stage};
@@ -60,6 +61,11 @@ impl Addresses {
                 OscType::Int(cue as i32),
             ],
         )
+    }
+
+    /// `/obstacle ,s`: the name of the obstacle that an alert is about; empty if it is about boards alone.
+    pub fn obstacle(&self, stage: &Stage, alert: &CollisionAlert) -> OscMessage {
+        self.message("obstacle", vec![text(obstacle_in(stage, alert).unwrap_or_default())])
     }
 
     /// `/countdown ,fs`: seconds of wall time until the next event, and its name.
@@ -122,7 +128,7 @@ impl State {
 pub fn next_event(stage: &Stage, header: &FrameHeader) -> Option<(f64, &'static str)> {
     let plays = header.playback_state() == Some(PlaybackState::Playing) && header.time_scale > 0.0;
     let ahead = |time: f64| time > header.sim_time && time <= stage.freeze_time;
-    let next = stage.events_in_use().iter().find(|event| plays && ahead(event.time))?;
+    let next = stage.events.iter().find(|event| plays && ahead(event.time))?;
     let name = FrameState::ALL.get(next.state as usize)?.name();
     Some(((next.time - header.sim_time) / header.time_scale, name))
 }
@@ -162,7 +168,7 @@ fn bench(number: u32) -> OscType {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench_dragon_messages::{SceneName, StageEvent};
+    use bench_dragon_messages::{List, SceneName, StageEvent};
 
     #[test]
     fn an_alert_about_nothing_fires_no_threshold_and_names_no_bench() {
@@ -185,11 +191,10 @@ mod tests {
 
     #[test]
     fn the_countdown_is_to_what_the_show_comes_to() {
-        let mut stage = Stage { freeze_time: 20.0, events: 3, ..Stage::default() };
-        let event = |time, state: FrameState| StageEvent { time, state: state as u32, reserved: 0 };
-        stage.timeline[0] = event(10.0, FrameState::Contact);
-        stage.timeline[1] = event(20.0, FrameState::Stall);
-        stage.timeline[2] = event(30.0, FrameState::Lock);
+        let event = |time, state: FrameState| StageEvent { time, state: state as u32, ..StageEvent::default() };
+        let states = [(10.0, FrameState::Contact), (20.0, FrameState::Stall), (30.0, FrameState::Lock)];
+        let events = List::of(states.map(|(time, state)| event(time, state)));
+        let stage = Stage { freeze_time: 20.0, events, ..Stage::default() };
         let at = |sim_time, time_scale, playback: PlaybackState| {
             let header = FrameHeader { sim_time, time_scale, playback: playback as u32, ..FrameHeader::default() };
             next_event(&stage, &header)

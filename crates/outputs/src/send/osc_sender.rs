@@ -120,6 +120,8 @@ impl OscSender {
         self.last_alert = Some(*alert);
         let header = self.latest.map(|(header, _)| header).filter(|header| header.run_id == alert.run_id);
         self.pending.push(self.addresses.alert(alert, header.map_or(0, |header| header.cue)));
+        let stage = self.stage.as_ref().filter(|stage| stage.run_id == alert.run_id && !stage.obstacles.is_empty());
+        self.pending.extend(stage.map(|stage| self.addresses.obstacle(stage, alert)));
         self.summary.alerts += 1;
     }
 
@@ -151,7 +153,7 @@ impl OscSender {
                 self.latest = Some((*header, handles.first().copied().unwrap_or_default()));
                 self.due |= self.pace.is_due(header);
             }
-            FeedEvent::Stage(stage) => self.stage = Some(*stage),
+            FeedEvent::Stage { stage, .. } => self.stage = Some(*stage),
             FeedEvent::Alert(alert) => self.take_alert(alert),
             FeedEvent::Cue(cue) => self.take_cue(cue),
             FeedEvent::Gone => self.stage = None,

@@ -119,6 +119,21 @@ export class Camera {
     return Math.max(1, Math.min(this.width, this.height) / 800);
   }
 
+  /** Returns the camera as it is kept. */
+  kept() {
+    const { mode, followed, x, y, zoom, metres, c, s } = this;
+    return { mode, followed, x, y, zoom, metres: metres ?? null, c, s };
+  }
+
+  /** Takes a kept camera; false if it is none. */
+  recall({ mode, followed, x, y, zoom, metres, c, s }) {
+    const isPlace = [x, y, c, s].every(Number.isFinite) && Math.abs(Math.hypot(c, s) - 1) < 1e-9, isSize = zoom > 0 && zoom < Infinity && (metres === null || (metres > 0 && metres < Infinity));
+    if (!["whole", "bench", "free"].includes(mode) || !(Number.isInteger(followed) && followed >= 0) || !isPlace || !isSize) return false;
+    Object.assign(this, { mode, followed, x, y, zoom, metres, c, s, stale: true });
+    if (mode === "whole" && this.frame) this.aim(this.frame);
+    return true;
+  }
+
   toPixel(x, y) {
     const dx = x - this.x, dy = y - this.y, { scale, c, s } = this;
     return [this.width / 2 + (dx * c - dy * s) * scale, this.height / 2 - (dx * s + dy * c) * scale];

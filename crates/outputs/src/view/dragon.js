@@ -1,7 +1,7 @@
 // One publisher's dragon: its stream, its present pose, its path and colours, its state and its marks. Knows the words
 // for its marks, and no canvas.
 
-import { centreOf, pathOf } from "./drawing.js";
+import { centreOf, obstaclesOf, pathOf } from "./drawing.js";
 import { STRIDE } from "./hermite.js";
 import { Nearest, Overlap, marksOf } from "./marks.js";
 import { SpeedScale } from "./palette.js";
@@ -102,7 +102,7 @@ export class Dragon {
       ahead = alert?.event ?? "path_end";
       seconds = ((alert?.event_time ?? pathEnd(stage, alert)) - playback.time(now)) / this.transport.pace;
     }
-    return { state: current, alert, trouble: lost, silent, stale: Boolean(lost) || silent !== null, seconds, ahead, stands: !newest?.playing, benches: stage?.benches, now: "" };
+    return { state: current, alert, trouble: lost, silent, stale: Boolean(lost) || silent !== null, seconds, ahead, stands: !newest?.playing, benches: stage?.benches, obstacles: stage?.obstacles, now: "" };
   }
 
   /** Returns a cue of the run by its number; null for one that is not known. The stage has the first cues only. */
@@ -179,7 +179,7 @@ export class Dragon {
     if (this.path && this.path.run === this.run && turns <= 1.001 * this.path.turns) return;
     // A team that moves outward gets room ahead.
     const room = this.path?.run === this.run ? 1.1 : 1;
-    this.path = { run: this.run, reach: room * this.reach, turns: room * turns, lines: pathOf(stage, room * turns) };
+    this.path = { run: this.run, reach: room * this.reach, turns: room * turns, lines: pathOf(stage, room * turns), obstacles: obstaclesOf(stage) };
   }
 
   /** Words for the marks, in the page's language. */

@@ -35,7 +35,7 @@ function onSpiral(a, angle) {
  * How a segment's spiral stands on the stage: its centre `x`, `y`, and the direction `c`, `s` of its x axis; `side` is -1
  * where it is mirrored. Its beginning and the side to which it bends say so; without a curvature it is about the origin.
  */
-export function spiralFrame({ kind, x, y, heading, curvature, theta_first }, pitch) {
+export function spiralFrame({ kind, x, y, heading, curvature, theta_first, pitch }) {
   if (curvature === null) return { x: 0, y: 0, c: 1, s: 0, side: 1 };
   const inward = kind === "inward_spiral", a = (inward ? pitch : -pitch) / (2 * Math.PI);
   const [px, py, dx, dy] = onSpiral(a, theta_first), side = Math.sign(inward ? -curvature : curvature);
@@ -45,19 +45,19 @@ export function spiralFrame({ kind, x, y, heading, curvature, theta_first }, pit
 }
 
 /** The place of the centre of a stage's spirals; the origin where it has none. */
-export function centreOf({ pitch, path }) {
+export function centreOf({ path }) {
   const spiral = path.find(({ kind }) => kind.endsWith("_spiral"));
-  return spiral ? spiralFrame(spiral, pitch) : { x: 0, y: 0 };
+  return spiral ? spiralFrame(spiral) : { x: 0, y: 0 };
 }
 
 /**
  * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach` from its centre,
  * where the team stands.
  */
-export function pathOf({ pitch, path: segments }, reach) {
+export function pathOf({ path: segments }, reach) {
   const path = new Path2D();
   for (const segment of segments) {
-    const { kind, x, y, heading, length, curvature, theta_first, theta_last } = segment;
+    const { kind, x, y, heading, length, curvature, theta_first, theta_last, pitch } = segment;
     const c = Math.cos(heading), s = Math.sin(heading);
     if (kind === "line") {
       path.moveTo(x, y);
@@ -67,12 +67,45 @@ export function pathOf({ pitch, path: segments }, reach) {
       path.moveTo(x, y);
       path.arc(cx, cy, 1 / Math.abs(curvature), from, from + curvature * length, curvature < 0);
     } else if (kind === "inward_spiral") {
-      addSpiral(path, spiralFrame(segment, pitch), pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
+      addSpiral(path, spiralFrame(segment), pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
     } else {
-      addSpiral(path, spiralFrame(segment, pitch), -pitch, theta_first, theta_last);
+      addSpiral(path, spiralFrame(segment), -pitch, theta_first, theta_last);
     }
   }
   return path;
+}
+
+/** The obstacles of a stage, each with its shape in metres, its keep-out, its name and a place on its outline. */
+export function obstaclesOf({ obstacles }) {
+  return obstacles.filter(({ outline }) => outline.length).map(({ name, kind, keep_out, outline }) => {
+    const shape = new Path2D(), { x, y, heading, curvature } = outline[0], last = outline.at(-1);
+    if (kind === "circle") shape.arc(x - Math.sin(heading) / curvature, y + Math.cos(heading) / curvature, 1 / curvature, 0, 2 * Math.PI);
+    else {
+      for (const side of outline) shape.lineTo(side.x, side.y);
+      if (kind === "line") shape.lineTo(last.x + last.length * Math.cos(last.heading), last.y + last.length * Math.sin(last.heading));
+      else shape.closePath();
+    }
+    return { shape, name, keepOut: keep_out, isFull: kind === "circle" || kind === "polygon", isBoundary: kind === "boundary", x, y };
+  });
+}
+
+/** The obstacles on the ground: the keep-out as a pale band about the outline. */
+function paintObstacles(context, palette, pixel, obstacles) {
+  context.lineJoin = context.lineCap = "round";
+  context.setLineDash([]);
+  for (const { shape, keepOut, isFull } of obstacles) {
+    context.strokeStyle = context.fillStyle = palette.faint;
+    context.globalAlpha = 0.25;
+    context.lineWidth = 2 * keepOut;
+    if (keepOut > 0) context.stroke(shape);
+    context.globalAlpha = 1;
+    if (isFull) context.fill(shape);
+    context.strokeStyle = palette.ink;
+    context.lineWidth = 1.5 * pixel;
+    context.stroke(shape);
+  }
+  context.lineJoin = "miter";
+  context.lineCap = "butt";
 }
 
 /** The spiral r = pitch * turn from one polar angle to another, as cubic curves with its tangents. */
@@ -114,7 +147,7 @@ export class Ground {
     this.x = this.y = 0;
   }
 
-  /** Covers another context's canvas: the ground with paths on it, each with its `lines` and `dashes` in pixels. */
+  /** Covers another context's canvas: the ground with paths on it, each with its `lines`, its `obstacles` and `dashes` in pixels. */
   cover(other, camera, palette, paths) {
     const { width, height } = other.canvas, { c, s, unit } = camera, scale = camera.scale * camera.ratio, right = width >> 2, down = height >> 2;
     const look = [width, height, camera.scale, camera.ratio, c, s, palette.ground, palette.faint].join();
@@ -160,6 +193,7 @@ export class Ground {
     context.fillStyle = palette.ground;
     if (!this.transparent) context.fillRect(0, 0, width, height);
     metres();
+    for (const { obstacles } of this.paths) paintObstacles(context, palette, pixel, obstacles);
     context.lineWidth = 1.2 * pixel;
     context.strokeStyle = palette.faint;
     for (const { lines, dashes } of this.paths) {
@@ -178,7 +212,7 @@ export class Ground {
  * boxes in pixels.
  */
 export function draw(context, camera, palette, { ground, dragons, labels, measure, hasFocus }) {
-  ground.cover(context, camera, palette, dragons.map(({ path, identity }) => ({ lines: path, dashes: identity?.dashes ?? [] })));
+  ground.cover(context, camera, palette, dragons.map(({ path, obstacles, identity }) => ({ lines: path, obstacles, dashes: identity?.dashes ?? [] })));
   const stale = dragons.filter((dragon) => dragon.stale);
   for (const dragon of stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (stale.length) ground.dim(context, DIMMED);
@@ -274,6 +308,10 @@ function wordsOf(dragons, palette, isNarrow) {
     }
     name(dragon, 0, front, palette.ink);
     if (count > 1) name(dragon, count - 1, rear, palette.ink);
+  });
+  // The least important: the names of the obstacles.
+  each(({ obstacles }) => {
+    for (const { name: text, isBoundary, x, y } of obstacles) if (!isBoundary) items.push({ key: `obstacle ${text}`, text, ink: palette.ink, x, y });
   });
   return { items, rings, marked };
 }

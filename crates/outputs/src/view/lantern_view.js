@@ -1,5 +1,5 @@
 // Geometry of the lantern look: boards in pixels of the canvas, and the part of the picture that light reaches. Called by
-// lanterns.js.
+// lanterns.js; `behindHead` also by seat.js.
 
 import { STRIDE, speedOf } from "./hermite.js";
 
@@ -57,4 +57,13 @@ export function boardsOf(view, dragon) {
   const density = count / (0.785 * (right - left + 1) * (high - low + 1)), exposure = Math.min(0.8, Math.max(0.3, 0.34 / density));
   const speed = speedOf(places, 0);
   return { dragon, show, boards, head, tail, pearl, exposure, speed: Number.isFinite(speed) ? speed : 0 };
+}
+
+/** Returns the place on the dragon's body `metres` behind the head: where the head was. */
+export function behindHead(places, metres) {
+  const distance = (k) => Math.hypot(places[k] - places[k + STRIDE], places[k + 1] - places[k + STRIDE + 1]);
+  let way = metres, k = 0, link = distance(0);
+  while (way > link && k < places.length - 2 * STRIDE) [way, k, link] = [way - link, k + STRIDE, distance(k + STRIDE)];
+  const share = Math.min(1, way / (link || 1));
+  return [places[k] + (places[k + STRIDE] - places[k]) * share, places[k + 1] + (places[k + STRIDE + 1] - places[k + 1]) * share];
 }

@@ -7,7 +7,7 @@
 
 import { headPicture, tailPicture } from "./dragon_head.js";
 import { STRIDE } from "./hermite.js";
-import { boardsOf, viewOf } from "./lantern_view.js";
+import { behindHead, boardsOf, viewOf } from "./lantern_view.js";
 import { CLOTHES, POOL_RADIUS, barrel, blank, box, dancer, halo, hash, paving, pool, turned } from "./sprites.js";
 
 /** The enlargement of the light on the ground, and of the halos. */
@@ -325,14 +325,11 @@ export class Lanterns {
   sparks(context, view, { show, dragon, speed }) {
     const { places } = dragon, { time } = show;
     if (!(show.embers > 0) || show.life < 1) return;
-    const distance = (k) => Math.hypot(places[k] - places[k + STRIDE], places[k + 1] - places[k + STRIDE + 1]);
     for (let spark = Math.floor(time * SPARKS); spark > (time - SPARK_LIFE) * SPARKS; spark--) {
       const age = time - spark / SPARKS, left = 1 - age / SPARK_LIFE;
-      let way = age * speed, k = 0, link = distance(0);
-      while (way > link && k < places.length - 2 * STRIDE) [way, k, link] = [way - link, k + STRIDE, distance(k + STRIDE)];
-      const share = Math.min(1, way / (link || 1)), turn = 2 * Math.PI * hash(spark + 1), drift = (0.12 + 0.5 * hash(spark + 2)) * age, swirl = 0.16 * age;
-      const x = places[k] + (places[k + STRIDE] - places[k]) * share + Math.cos(turn) * drift + swirl * Math.sin(3 * age + turn);
-      const y = places[k + 1] + (places[k + STRIDE + 1] - places[k + 1]) * share + Math.sin(turn) * drift + swirl * Math.cos(2.6 * age + turn);
+      const [startX, startY] = behindHead(places, age * speed), turn = 2 * Math.PI * hash(spark + 1), drift = (0.12 + 0.5 * hash(spark + 2)) * age, swirl = 0.16 * age;
+      const x = startX + Math.cos(turn) * drift + swirl * Math.sin(3 * age + turn);
+      const y = startY + Math.sin(turn) * drift + swirl * Math.cos(2.6 * age + turn);
       const [px, py] = view.place(x, y), size = Math.max((0.014 + 0.022 * hash(spark + 3)) * view.pixels * (0.5 + 0.5 * left), 1);
       const alpha = Math.max(0, left * show.embers * (0.6 + 0.4 * Math.sin(17 * time + spark)));
       if (size > 2) {

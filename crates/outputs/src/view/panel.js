@@ -21,9 +21,9 @@ const spokenOf = new Map();
  * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (the reason why nothing comes,
  * or null), `silent` (seconds without a frame, or null), `stale` (true if the whole picture is stale), `of` (the dragon
  * of the situation, or null for a single dragon), `seconds` until the event `ahead` (NaN without a countdown), `stands`
- * (true if the show stands still), `benches`, and `now` (the present state in words).
+ * (true if the show stands still), `benches`, `obstacles`, and `now` (the present state in words).
  */
-export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, benches, now }) {
+export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, benches, obstacles, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
   const changed = dataset.level !== state.name;
   if (changed) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
@@ -31,7 +31,7 @@ export function showSituation({ state, alert, trouble, silent, stale, of, second
   // The motion of a picture that no frame confirms, or of a show that stands, is not stated.
   element("state").hidden = Boolean(trouble) || silent !== null || (calm && stands);
   put("state", `${SIGNS[state.severity]} ${capital(say(state.name))}`);
-  const sentence = trouble ? "" : sentenceOf(state, alert, benches);
+  const sentence = trouble ? "" : sentenceOf(state, alert, benches, obstacles);
   put("alert", of && sentence ? `${of}: ${sentence}` : sentence);
   put("now", capital(now));
   element("now").hidden = !now;

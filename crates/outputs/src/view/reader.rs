@@ -9,7 +9,7 @@ use tokio::sync::watch;
 
 use super::{Facts, Picture, Proofs, SceneHash, wire};
 use bench_dragon_client::feed::{Feed, FeedEvent};
-use bench_dragon_messages::{LoopStatus, Stage};
+use bench_dragon_messages::{LoopStatus, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
 
 /// The interval of polls: some browsers draw 240 times a second, none needs more. Waking this thread at each frame
@@ -66,7 +66,7 @@ struct Reader<'a> {
     publisher: String,
     proofs: &'a Proofs,
     facts: &'a Arc<Facts>,
-    stage: Option<Stage>,
+    stage: Option<StageMessage>,
     /// The proofs of the scene of that stage.
     proved: Option<Arc<[ProvedEvent]>>,
     /// The scene for which the log has the warning that no certificate is for it.
@@ -75,6 +75,8 @@ struct Reader<'a> {
     status: Option<LoopStatus>,
     /// Cues that have come so far.
     cues: u64,
+    /// True for a show of several dragons, until it has gone.
+    has_several: bool,
     /// The run and the scene whose facts are not computed yet.
     unknown: Option<(u64, SceneHash)>,
 }
@@ -91,6 +93,7 @@ impl<'a> Reader<'a> {
             unproved: None,
             status: None,
             cues: 0,
+            has_several: false,
             unknown: None,
         }
     }
@@ -98,19 +101,32 @@ impl<'a> Reader<'a> {
     /// Applies an event. Returns true if the picture changed.
     fn handle(&mut self, event: FeedEvent<'_>) -> bool {
         match event {
-            FeedEvent::Stage(stage) => {
-                self.stage = Some(*stage);
+            FeedEvent::Gone => self.has_several = false,
+            _ if self.has_several => return false,
+            FeedEvent::Stage { stage, .. } if stage.dragons.len() > 1 => {
+                self.has_several = true;
+                let (name, dragons) = (&self.publisher, stage.dragons.len());
+                let sentence = format!("\"{name}\" has {dragons} dragons, which the page does not draw");
+                log::warn!("{sentence}");
+                self.picture = Picture::waiting(Some(&sentence));
+                return true;
+            }
+            _ => {}
+        }
+        match event {
+            FeedEvent::Stage { stage, segments } => {
+                self.stage = Some(StageMessage { stage: *stage, segments: segments.to_vec() });
                 self.proved = self.proofs.of(&stage.scene_hash);
                 self.describe();
                 self.warn_of_another_scene();
             }
             FeedEvent::Alert(alert) => {
-                let benches = self.stage.map_or(0, |stage| stage.benches);
-                self.picture.alert = wire::alert(alert, benches).into();
+                let unknown = Stage::default();
+                self.picture.alert = wire::alert(alert, self.stage().unwrap_or(&unknown)).into();
             }
             FeedEvent::Cue(cue) => {
                 self.cues += 1;
-                let most = self.stage.map_or(0, |stage| stage.cues as usize).max(KEPT_CUES);
+                let most = self.stage().map_or(0, |stage| stage.cues as usize).max(KEPT_CUES);
                 let kept = self.picture.cues.iter().rev().take(most - 1).rev().cloned();
                 self.picture.cues = kept.chain([(self.cues, wire::cue(cue).into())]).collect();
             }
@@ -145,9 +161,13 @@ impl<'a> Reader<'a> {
         true
     }
 
+    fn stage(&self) -> Option<&Stage> {
+        self.stage.as_ref().map(|message| &message.stage)
+    }
+
     /// Looks for proofs of the scene that came after its stage. Returns true if they change the picture.
     fn look_for_proof(&mut self) -> bool {
-        let Some(stage) = self.stage.as_ref().filter(|_| self.proved.is_none()) else { return false };
+        let Some(stage) = self.stage().filter(|_| self.proved.is_none()) else { return false };
         self.proved = self.proofs.of(&stage.scene_hash);
         if self.proved.is_some() {
             self.describe();
@@ -166,7 +186,7 @@ impl<'a> Reader<'a> {
 
     /// Warns once for each scene that all certificates are for other scenes.
     fn warn_of_another_scene(&mut self) {
-        let Some(stage) = self.stage.as_ref().filter(|stage| self.proofs.are_of_others(&stage.scene_hash)) else {
+        let Some(stage) = self.stage().copied().filter(|stage| self.proofs.are_of_others(&stage.scene_hash)) else {
             return;
         };
         if self.unproved.replace(stage.scene_hash) != Some(stage.scene_hash) {
@@ -181,7 +201,7 @@ impl<'a> Reader<'a> {
     /// Updates the message about the stage, with the scene's name when it is known.
     fn describe(&mut self) {
         let Some(stage) = &self.stage else { return };
-        let status = self.status.as_ref().filter(|status| status.run_id == stage.run_id);
+        let status = self.status.as_ref().filter(|status| status.run_id == stage.stage.run_id);
         let scene = status.map(|status| status.scene.as_str());
         self.picture.stage = wire::stage(stage, &self.publisher, scene, self.proved.as_deref()).into();
     }

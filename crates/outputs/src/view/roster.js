@@ -48,7 +48,7 @@ export class Roster {
       if (sign.textContent !== transport.sign) sign.textContent = transport.sign;
       item.dataset.transport = transport.kind;
       const left = sight.seconds > -1 ? `, ${say(sight.ahead)} ${remaining(Math.max(0, sight.seconds)).join(" ")}` : "";
-      const text = dragon === first || sight.stale ? "" : sentenceOf(sight.state, sight.alert, sight.benches);
+      const text = dragon === first || sight.stale ? "" : sentenceOf(sight.state, sight.alert, sight.benches, sight.obstacles);
       if (state.textContent !== words + left) state.textContent = words + left;
       if (sentence.textContent !== text) sentence.textContent = text;
       item.dataset.severity = sight.stale ? "lost" : sight.state.severity;

@@ -5,6 +5,7 @@ import { conduct } from "./conduct.js";
 import { wordsOf } from "./address.js";
 import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
+import { Cameras } from "./cameras.js";
 import { Curve } from "./curve.js";
 import { Dragon } from "./dragon.js";
 import { Labels } from "./labels.js";
@@ -14,12 +15,14 @@ import { Ground, draw } from "./drawing.js";
 import { speedOf } from "./hermite.js";
 import { KeySwitch } from "./key_switch.js";
 import { Measure } from "./measure.js";
+import { Pace } from "./pace.js";
 import { attach } from "./pointer_input.js";
 import { identityOf, paletteOf } from "./palette.js";
 import { element, put, showBench, showChase, showFigures, showNames, showProofs, showSituation, showTransport } from "./panel.js";
 import { publishers } from "./publishers.js";
 import { Resolution } from "./resolution.js";
 import { Roster } from "./roster.js";
+import { Seat } from "./seat.js";
 import { Sound } from "./sound.js";
 import { capital, nameOf, say, setLanguage, translate } from "./words.js";
 
@@ -29,15 +32,20 @@ const FIGURES_INTERVAL = 100;
 const HEADER_LEAD = 1;
 
 const words = wordsOf(location.hash), root = document.documentElement, stillness = matchMedia("(prefers-reduced-motion: reduce)");
+// A seat is a place in the audience of a show.
+words.show ??= words.seat && true;
 setLanguage(words.lang ?? navigator.language);
 translate(document);
-for (const word of ["show", "transparent", "tell"]) root.toggleAttribute(`data-${word}`, word in words);
+for (const word of ["show", "transparent", "tell"]) root.toggleAttribute(`data-${word}`, Boolean(words[word]));
 if (words.dark || words.light || words.show) root.dataset.theme = words.light ? "light" : "dark";
 
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: "transparent" in words });
 const camera = new Camera(), resolution = new Resolution(), ground = new Ground("transparent" in words), sound = new Sound();
 const labels = "nolabels" in words ? null : new Labels(stillness.matches);
-const lanterns = words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null;
+const seat = words.seat ? new Seat(words.seat === true ? [] : words.seat) : null, pace = seat ? new Pace() : null;
+const lanterns = seat ?? (words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null);
+/** The eye that hands move. */
+const eye = seat ?? camera;
 const several = publishers.length > 1, dragons = publishers.map((name) => new Dragon(name, { several, show: words.show, still: stillness.matches }));
 root.toggleAttribute("data-several", several);
 const keySwitch = new KeySwitch(words.keys || words.desk || words.hands, element("keys-on"));
@@ -60,7 +68,7 @@ let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = nul
  * it; `latency` and `ways` in ms since the frame was sent. With several dragons it is of the first, and `dragons`
  * has the same of each.
  */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: dragons[0].latency, ways: dragons[0].stream.ways, played: sound.played, toPixel: (x, y) => camera.toPixel(x, y), dragons: [] };
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: dragons[0].latency, ways: dragons[0].stream.ways, played: sound.played, toPixel: (...place) => eye.toPixel(...place), dragons: [] };
 window.picture = picture;
 
 function fitCanvas() {
@@ -122,7 +130,7 @@ function paint(there) {
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
     const { stage, places, colours, path, marks, sight } = dragon, own = dragon === whose ? chosen : -1;
-    return { stage, places, colours, path: path.lines, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
+    return { stage, places, colours, path: path.lines, obstacles: path.obstacles, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
   });
   const written = draw(context, camera, palette, { ground, dragons: scene, labels, measure, hasFocus });
   picture.drawn++;
@@ -133,18 +141,19 @@ function paint(there) {
 
 /** Draws the show look. */
 function light(there) {
-  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s].join();
-  if (look === last) return;
-  if (last) resolution.take(passedAt - drawnAt);
+  const isDue = pace?.begin(passedAt) ?? true, look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, seat?.key].join();
+  if (look === last || !isDue) return;
+  if (last && !seat) resolution.take(passedAt - drawnAt);
   [last, drawnAt] = [look, passedAt];
   lanterns.draw(context, camera, there);
+  pace?.drawn(passedAt);
   picture.drawn++;
   for (const dragon of there) if (!dragon.sight.stale) dragon.drawn();
 }
 
 /** The picture stays; the data for tests of a publisher that is gone does not. */
 function report() {
-  picture.dragons = dragons.map((dragon) => dragon.report(camera));
+  picture.dragons = dragons.map((dragon) => dragon.report(eye));
   const { name: _, time, ...rest } = picture.dragons[0];
   Object.assign(picture, rest, time === null ? {} : { time });
   if (picture.shown) picture.range = dragons[0].colours.ticks.map(({ speed }) => speed);
@@ -175,6 +184,7 @@ function showText(now) {
   if (words.show && !notices.length && sight.trouble) notices.push(capital(say(sight.trouble)));
   element("notice").hidden = !notices.length || "nolabels" in words;
   put("notice", notices.join("\n"));
+  showSeat();
   const shown = selected ?? first, { newest, stage, colours, stream } = shown;
   curve.show(shown.isThere ? stream.facts : null, stage?.freeze_time, newest?.time);
   // The scene of a picture that stays may no longer be played.
@@ -194,6 +204,13 @@ function showText(now) {
   put("rate", shown.sight.stale ? "" : say("frames", { rate: rate.toFixed(rate < 10 ? 1 : 0), behind }));
 }
 
+/** A line of the seat: the picture's heights are not to scale; and why it stands on a slow computer. */
+function showSeat() {
+  element("seat-note").hidden = !seat || "nolabels" in words || dragons.every(({ sight }) => sight.stale);
+  if (!seat) return;
+  put("seat-note", [say("notToScale"), pace.isStill ? say("still", { seconds: pace.seconds, rate: pace.rate.toFixed(1) }) : ""].filter(Boolean).join(" "));
+}
+
 // The user's input.
 
 function showFollow() {
@@ -205,11 +222,11 @@ function follow() {
   showFollow();
 }
 function whole() {
-  camera.whole();
+  eye.whole();
   showFollow();
 }
 function pan(x, y) {
-  camera.pan(x, y);
+  eye.pan(x, y);
   showFollow();
 }
 function choose(bench, dragon = whose) {
@@ -274,7 +291,7 @@ function escape() {
   choose(-1);
 }
 
-const zoom = (by) => () => camera.zoomAt(by);
+const zoom = (by) => () => eye.zoomAt(by);
 const keys = {
   "+": zoom(1.25), "=": zoom(1.25), "-": zoom(0.8), 0: whole, Home: whole,
   f: follow, t: toggleTheme, p: fill, s: toggleSound, "?": help, i: speak, m: () => measure.toggle(), Enter: measureMiddle, Escape: escape,
@@ -296,7 +313,8 @@ function tap(x, y) {
 // An audience's picture obeys no hand that happens to touch it.
 if (words.show) lock(() => `${say("locked")} · ${element("time").textContent} · ${element("playback").textContent}`);
 if (words.show) keys["?"] = () => null;
-if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (camera.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench", isWanted: (event) => keySwitch.acts(event, canvas) });
+if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (eye.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench", isWanted: (event) => keySwitch.acts(event, canvas) });
+if (!words.show || words.hands) new Cameras(eye, seat ? "seat" : "stage", element("camera-note"));
 element("pick").oninput = ({ target }) => {
   chosen = target.value === "" ? -1 : Math.floor(target.value) - 1;
   if (several && chosen >= 0) [whose, selected] = [selected ?? foremost(), selected ?? foremost()];

@@ -27,7 +27,7 @@ use serde_json::{Value, json};
 use bench_dragon_messages::json::{AlertObject, ChaseObject, CueObject, Exact, StageObject};
 use bench_dragon_messages::sentence::{Figures, alert_sentence, chase_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Level, Severity};
-use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
 
 use super::SceneFacts;
@@ -59,7 +59,12 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
 
 /// Returns the stage, the name of its publisher and, when they are known, the scene's name and the proofs of its
 /// events.
-pub(super) fn stage(stage: &Stage, publisher: &str, scene: Option<&str>, proved: Option<&[ProvedEvent]>) -> String {
+pub(super) fn stage(
+    stage: &StageMessage,
+    publisher: &str,
+    scene: Option<&str>,
+    proved: Option<&[ProvedEvent]>,
+) -> String {
     #[derive(Serialize)]
     struct StageMessage<'a> {
         r#type: &'static str,
@@ -108,9 +113,9 @@ fn state(state: FrameState) -> Value {
         "sentence": state_sentence(state)})
 }
 
-/// Returns an alert with its severity and its sentence, in a team of `benches` benches; the page shows the figures
+/// Returns an alert with its severity and its sentence, with the names of `stage`; the page shows the figures
 /// beside it.
-pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
+pub(super) fn alert(alert: &CollisionAlert, stage: &Stage) -> String {
     #[derive(Serialize)]
     struct AlertMessage {
         #[serde(flatten)]
@@ -124,7 +129,7 @@ pub(super) fn alert(alert: &CollisionAlert, benches: u32) -> String {
         alert: alert.into(),
         severity: level.map_or(Severity::Ok, Level::severity).name(),
         happened: level.is_some_and(Level::has_happened),
-        sentence: alert_sentence(alert, benches, Figures::Omitted),
+        sentence: alert_sentence(alert, stage, Figures::Omitted),
     };
     json!(message).to_string()
 }
@@ -143,6 +148,7 @@ pub(super) fn clock(monotonic_ns: Option<u64>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::{List, StageDragon};
 
     #[test]
     fn a_frame_has_the_documented_layout() {
@@ -188,7 +194,8 @@ mod tests {
 
     #[test]
     fn the_states_stand_in_the_order_of_their_numbers() {
-        let json: Value = serde_json::from_str(&stage(&Stage::default(), "dragon", Some("paper"), None)).unwrap();
+        let json: Value =
+            serde_json::from_str(&stage(&StageMessage::default(), "dragon", Some("paper"), None)).unwrap();
         assert_eq!((&json["publisher"], &json["scene"]), (&"dragon".into(), &"paper".into()));
         assert!(json["scene_hash"].is_null() && json["proved"].is_null(), "{json}");
         let states = json["states"].as_array().unwrap();
@@ -212,7 +219,9 @@ mod tests {
             event_y: 2.0,
             ..Default::default()
         };
-        let json: Value = serde_json::from_str(&alert(&alert_of, 9)).unwrap();
+        let dragons = List::of([StageDragon { benches: 9, ..StageDragon::default() }]);
+        let nine = Stage { dragons, ..Stage::default() };
+        let json: Value = serde_json::from_str(&alert(&alert_of, &nine)).unwrap();
         assert_eq!((&json["type"], &json["event"]), (&"alert".into(), &"contact".into()));
         assert_eq!((&json["severity"], &json["happened"]), (&"warning".into(), &false.into()));
         assert_eq!(

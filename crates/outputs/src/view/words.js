@@ -28,6 +28,8 @@ const WORDS = {
   key_zoom: ["zoom", "缩放"],
   key_0: ["show all", "显示全部"],
   key_f: ["follow the head, or the chosen bench", "跟随龙头或所选板凳"],
+  key_camera: ["take a kept camera", "切换到已保存的视角"],
+  key_keep: ["keep this camera, on this browser", "在本浏览器中保存此视角"],
   key_t: ["light or dark", "浅色或深色"],
   key_p: ["full screen", "全屏"],
   key_s: ["sound: a tick at 3, 2, 1, a gong at the event", "声音：倒数 3、2、1 时滴答，事件发生时锣响"],
@@ -186,6 +188,12 @@ const WORDS = {
   eventAhead: ["{kind} ahead", "{kind}：尚有"],
 
   locked: ["locked", "已锁定画面"],
+  notToScale: ["Not to scale above the boards.", "板凳以上的部分不按比例。"],
+  still: ["A still, renewed every {seconds} s: this computer draws {rate} pictures/s. For a film: benches/stage_picture.py film.", "静态画面，每 {seconds} 秒更新：本机每秒只能绘制 {rate} 幅。制作影片：benches/stage_picture.py film。"],
+  cameraKept: ["Camera {number} kept", "已保存视角 {number}"],
+  cameraTaken: ["Camera {number}", "视角 {number}"],
+  cameraEmpty: ["Camera {number} is empty: Shift+{number} keeps this one", "视角 {number} 为空：Shift+{number} 保存当前视角"],
+  cameraUnkept: ["This browser keeps no cameras", "本浏览器无法保存视角"],
 
   // The state of the page, spoken once.
   server: ["waiting for the server", "等待服务器"],
@@ -261,8 +269,9 @@ function outward(seconds, step) {
  * Returns the proof of an event, in a show that ends at `freeze`: `text`, empty for an unknown event, and `canCome`,
  * true if the show reaches it.
  */
-export function proofOf({ event, status, time_lo, time_hi }, freeze) {
-  const kind = capital(say(event)), lo = time_lo === null ? null : outward(time_lo, -1e-9);
+export function proofOf({ event, status, time_lo, time_hi, obstacle }, freeze) {
+  const number = obstacle === undefined ? "" : ` ${obstacle + 1}`;
+  const kind = capital(say(event)) + number, lo = time_lo === null ? null : outward(time_lo, -1e-9);
   const isBeyond = lo !== null && time_lo > freeze;
   if (status === "proved") {
     const beyond = isBeyond ? say("beyondShow") : "";
@@ -290,7 +299,7 @@ export function chaseOf({ source, state, timecode, tracker, error, distance, sen
 export const nameOf = (bench) => (bench === 0 ? say("headBench") : say("one", { number: bench + 1 }));
 
 /** Returns the sentence of an alert or a state; empty for an alert that the frames have not reached, or have left. */
-export function sentenceOf(state, alert, count) {
+export function sentenceOf(state, alert, count, obstacles = []) {
   if (language === 0 || !alert && !state.sentence) {
     if (state.sentence) return `${capital(state.sentence)}.`;
     return state.severity === "ok" || alert?.level !== state.name ? "" : `${capital(alert.sentence)}.`;
@@ -298,7 +307,7 @@ export function sentenceOf(state, alert, count) {
   if (state.sentence) return "龙头已到达路径终点。";
   if (state.severity === "ok" || alert.level !== state.name) return "";
   // The numbers of obstacles follow the handles.
-  const name = (bench) => bench > count ? `第 ${bench - count} 个障碍物` : `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
+  const name = (bench) => bench > count ? `障碍物“${obstacles[bench - count - 1]?.name ?? bench - count}”` : `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
   const both = (...pair) => pair.filter((bench) => bench !== null).map(name).join("与");
   const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)},\u00a0${alert.event_y.toFixed(3)})\u00a0m`;
   if (state.happened) {

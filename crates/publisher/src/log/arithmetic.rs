@@ -16,7 +16,8 @@ const ELEMENTARY_FUNCTIONS: &str = "libm 0.2.16";
 pub struct Arithmetic {
     /// The processor's architecture, for people: `x86_64`.
     pub architecture: String,
-    /// The name of the instructions that read the tables ([`Instructions::name`]).
+    /// The name of the instructions that read the tables ([`Instructions::name`]); with several dragons that of each,
+    /// between commas.
     pub instructions: String,
     /// The crate of the elementary functions and its version.
     pub elementary_functions: String,
@@ -27,17 +28,28 @@ impl Arithmetic {
     pub fn of(scene: &Scene) -> Self {
         Self {
             architecture: std::env::consts::ARCH.to_owned(),
-            instructions: scene.motion.instructions().name().to_owned(),
+            instructions: match &scene.ensemble {
+                Some(ensemble) => {
+                    let names = ensemble.dragons().iter().map(|dragon| dragon.motion.instructions().name());
+                    names.collect::<Vec<_>>().join(",")
+                }
+                None => scene.motion.instructions().name().to_owned(),
+            },
             elementary_functions: ELEMENTARY_FUNCTIONS.to_owned(),
         }
     }
 
     /// Returns true if this machine computes the same bits.
     pub fn is_available(&self) -> bool {
-        let instructions = Instructions::of_name(&self.instructions);
         self.architecture == std::env::consts::ARCH
-            && instructions.is_some_and(Instructions::is_available)
+            && self.sets().is_some()
             && self.elementary_functions == ELEMENTARY_FUNCTIONS
+    }
+
+    /// Returns the instructions of each dragon, or `None` if this processor lacks some.
+    pub fn sets(&self) -> Option<Vec<Instructions>> {
+        let set = |name| Instructions::of_name(name).filter(|set| set.is_available());
+        self.instructions.split(',').map(set).collect()
     }
 }
 

@@ -13,8 +13,8 @@ use std::io::{BufRead, Read};
 use serde::Serialize;
 
 use super::lines::{FORMAT, HashChain, Line, ShowLine};
-use bench_dragon_motion::Method;
 use bench_dragon_motion::solve::table::Instructions;
+use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::scene::{Accepted, Scene, printable};
 use player::Player;
 
@@ -135,7 +135,7 @@ fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, Ve
     if show.format != FORMAT {
         return Err(lines.error(&format!("the format is {}, expected {FORMAT}", show.format)));
     }
-    let scene = show.scene_text(file).parse().map_err(|error| VerifyError::Scene(error.to_string()))?;
+    let scene = show.scene_text(file).parse_any().map_err(|error| VerifyError::Scene(error.to_string()))?;
     let playback = show.playback().ok_or_else(|| {
         lines.error("on_contact and at_end are not understood, expected \"stop\" or \"continue\", \"hold\" or \"loop\"")
     })?;
@@ -147,23 +147,33 @@ fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, Ve
     for (accepted, name, value) in numbers {
         accepted.check(name, value).map_err(|sentence| lines.error(&sentence))?;
     }
-    let instructions = Instructions::of_name(&show.arithmetic.instructions).filter(|set| set.is_available());
-    let motion = match instructions {
-        Some(instructions) => scene.motion.clone().with_instructions(instructions),
-        None => None,
+    let scene = match show.arithmetic.sets() {
+        Some(sets) => with_instructions(scene, &sets),
+        None => scene,
     };
-    let scene = Scene { motion: motion.unwrap_or_else(|| scene.motion.clone()), ..scene };
     let player = Player::new(&scene, playback, show.arithmetic.is_available());
     player.map_err(|error| lines.error(&error.to_string()))
 }
 
+/// Returns the scene computed with these instructions, one set for each dragon.
+fn with_instructions(scene: Scene, sets: &[Instructions]) -> Scene {
+    match (&scene.ensemble, sets) {
+        (Some(ensemble), _) => Scene { ensemble: ensemble.with_instructions(sets).or(scene.ensemble), ..scene },
+        (None, [one]) => {
+            let motion = scene.motion.clone().with_instructions(*one);
+            Scene { motion: motion.unwrap_or(scene.motion), ..scene }
+        }
+        (None, _) => scene,
+    }
+}
+
 /// Returns the distance in metres that two exact solutions may have besides their rounding.
-fn accuracy_of(scene: &Scene) -> f64 {
+fn accuracy_of(motion: &Motion) -> f64 {
     /// The least tolerance.
     const LEAST: f64 = 1e-12;
     /// The error that rounding causes in the bisection of the paper's rules.
     const PAPER: f64 = 1e-9;
-    match scene.motion.method() {
+    match motion.method() {
         Method::Accuracy(accuracy) => accuracy.max(LEAST),
         Method::Paper(_) => PAPER,
         Method::Newton | Method::FollowerTable => LEAST,

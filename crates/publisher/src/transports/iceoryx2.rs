@@ -11,8 +11,8 @@
 
 mod control;
 mod frames;
+mod held_slice;
 mod queues;
-mod scene;
 
 use std::time::{Duration, Instant};
 
@@ -33,13 +33,15 @@ use bench_dragon_client::shared_memory::{
 use super::{Transport, TransportConfig, TransportError};
 use crate::live::control::CommandSender;
 use crate::live::{Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
-use bench_dragon_messages::{CollisionAlert, Cue, HandlePose, HandlePose32, LoopStatus, Stage};
+use bench_dragon_messages::{
+    CollisionAlert, Cue, HandlePose, HandlePose32, LoopStatus, SceneHeader, Stage, StageMessage, StageSegment,
+};
 use bench_dragon_show::convert::{Decimation, handle_pose, handle_pose_32, handle_poses};
 use bench_dragon_show::scene::SinglePrecision;
 
 use frames::{FrameSender, FrameService};
+use held_slice::HeldSlice;
 use queues::{check_room, default_queue};
-use scene::SceneSender;
 
 /// The interval at which the stage, the latest alert and the latest cue are retransmitted to a tunnel. A tunnel keeps
 /// no history for machines that join later.
@@ -72,7 +74,7 @@ pub struct PublisherConfig {
     /// The text of the scene, sent once and kept for late subscribers; empty if it is not known.
     pub scene: String,
     /// The stage, sent once and kept for late subscribers.
-    pub stage: Stage,
+    pub stage: StageMessage,
 }
 
 impl PublisherConfig {
@@ -105,7 +107,7 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
         alerts,
         cues,
         scene: scene.to_owned(),
-        stage,
+        stage: stage.clone(),
     };
     config.queue = queue.unwrap_or_else(|| default_queue(&config));
     Ok(Some(Box::new(Iceoryx2 { config, control: None })))
@@ -152,8 +154,8 @@ pub struct SharedMemoryPublisher {
     poses_32: Option<(FrameSender<HandlePose32>, Decimation)>,
     alerts: Option<Repeated<CollisionAlert>>,
     cues: Option<Repeated<Cue>>,
-    stage: Repeated<Stage>,
-    scene: SceneSender,
+    stage: HeldSlice<StageSegment, Stage>,
+    scene: HeldSlice<u8, SceneHeader>,
     tick: Notifier<ipc::Service>,
     tick_service: event::PortFactory<ipc::Service>,
     // Dropped last: the ports above belong to it.
@@ -188,9 +190,11 @@ impl SharedMemoryPublisher {
         // A large step can reach all cues in one frame. With a power of two, most changes of a scene keep the service.
         let open_cues = || Repeated::open(&node, config, "cues", config.cues.next_power_of_two().max(SMALL_QUEUE));
         let cues = (config.cues > 0).then(open_cues).transpose()?;
-        let mut stage = Repeated::open(&node, config, "stage", SMALL_QUEUE)?;
-        stage.send(config.stage).map_err(|error| failed(name, "stage", error))?;
-        let scene = SceneSender::open(&node, config)?;
+        let StageMessage { stage: header, segments } = &config.stage;
+        let stage = HeldSlice::open(&node, config, "stage", *header, segments)?;
+        let Stage { run_id, scene_hash, .. } = *header;
+        let header = SceneHeader { run_id, hash: scene_hash };
+        let scene = HeldSlice::open(&node, config, "scene", header, config.scene.as_bytes())?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)
             .event()

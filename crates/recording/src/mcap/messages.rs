@@ -4,7 +4,7 @@
 //! [`recorder`](super::recorder).
 
 use super::file::Batch;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage, StageMessage};
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
@@ -35,7 +35,7 @@ impl Messages {
             handles: HandlePoses::of(0),
             poses: PoseArray::of(0),
             markers: None,
-            transforms: TfMessage::of(name),
+            transforms: TfMessage::of(name, &Stage::default()),
         }
     }
 
@@ -77,12 +77,14 @@ impl Messages {
     }
 
     /// Fills the messages of a stage, the path among them.
-    pub fn stage(&mut self, sequence: u32, stage: &Stage) {
+    pub fn stage(&mut self, sequence: u32, message: &StageMessage) {
+        let stage = &message.stage;
         self.batch.clear();
-        self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(stage));
-        self.batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(*stage));
+        self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(message));
+        self.transforms = TfMessage::of(&self.name, stage);
+        self.batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(message.clone()));
         if self.topics.contains(&Topic::Path) {
-            self.batch.push(Topic::Path, stage.stamp_ns, sequence, &Path::of(stage));
+            self.batch.push(Topic::Path, stage.stamp_ns, sequence, &Path::of(message));
         }
     }
 

@@ -21,7 +21,7 @@ use super::index::{Index, index, told};
 use super::recover::records_of_chunk;
 use super::run::SCENE_ATTACHMENT;
 use bench_dragon_messages::sentence::number;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::settings::Topic;
 use bench_dragon_ros2_messages::{HandlePoses, Header, MessageType, Stamped, fields};
 use bench_dragon_show::scene::printable;
@@ -109,7 +109,7 @@ pub enum Item {
     /// A status.
     Status(Box<LoopStatus>),
     /// A stage.
-    Stage(Box<Stage>),
+    Stage(Box<StageMessage>),
 }
 
 /// A file that can be played.
@@ -138,7 +138,7 @@ pub struct Contents {
     /// The first and the last frame.
     pub ends: [FrameHeader; 2],
     /// The stage.
-    pub stage: Stage,
+    pub stage: StageMessage,
     /// The text of the scene, if the recording has it.
     pub scene_text: Option<String>,
 }
@@ -172,7 +172,7 @@ impl Recording {
             rate: 0.0,
             frames,
             ends: [FrameHeader::default(); 2],
-            stage: Stage::default(),
+            stage: StageMessage::default(),
             scene_text: scene_text(&mut file, length, &attachments)?,
         };
         let mut recording = Self { file, length, chunks, channels, contents };

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::file::McapFile;
 use super::messages::Messages;
 use super::run::{Event, Run};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::settings::Topic;
 
 /// The topics recorded by default: those of a replay, and those that tools show without this program's message types.
@@ -157,8 +157,8 @@ impl Recorder {
     ///
     /// # Errors
     /// As [`Recorder::frame`].
-    pub fn stage(&mut self, stage: &Stage) -> Result<(), RecordError> {
-        self.event(Event::Stage(Box::new(*stage)))
+    pub fn stage(&mut self, stage: &StageMessage) -> Result<(), RecordError> {
+        self.event(Event::Stage(Box::new(stage.clone())))
     }
 
     /// Attaches the text of a run's scene. An empty text is not known.
@@ -337,7 +337,7 @@ impl Recorder {
     fn fill_frame(&mut self, frame: &FrameHeader, handles: &[HandlePose]) {
         let run = self.run.as_ref();
         let (stage, alert) = (run.and_then(|run| run.stage.as_deref()), run.and_then(|run| run.alert.as_ref()));
-        self.messages.frame(frame, handles, stage, alert);
+        self.messages.frame(frame, handles, stage.map(|message| &message.stage), alert);
     }
 
     /// Returns true if the batch fits into this file.

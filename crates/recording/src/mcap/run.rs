@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::file::McapFile;
 use bench_dragon_messages::json::{Exact, StageObject};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, StageMessage};
 
 /// The name of the attachment with the description of the run.
 const ATTACHMENT: &str = "bench_dragon.json";
@@ -18,7 +18,7 @@ pub(super) const SCENE_ATTACHMENT: &str = "scene.toml";
 /// An event-driven message.
 #[derive(Debug, Clone)]
 pub(super) enum Event {
-    Stage(Box<Stage>),
+    Stage(Box<StageMessage>),
     Scene { run_id: u64, text: Arc<str> },
     Alert(CollisionAlert),
     Cue(Cue),
@@ -29,7 +29,7 @@ impl Event {
     /// Returns the run of the message.
     pub fn run_id(&self) -> u64 {
         match self {
-            Self::Stage(stage) => stage.run_id,
+            Self::Stage(stage) => stage.stage.run_id,
             Self::Scene { run_id, .. } => *run_id,
             Self::Alert(alert) => alert.run_id,
             Self::Cue(cue) => cue.run_id,
@@ -40,7 +40,7 @@ impl Event {
     /// Returns the message's time and the tick of its frame. A stage belongs to the first frame of the run.
     fn stamp(&self) -> (u64, u64) {
         match self {
-            Self::Stage(stage) => (stage.stamp_ns, 0),
+            Self::Stage(stage) => (stage.stage.stamp_ns, 0),
             // It is no message.
             Self::Scene { .. } => (0, 0),
             Self::Alert(alert) => (alert.stamp_ns, alert.tick),
@@ -62,7 +62,7 @@ pub(super) struct Run {
     pub latest_deadline_ns: u64,
     pub attached: bool,
     /// The latest messages, as a subscriber that joins now gets them.
-    pub stage: Option<Box<Stage>>,
+    pub stage: Option<Box<StageMessage>>,
     pub scene: Option<Arc<str>>,
     pub alert: Option<CollisionAlert>,
     pub cue: Option<Cue>,
@@ -132,7 +132,7 @@ impl Run {
         let object = json!({
             "run_id": Exact(self.run_id), "name": name, "scene": scene, "stage": self.stage.as_deref().map(StageObject::from),
         });
-        let time_ns = self.stage.as_ref().map_or(0, |stage| stage.stamp_ns);
+        let time_ns = self.stage.as_ref().map_or(0, |stage| stage.stage.stamp_ns);
         self.file.attach(ATTACHMENT, "application/json", time_ns, object.to_string().as_bytes())
     }
 }

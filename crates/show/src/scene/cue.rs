@@ -85,6 +85,11 @@ pub(super) struct RawCue {
 }
 
 impl RawCue {
+    /// Returns the metres of the head's travel, if they are given.
+    pub(super) fn travelled(&self) -> Option<&Spanned<f64>> {
+        self.travelled.as_ref()
+    }
+
     pub(super) fn validated(&self, source: &Source, alerts: bool) -> Result<Cue, SceneError> {
         let name = self.name.get_ref().trim();
         if name.is_empty() {

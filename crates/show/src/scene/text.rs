@@ -47,6 +47,14 @@ impl SceneText {
     pub fn parse(&self) -> Result<Scene, SceneError> {
         Scene::parse(&self.text, &self.file, &self.stem)
     }
+
+    /// Parses the text of a scene of one dragon or of several.
+    ///
+    /// # Errors
+    /// As [`Scene::parse_any`].
+    pub fn parse_any(&self) -> Result<Scene, SceneError> {
+        Scene::parse_any(&self.text, &self.file, &self.stem)
+    }
 }
 
 /// Returns text in printable form: line ends and terminal control characters are escaped.

@@ -20,7 +20,7 @@ pub struct ShowFacts {
 impl ShowFacts {
     /// Returns true if a stage has the same end and, as far as it lists them, the same cues.
     pub(super) fn agree_with(&self, stage: &Stage) -> bool {
-        let listed = stage.cues_in_use().iter().map(|cue| (cue.time, cue.pauses == 1));
+        let listed = stage.cue_list.iter().map(|cue| (cue.time, cue.pauses == 1));
         stage.freeze_time == self.end
             && stage.cues as usize == self.cues.len()
             && self.cues.iter().copied().zip(listed).all(|(a, b)| a == b)

@@ -90,7 +90,7 @@ fn wait_for_stage(
     let mut agrees = None;
     while agrees.is_none() && began.elapsed() < START_TIMEOUT && !stop.load(Ordering::Relaxed) {
         feed.poll(READ_INTERVAL, &mut |event| match event {
-            FeedEvent::Stage(stage) => agrees = Some(facts.agree_with(stage)),
+            FeedEvent::Stage { stage, .. } => agrees = Some(facts.agree_with(stage)),
             FeedEvent::Frame { header, .. } => record.frame(header),
             _ => (),
         })?;

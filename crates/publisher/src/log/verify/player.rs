@@ -55,10 +55,9 @@ struct VerifiedCounts {
 impl Player {
     /// Creates the player of a scene.
     pub fn new(scene: &Scene, playback: Playback, same_arithmetic: bool) -> Result<Self, StartError> {
-        let motion = &scene.motion;
         let timeline = match scene.alerts {
-            Some(_) => motion.timeline(&mut |_| ()),
-            None => motion.timeline_without_contact(),
+            Some(_) => scene.timeline(&mut |_| ()),
+            None => scene.timeline_without_contact(),
         };
         let show = Show::new(scene, timeline, playback)?;
         let reference = Reference::of(scene);
@@ -334,7 +333,6 @@ fn listed(lines: &[Line]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::accuracy_of;
     use super::*;
     use bench_dragon_motion::solve::{Chain, Velocities};
     use bench_dragon_show::solve_at_or_just_before;
@@ -349,7 +347,7 @@ mod tests {
         let scene = Scene::parse(&text, "lock.toml", "lock").unwrap();
         let motion = &scene.motion;
         let lock = motion.timeline_without_contact().freeze(false).time;
-        let mut reference = Reference::new(motion, accuracy_of(&scene));
+        let mut reference = Reference::of(&scene);
         let mut solver = motion.solver(Velocities::Omitted).solver;
         let mut chain = Chain::new(motion.team().handles());
         let mut furthest: f64 = 0.0;

@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 use super::super::lines::SecondLine;
 use super::accuracy_of;
 use bench_dragon_messages::HandlePose;
+use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::scene::Scene;
@@ -22,8 +23,16 @@ const MOST_GROWTH: f64 = 1e6;
 /// The error of an angle in (-pi, pi] from arctangents and sums, radians.
 const ROUNDING_OF_ANGLES: f64 = 1e-14;
 
-/// The second solver of a scene, and the greatest distance from it so far.
+/// The second solver of a scene: one for each dragon.
 pub struct Reference {
+    /// By dragon: its first handle, and its solver.
+    parts: Vec<(usize, OneReference)>,
+}
+
+/// The second solver of a dragon, and the greatest distance from it so far.
+struct OneReference {
+    /// The dragon, if it is one of several: it tells its own time.
+    dragon: Option<Dragon>,
     solver: Box<dyn Solver>,
     chain: Chain,
     head_speed: f64,
@@ -37,37 +46,34 @@ pub struct Reference {
 impl Reference {
     /// Makes the second solver of a scene: `newton`, or the paper's rules for a scene that requests them.
     pub fn of(scene: &Scene) -> Self {
-        let motion = &scene.motion;
-        let other = match motion.method() {
-            Method::Paper(_) => motion.clone(),
-            _ => motion.with_method(Method::Newton).unwrap_or_else(|_| motion.clone()),
+        let Some(ensemble) = &scene.ensemble else {
+            return Self { parts: vec![(0, OneReference::new(None, scene.motion.clone()))] };
         };
-        Self::new(&other, accuracy_of(scene))
-    }
-
-    pub(super) fn new(motion: &Motion, accuracy: f64) -> Self {
-        Self {
-            solver: motion.solver(Velocities::Computed).solver,
-            chain: Chain::new(motion.team().handles()),
-            head_speed: motion.head_speed(),
-            placed: motion.placement().origin().coords.norm(),
-            accuracy,
-            worst: None,
-        }
+        let part = |(k, dragon): (usize, &Dragon)| {
+            (ensemble.handles_of(k).start, OneReference::new(Some(dragon.clone()), dragon.motion.clone()))
+        };
+        Self { parts: ensemble.dragons().iter().enumerate().map(part).collect() }
     }
 
     /// Compares the time of a line with the show's, and its handles with the second solver's.
     pub(super) fn compare(&mut self, line: &SecondLine, shown: f64) -> Result<(), String> {
         let time = line.sim_time;
         let apart = (time - shown).abs();
-        if apart.is_nan() || apart > EVENT_TIME + self.accuracy / self.head_speed + 8.0 * f64::EPSILON * shown {
+        let allowed = self.parts.iter().map(|(_, part)| part.accuracy / part.head_speed).fold(0.0, f64::max);
+        if apart.is_nan() || apart > EVENT_TIME + allowed + 8.0 * f64::EPSILON * shown {
             return Err(format!("its simulated time is {time} s, computed {shown} s"));
         }
         if line.handles.is_empty() {
             return Err(no_solution(time));
         }
-        self.solve(time)?;
-        line.handles.iter().try_for_each(|(handle, x, y)| self.compare_place(*handle as usize, time, *x, *y).map(drop))
+        for (first, part) in &mut self.parts {
+            let own_time = part.solve(time)?;
+            let handles = *first..*first + part.chain.handles();
+            for (handle, x, y) in line.handles.iter().filter(|of| handles.contains(&(of.0 as usize))) {
+                part.compare_place(*first, *handle as usize - *first, own_time, *x, *y)?;
+            }
+        }
+        Ok(())
     }
 
     /// Compares the position and the heading of every handle of a frame with those of the time `time`.
@@ -75,11 +81,46 @@ impl Reference {
     /// # Errors
     /// A sentence for the first handle outside of the tolerance.
     pub fn compare_frame(&mut self, time: f64, poses: &[HandlePose]) -> Result<(), String> {
-        if poses.len() != self.chain.handles() {
-            return Err(format!("it has {} handles, the scene {}", poses.len(), self.chain.handles()));
+        let handles: usize = self.parts.iter().map(|(_, part)| part.chain.handles()).sum();
+        if poses.len() != handles {
+            return Err(format!("it has {} handles, the scene {handles}", poses.len()));
         }
-        self.solve(time)?;
-        let places = poses.iter().enumerate().map(|(handle, pose)| self.compare_place(handle, time, pose.x, pose.y));
+        for (first, part) in &mut self.parts {
+            part.compare_frame(*first, time, &poses[*first..*first + part.chain.handles()])?;
+        }
+        Ok(())
+    }
+
+    /// Returns the greatest distance so far and its tolerance, metres; `None` before the first comparison.
+    pub fn worst(&self) -> Option<(f64, f64)> {
+        let worst = self.parts.iter().filter_map(|(_, part)| part.worst);
+        worst.max_by(|one, other| one.0.total_cmp(&other.0))
+    }
+}
+
+impl OneReference {
+    fn new(dragon: Option<Dragon>, motion: Motion) -> Self {
+        let accuracy = accuracy_of(&motion);
+        let other = match motion.method() {
+            Method::Paper(_) => motion,
+            _ => motion.with_method(Method::Newton).unwrap_or(motion),
+        };
+        Self {
+            dragon,
+            solver: other.solver(Velocities::Computed).solver,
+            chain: Chain::new(other.team().handles()),
+            head_speed: other.head_speed(),
+            placed: other.placement().origin().coords.norm(),
+            accuracy,
+            worst: None,
+        }
+    }
+
+    /// Compares a frame's handles of this dragon, of which `first` is the number of the first.
+    fn compare_frame(&mut self, first: usize, time: f64, poses: &[HandlePose]) -> Result<(), String> {
+        let own_time = self.solve(time)?;
+        let places = poses.iter().enumerate();
+        let places = places.map(|(handle, pose)| self.compare_place(first, handle, own_time, pose.x, pose.y));
         let tolerances: Vec<f64> = places.collect::<Result<_, _>>()?;
         for (handle, HandlePose { heading, .. }) in poses.iter().enumerate() {
             // The last handle has the last bench's heading.
@@ -90,23 +131,20 @@ impl Reference {
             if turned.is_nan() || turned.abs() > allowed {
                 return Err(format!(
                     "the heading of handle {}, counted from 1, is {turned:.1e} rad from newton's, more than {allowed:.1e} rad",
-                    handle + 1
+                    first + handle + 1
                 ));
             }
         }
         Ok(())
     }
 
-    /// Returns the greatest distance so far and its tolerance, metres; `None` before the first comparison.
-    pub fn worst(&self) -> Option<(f64, f64)> {
-        self.worst
-    }
-
-    fn solve(&mut self, time: f64) -> Result<(), String> {
+    /// Solves the dragon for a time of the show, and returns the time of its own motion.
+    fn solve(&mut self, time: f64) -> Result<f64, String> {
+        let own_time = self.dragon.as_ref().map_or(time, |dragon| dragon.own_time(time).0);
         let solved = time.is_finite()
             && time >= 0.0
-            && solve_at_or_just_before(self.solver.as_mut(), time, &mut self.chain).is_ok();
-        if solved { Ok(()) } else { Err(no_solution(time)) }
+            && solve_at_or_just_before(self.solver.as_mut(), own_time, &mut self.chain).is_ok();
+        if solved { Ok(own_time) } else { Err(no_solution(time)) }
     }
 
     /// Returns the metres between the holes of a bench.
@@ -116,14 +154,14 @@ impl Reference {
     }
 
     /// Compares the place of a handle with the solution. Returns the tolerance in metres.
-    fn compare_place(&mut self, handle: usize, time: f64, x: f64, y: f64) -> Result<f64, String> {
+    fn compare_place(&mut self, first: usize, handle: usize, time: f64, x: f64, y: f64) -> Result<f64, String> {
         let place = self.chain.x.get(handle).zip(self.chain.y.get(handle));
         let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| (x - own_x).hypot(y - own_y));
         // Both solutions have rounding errors.
         let rounding = 8.0 * f64::EPSILON * (x.hypot(y) + self.head_speed * time + self.placed);
         let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, handle);
         if metres.is_nan() || metres > tolerance {
-            let handle = handle + 1;
+            let handle = first + handle + 1;
             return Err(format!(
                 "handle {handle}, counted from 1, is {metres:.1e} m from newton's place, more than {tolerance:.1e} m"
             ));

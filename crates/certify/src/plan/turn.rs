@@ -1,0 +1,235 @@
+//! The least turn radius, enclosed: with every radius up to the lower number a link stalls or locks or boards overlap,
+//! with the upper number none of these happens.
+//!
+//! In: a team, a pitch, the ratio of the arcs. Out: the two numbers. "The least turn" in `docs/proofs.md` has the proof.
+//! The ordinary search ([`super::turn_trial`]) only suggests where to search.
+
+use super::PlanError;
+use super::turn_trial::{Family, Witness};
+use crate::turn::{Passage, Turns};
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::model::team::Team;
+use bench_dragon_show::scene::Accepted;
+
+/// The least radius of a turnaround with which a team turns round: the head comes in from any distance, and until the
+/// last handle has left the turn no two boards touch that share no handle, and no link stalls or locks. Radii above
+/// `value_hi` are not covered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeastTurn {
+    /// Lower bound, metres: with every radius from `from` up to this, a link stalls or locks or two boards overlap.
+    /// Equal to `from` if this is shown for no radius.
+    pub value_lo: f64,
+    /// Upper bound, metres: with this radius the team turns round. `None` if this is shown for no radius.
+    pub value_hi: Option<f64>,
+    /// Metres of the S with the radius `value_hi`.
+    pub length: Option<f64>,
+    /// The least radius that is tested, metres.
+    pub from: f64,
+    /// The radius of the first arc over that of the second.
+    pub arc_ratio: f64,
+    /// The event with the radius `value_lo`; `None` if nothing is shown.
+    pub limit: Option<TurnLimit>,
+    /// True if `value_lo` and `value_hi` are within 1e-8 m. Otherwise the search was given up.
+    pub proved: bool,
+    /// Number of intervals into which the radii from `from` to `value_lo` are divided.
+    pub intervals: u64,
+    /// Metres of path before and after the S that the proof for `value_hi` covers.
+    pub leads: Option<[f64; 2]>,
+}
+
+/// The event that keeps the turn from being smaller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnLimit {
+    /// A contact, a stall or a lock.
+    pub kind: EventKind,
+    /// The bench that stalls or locks, or the one of two that is nearer the head, counted from 0.
+    pub bench_a: u32,
+    /// The other of two benches that touch.
+    pub bench_b: Option<u32>,
+    /// Metres of path past the beginning of the S: of the rear handle of a lock, the front handle of a stall, the head
+    /// at a contact. Negative before the S.
+    pub past: f64,
+}
+
+/// Distance of the two numbers in metres, with room for rounding.
+const WIDTH: f64 = 9e-9;
+
+/// Multiples of [`WIDTH`] that are tried. Next to a lock the follower is so fast that doubles cannot resolve its way, and
+/// the proof needs a greater distance from the lock.
+const FURTHER: [f64; 6] = [1.0, 4.0, 16.0, 64.0, 256.0, 4096.0];
+
+/// Limit of intervals of radii.
+const MOST_INTERVALS: u64 = 200_000;
+
+/// Length of an interval in metres, at least and at first; the factors after an interval that is shown and one that is
+/// not.
+const LEAST_INTERVAL: f64 = 1e-11;
+const FIRST_INTERVAL: f64 = 1e-3;
+const GROWTH: f64 = 1.5;
+const SHRINK: f64 = 0.5;
+
+/// Share of a radius within which a better ratio must be better, and the steps of the ratio's logarithm.
+const BETTER: f64 = 1e-7;
+const FIRST_RATIO_STEP: f64 = 0.7;
+const LEAST_RATIO_STEP: f64 = 2e-3;
+
+/// Encloses the least turn radius of a team on spirals of a pitch, with arcs of a ratio, or with the best ratio that the
+/// search finds if there is none. `progress` receives the share of the work that is done, from 0 to 1.
+///
+/// # Errors
+/// The team turns round with the least radius that is tested, or its boards overlap on a straight line.
+pub fn least_turn(
+    team: &Team,
+    pitch: f64,
+    arc_ratio: Option<f64>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<LeastTurn, PlanError> {
+    if team.benches >= 3 && 2.0 * team.hole_inset >= team.link(1) {
+        return Err(PlanError(format!(
+            "the team turns round with no radius: a bench is as long as two insets or shorter ({} m between its \
+             holes), so that the boards before and after it overlap even on a straight line",
+            team.link(1)
+        )));
+    }
+    let family = Family { team, pitch, arc_ratio: arc_ratio.unwrap_or(1.0) };
+    let family = if arc_ratio.is_none() { best(family) } else { family };
+    let from = Accepted::LENGTH.least;
+    let Some(witness) = family.event(from) else {
+        return Err(PlanError(format!(
+            "the team turns round with a turn radius of {from} m already, the least that is tested"
+        )));
+    };
+    let mut blocked = Blocked { family, radius: from, witness, intervals: 0, shown: None };
+    blocked.extend(&mut |share| progress(0.5 * share));
+    let Blocked { radius: value_lo, intervals, shown, .. } = blocked;
+    let upper = value_lo + WIDTH;
+    let mut found = LeastTurn {
+        value_lo,
+        value_hi: None,
+        length: None,
+        from,
+        arc_ratio: family.arc_ratio,
+        limit: shown.map(|witness| limit(&family, value_lo, &witness)),
+        proved: false,
+        intervals,
+        leads: None,
+    };
+    if intervals == 0 || upper > Accepted::LENGTH.greatest || family.event(upper).is_some() {
+        return Ok(found);
+    }
+    for further in FURTHER {
+        let upper = value_lo + further * WIDTH;
+        let Some(passage) = Passage::new(team, (pitch, family.arc_ratio), upper) else { break };
+        if passage.is_free(team, &mut |share| progress(0.5 + 0.5 * share)) {
+            found.value_hi = Some(upper);
+            found.length = Some(family.length(upper));
+            found.leads = Some([passage.lead_in, passage.lead_out]);
+            found.proved = upper - value_lo <= 1e-8;
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// Returns the family with the best ratio that the ordinary search finds.
+fn best(family: Family<'_>) -> Family<'_> {
+    let (mut best, mut step) = (family, FIRST_RATIO_STEP);
+    let mut radius = best.radius();
+    while step > LEAST_RATIO_STEP {
+        let better = [step, -step].into_iter().find_map(|by| {
+            let arc_ratio = (1e3 * best.arc_ratio * by.exp()).round() / 1e3;
+            let Accepted { least, greatest, .. } = Accepted::ARC_RATIO;
+            let other = Family { arc_ratio: arc_ratio.clamp(least, greatest), ..best };
+            other.event(radius * (1.0 - BETTER)).is_none().then_some(other)
+        });
+        match better {
+            Some(other) => (best, radius) = (other, other.radius().min(radius)),
+            None => step *= 0.5,
+        }
+    }
+    best
+}
+
+fn limit(family: &Family<'_>, radius: f64, witness: &Witness) -> TurnLimit {
+    let past = family.past(radius, witness.place());
+    match *witness {
+        Witness::Fold { kind, link, .. } => TurnLimit { kind, bench_a: link as u32, bench_b: None, past },
+        Witness::Overlap { pair, .. } => {
+            TurnLimit { kind: EventKind::Contact, bench_a: pair.0, bench_b: Some(pair.1), past }
+        }
+    }
+}
+
+/// An interval of radii with which the team is proved not to turn round.
+struct Blocked<'a> {
+    family: Family<'a>,
+    /// The greatest radius that is proved.
+    radius: f64,
+    witness: Witness,
+    intervals: u64,
+    /// The witness of the last interval.
+    shown: Option<Witness>,
+}
+
+impl Blocked<'_> {
+    /// Extends the interval as far as can be shown. `progress` receives the share that is done.
+    fn extend(&mut self, progress: &mut dyn FnMut(f64)) {
+        let longest = self.family.team.longest_link();
+        let mut width = FIRST_INTERVAL;
+        while self.intervals < MOST_INTERVALS && self.radius < Accepted::LENGTH.greatest {
+            if !self.holds(width) {
+                let same = self.family.follow(self.radius, &self.witness);
+                let next = self.widest(same, width, LEAST_INTERVAL).or_else(|| {
+                    // The event may have gone, and another one remain a little further on.
+                    let others = self.family.events(self.radius + WIDTH);
+                    self.widest(others, FIRST_INTERVAL, WIDTH)
+                });
+                let Some(next) = next else { break };
+                width = next;
+            }
+            self.radius += width;
+            self.shown = Some(self.witness);
+            self.intervals += 1;
+            width *= GROWTH;
+            progress(self.radius / (self.radius + longest));
+        }
+    }
+
+    /// Takes the witness with the widest interval of at most `width` and at least `least` metres, and returns its width.
+    fn widest(&mut self, witnesses: Vec<Witness>, width: f64, least: f64) -> Option<f64> {
+        let (before, mut best) = (self.witness, None);
+        let mut widest = least;
+        for witness in witnesses {
+            self.witness = witness;
+            let mut next = width;
+            while next > widest && !self.holds(next) {
+                next *= SHRINK;
+            }
+            if next > widest {
+                (best, widest) = (Some(witness), next);
+            }
+            if widest == width {
+                break;
+            }
+        }
+        self.witness = best.unwrap_or(before);
+        best.map(|_| widest)
+    }
+
+    /// Returns true if the event is proved for all radii up to `width` further on.
+    fn holds(&self, width: f64) -> bool {
+        let Family { team, pitch, arc_ratio } = self.family;
+        let radii = [self.radius, self.radius + width];
+        let [Some(first), Some(last)] = radii.map(|radius| self.family.path(radius)) else { return false };
+        let turns = |ends| Turns::new(team, (pitch, arc_ratio), radii, ends);
+        match &self.witness {
+            Witness::Fold { link, pivot, end, .. } => turns([first, last]).fold(*link, *pivot, *end),
+            Witness::Overlap { pair, head, .. } => {
+                turns([first, last]).overlap(*head, [pair.0 as usize, pair.1 as usize])
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

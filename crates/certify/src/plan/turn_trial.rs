@@ -1,0 +1,274 @@
+//! Events of a team on turnarounds of one pitch and arc ratio, found by the ordinary search, which samples. They suggest
+//! to the proofs of [`crate::turn`] where to search.
+
+use crate::grid::{param, place};
+use crate::path::Place;
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::contact::ConservativeAdvancement;
+use bench_dragon_motion::event::{Budget, Event};
+use bench_dragon_motion::linkage::follower;
+use bench_dragon_motion::model::curve::Coordinate;
+use bench_dragon_motion::model::path::{Param, Path};
+use bench_dragon_motion::model::root::{bisect_predicate, golden_section_min};
+use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::singularities::Singularities;
+use bench_dragon_show::scene::Accepted;
+
+/// Turns outside the turn or the longest link at which a trial of the links starts, and lengths of the longest link
+/// after the turn at which it ends.
+const TURNS_BEFORE: f64 = 2.0;
+const LINKS_AFTER: f64 = 6.0;
+
+/// Turns outside the turn at which a trial of the boards starts.
+const BOARDS_BEFORE: f64 = 3.0;
+
+/// Work for one trial, in units of [`Budget`]: some seconds.
+const TRIAL_BUDGET: u64 = 20_000_000;
+
+/// Coordinate of a pivot just behind a junction, radians.
+const BESIDE_JUNCTION: f64 = 1e-13;
+
+/// Distances from an event, in links, within which a pivot is searched for; the number of places that are tried; and
+/// the share of a fold's depth that a pivot keeps off the ends of the S.
+const REACHES: [f64; 4] = [0.5, 0.1, 0.01, 1e-3];
+const OFFSETS: i32 = 48;
+const ASIDE: f64 = 0.05;
+
+/// Steps between two handles in which the distance is followed.
+const STEPS: u32 = 64;
+
+/// Distance from the last contact, in links, within which the same two boards are followed.
+const WINDOW: f64 = 0.3;
+
+/// Greatest share of the depth of a fold by which the end of its stretch is beyond the other handle, and the number of
+/// halvings that are tried.
+const BEYOND: f64 = 0.25;
+const BEYOND_TRIALS: i32 = 12;
+
+/// The turnarounds of a team with one pitch and one ratio of the arcs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Family<'a> {
+    pub team: &'a Team,
+    pub pitch: f64,
+    pub arc_ratio: f64,
+}
+
+/// An event, as a proof needs it.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Witness {
+    /// One handle of a link at a pivot, the other one before `end` and on the wrong side of the pivot's normal.
+    Fold { kind: EventKind, link: usize, pivot: Place, end: Place },
+    /// Two boards that overlap with the head at a place.
+    Overlap { pair: (u32, u32), head: Place },
+}
+
+impl Witness {
+    /// Returns the place of the pivot or of the head.
+    pub fn place(&self) -> Place {
+        match *self {
+            Self::Fold { pivot, .. } => pivot,
+            Self::Overlap { head, .. } => head,
+        }
+    }
+}
+
+impl Family<'_> {
+    /// Returns the turnaround with a radius. The head is at distance 0 where the S begins; both spirals are endless.
+    pub fn path(&self, radius: f64) -> Option<Path> {
+        self.path_between(radius, 0.0, 1e3 * self.team.longest_link())
+    }
+
+    fn path_between(&self, radius: f64, lead_in: f64, lead_out: f64) -> Option<Path> {
+        Path::turnaround(self.pitch, radius, self.arc_ratio, lead_in, lead_out).ok()
+    }
+
+    /// Returns the metres of the S.
+    pub fn length(&self, radius: f64) -> f64 {
+        let a = self.pitch / std::f64::consts::TAU;
+        2.0 * radius.hypot(a) * (radius / a).atan()
+    }
+
+    /// Returns the metres of path from the beginning of the S to a place.
+    pub fn past(&self, radius: f64, at: Place) -> f64 {
+        self.path(radius).map_or(f64::NAN, |path| path.travelled(param(at)))
+    }
+
+    /// Returns an event with this radius, if the search finds one.
+    pub fn event(&self, radius: f64) -> Option<Witness> {
+        self.folds(radius).first().copied().or_else(|| self.touch(radius))
+    }
+
+    /// Returns the events with this radius that the search finds: the folds, or else boards that overlap.
+    pub fn events(&self, radius: f64) -> Vec<Witness> {
+        let folds = self.folds(radius);
+        if folds.is_empty() { self.touch(radius).into_iter().collect() } else { folds }
+    }
+
+    /// Returns the least radius that the search finds, to some digits, if that radius is near the first free one.
+    pub fn radius(&self) -> f64 {
+        let free = |blocked: &dyn Fn(f64) -> bool, from: f64| {
+            let mut to = from.max(self.team.longest_link());
+            while blocked(to) && to < Accepted::LENGTH.greatest {
+                to *= 2.0;
+            }
+            bisect(|radius| !blocked(radius), from, to)
+        };
+        let without_fold = free(&|radius| !self.folds(radius).is_empty(), Accepted::LENGTH.least);
+        let beyond = without_fold * (1.0 + 1e-7);
+        if self.touch(beyond).is_none() { without_fold } else { free(&|radius| self.event(radius).is_some(), beyond) }
+    }
+
+    /// Returns the metres of the spiral between two distances from the centre.
+    fn spiral_between(&self, inner: f64, outer: f64) -> f64 {
+        let length = |radius: f64| Path::spiral(self.pitch, radius / self.pitch).length();
+        length(outer) - length(inner)
+    }
+
+    /// Returns the first stall and the lock with this radius, with several pivots each.
+    pub fn folds(&self, radius: f64) -> Vec<Witness> {
+        let team = Team { benches: self.team.benches.min(2), ..*self.team };
+        let longest = team.longest_link();
+        let lead_in = self.spiral_between(radius, radius.max(longest) + TURNS_BEFORE * self.pitch);
+        let Some(path) = self.path_between(radius, lead_in, team.length() + LINKS_AFTER * longest) else {
+            return Vec::new();
+        };
+        let found = Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| ()));
+        let lock = found.end.filter(|end| end.kind == EventKind::Lock);
+        let witness = |event: Event| {
+            let link = event.bench_a? as usize;
+            // Rounding may leave no follower in the last digits before a lock.
+            let pivot = (0..40).find_map(|power| {
+                let mut handle = path.param_at(event.travelled - 1e-14 * (1.0 + event.travelled) * 2f64.powi(power));
+                let handles = if event.kind == EventKind::Lock { link + 1 } else { link };
+                for bench in 0..handles {
+                    handle = follower(&path, handle, team.link(bench)).ok()?;
+                }
+                Some(handle)
+            })?;
+            let near = path.travelled(pivot) - lead_in;
+            Some(REACHES.map(|reach| self.pivoted(radius, (event.kind, link), near, reach * team.link(link))))
+        };
+        let witnesses = found.stall.into_iter().chain(lock).filter_map(witness);
+        witnesses.flatten().flatten().collect()
+    }
+
+    /// Returns the fold with the deepest pivot within a distance of a place, both metres along the path, the place from
+    /// the beginning of the S.
+    fn pivoted(&self, radius: f64, (kind, link): (EventKind, usize), near: f64, reach: f64) -> Option<Witness> {
+        let path = self.path(radius)?;
+        let length = self.team.link(link);
+        let folded = |pivot: Param| Folded::new(&path, kind, length, pivot);
+        let depth = |pivot: Param| folded(pivot).map_or(f64::INFINITY, |folded| folded.merit);
+        let better = |one: (f64, Param), other: Param| {
+            let merit = depth(other);
+            if merit < one.0 { (merit, other) } else { one }
+        };
+        let at = |travelled: f64| path.param_at(travelled);
+        let offsets = (0..OFFSETS).map(|power| reach * 10f64.powf(-0.25 * f64::from(power)));
+        let first = (depth(at(near)), at(near));
+        let coarse = offsets.flat_map(|by| [at(near + by), at(near - by)]).fold(first, better);
+        let (from, by) = (path.travelled(coarse.1), 0.5 * (path.travelled(coarse.1) - near).abs());
+        let (_, finer) = golden_section_min(|travelled| depth(at(travelled)), from - by, from + by);
+        let junctions = [1, 2].map(|segment| Param::new(segment, Coordinate { high: BESIDE_JUNCTION, low: 0.0 }));
+        let junctions = junctions.into_iter().filter(|junction| (path.travelled(*junction) - near).abs() < reach);
+        let (merit, pivot) = junctions.chain([at(finer)]).fold(coarse, better);
+        // The ends of the S move as the radius grows: a pivot keeps off them.
+        let aside = ASIDE * merit.abs();
+        let beside = [0.0, self.length(radius)].into_iter().find(|end| (path.travelled(pivot) - end).abs() < aside);
+        let (merit, pivot) = beside.map_or((merit, pivot), |end| {
+            let [before, after] = [at(end - aside), at(end + aside)];
+            better((depth(before), before), after)
+        });
+        let end = folded(pivot)?.end;
+        (merit < 0.0).then(|| Witness::Fold { kind, link, pivot: place(pivot), end: place(end) })
+    }
+
+    /// Returns two boards that overlap with this radius, at their deepest.
+    fn touch(&self, radius: f64) -> Option<Witness> {
+        let team = self.team;
+        let outer = radius.max(team.longest_link()) + BOARDS_BEFORE * self.pitch;
+        let lead_in = self.spiral_between(radius, outer);
+        let path = self.path_between(radius, lead_in, team.length())?;
+        let advancement = ConservativeAdvancement::new(&path, team, &[], &[]);
+        let mut unreported = |_| {};
+        let mut budget = Budget::new(TRIAL_BUDGET, &mut unreported);
+        let least = advancement.least_clearance(0.0, path.length(), &mut budget).ok()?.value?;
+        let head = place(path.param_at(least.travelled));
+        (least.value <= 0.0).then_some(Witness::Overlap { pair: (least.bench_a, least.bench_b), head })
+    }
+
+    /// Returns the same event with another radius, with several pivots.
+    pub fn follow(&self, radius: f64, witness: &Witness) -> Vec<Witness> {
+        let past = self.past(radius, witness.place());
+        match *witness {
+            Witness::Fold { kind, link, .. } => {
+                let pivoted = |reach| self.pivoted(radius, (kind, link), past, reach * self.team.link(link));
+                REACHES.into_iter().filter_map(pivoted).collect()
+            }
+            Witness::Overlap { pair, .. } => self.deepest(radius, pair, past).into_iter().collect(),
+        }
+    }
+
+    /// Returns the deepest overlap of two boards, or of others near them, with the head near a place, metres past the
+    /// beginning of the S.
+    fn deepest(&self, radius: f64, (a, b): (u32, u32), past: f64) -> Option<Witness> {
+        let window = WINDOW * self.team.shortest_link();
+        let lead_in = self.spiral_between(radius, radius.max(self.team.longest_link()) + BOARDS_BEFORE * self.pitch);
+        let path = self.path_between(radius, lead_in, self.team.length())?;
+        let advancement = ConservativeAdvancement::new(&path, self.team, &[], &[]);
+        let at = (lead_in + past).clamp(0.0, path.length());
+        let parts = [((at - window).max(0.0), at), (at, (at + window).min(path.length()))];
+        let others = [(a, b), (a, b + 1), (a, b.saturating_sub(1).max(a + 2)), (a + 1, b + 1)];
+        let pairs = others.into_iter().filter(|pair| (pair.1 as usize) < self.team.benches);
+        let found = pairs.flat_map(|pair| parts.map(|(from, to)| (pair, advancement.minimum_of(pair, from, to))));
+        let (pair, (clearance, travelled)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
+        let head = place(path.param_at(travelled));
+        (clearance < 0.0).then_some(Witness::Overlap { pair, head })
+    }
+}
+
+/// Relative precision of the radii that the search compares.
+const SEARCH_PRECISION: f64 = 1e-6;
+
+/// Returns the least number within `low..=high` where a predicate holds, to some digits.
+fn bisect(holds: impl Fn(f64) -> bool, low: f64, high: f64) -> f64 {
+    let (mut inside, mut outside) = (low, high);
+    while outside - inside > SEARCH_PRECISION * outside {
+        let middle = 0.5 * (inside + outside);
+        if holds(middle) { outside = middle } else { inside = middle }
+    }
+    outside
+}
+
+/// A link with one handle at a pivot.
+struct Folded {
+    /// A place beyond the other handle, but not so far that the product changes its sign.
+    end: Param,
+    /// Product of the pivot's tangent and the link, metres. If it is negative, the link has stalled or locked, and the
+    /// number is no less than minus a multiple of the metres by which `end` is further than the link from the pivot.
+    merit: f64,
+}
+
+impl Folded {
+    /// Creates the link with its rear handle (of a lock) or its front handle (of a stall) at a pivot.
+    fn new(path: &Path, kind: EventKind, link: f64, pivot: Param) -> Option<Self> {
+        let (point, tangent) = (path.point(pivot), path.tangent(pivot));
+        let distance = |travelled: f64| (path.point(path.param_at(travelled)) - point).norm();
+        let (other, forward) = if kind == EventKind::Lock {
+            let from = path.travelled(pivot);
+            let reached = |metres: f64| distance(from + metres) >= link;
+            let step = link / f64::from(STEPS);
+            let first = (1..64 * STEPS).map(|k| step * f64::from(k)).find(|metres| reached(*metres))?;
+            (from + bisect_predicate(reached, first - step, first), 1.0)
+        } else {
+            (path.travelled(follower(path, pivot, link).ok()?), -1.0)
+        };
+        let product = forward * tangent.dot(&(path.point(path.param_at(other)) - point));
+        // The distance may fall again beyond.
+        let places = (0..BEYOND_TRIALS).map(|power| other + forward * BEYOND * product.abs() * 0.5f64.powi(power));
+        let end = places.max_by(|one, other| distance(*one).total_cmp(&distance(*other)))?;
+        let room = (distance(end) - link) / BEYOND;
+        let merit = if product < 0.0 { product.max(-room) } else { product };
+        Some(Self { end: path.param_at(end), merit })
+    }
+}

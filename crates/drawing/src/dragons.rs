@@ -1,0 +1,112 @@
+//! The dragons of a picture: one, coloured by speed, or several, each with its own colour and its name.
+
+use super::benches;
+use super::camera::StageBox;
+use super::palette::{Palette, SERIES};
+use bench_dragon_messages::Roster;
+use bench_dragon_motion::Motion;
+use bench_dragon_motion::ensemble::{Dragon, Ensemble};
+use bench_dragon_motion::model::board::Board;
+use bench_dragon_motion::solve::Chain;
+
+/// The dragons of a picture, in the order of their handles.
+pub struct Dragons<'a> {
+    drawn: Vec<Drawn<'a>>,
+    /// The names of benches.
+    pub roster: Roster,
+}
+
+/// A dragon of a picture.
+pub struct Drawn<'a> {
+    /// Its name; empty if it is the only one.
+    pub name: &'a str,
+    /// The number of its first handle.
+    pub first: usize,
+    /// Its motion.
+    pub motion: &'a Motion,
+}
+
+impl<'a> Dragons<'a> {
+    /// Creates the only dragon of a picture.
+    pub fn one(motion: &'a Motion) -> Self {
+        Self::new(vec![Drawn { name: "", first: 0, motion }])
+    }
+
+    /// Creates the dragons of a show of several.
+    pub fn several(ensemble: &'a Ensemble) -> Self {
+        let drawn = |(k, dragon): (usize, &'a Dragon)| Drawn {
+            name: &dragon.name,
+            first: ensemble.handles_of(k).start,
+            motion: &dragon.motion,
+        };
+        Self::new(ensemble.dragons().iter().enumerate().map(drawn).collect())
+    }
+
+    fn new(drawn: Vec<Drawn<'a>>) -> Self {
+        let obstacles = drawn[0].motion.ground().obstacles().iter().map(|obstacle| obstacle.name.clone());
+        let dragons = drawn.iter().map(|of| (of.name.to_owned(), of.motion.team().benches as u32));
+        let roster = Roster::new(dragons.collect(), obstacles.collect());
+        Self { drawn, roster }
+    }
+
+    /// Returns the dragons.
+    pub fn all(&self) -> &[Drawn<'a>] {
+        &self.drawn
+    }
+
+    /// Returns the first dragon.
+    pub fn first(&self) -> &'a Motion {
+        self.drawn[0].motion
+    }
+
+    /// Returns true if there are several.
+    pub fn are_several(&self) -> bool {
+        self.drawn.len() > 1 || !self.drawn[0].name.is_empty()
+    }
+
+    /// Returns the boards of a chain that may have a part in a box, by the numbers of their benches.
+    pub fn seen(&self, chain: &Chain, view: &StageBox) -> Vec<(usize, Board)> {
+        let seen = |of: &Drawn| benches::seen(of.motion.team(), chain, of.first, view);
+        self.drawn.iter().flat_map(seen).collect()
+    }
+
+    /// Returns the dragon of a bench, and its number in the order of the dragons.
+    pub fn owner(&self, bench: usize) -> (usize, &Drawn<'a>) {
+        let owner = self.drawn.partition_point(|of| of.first <= bench) - 1;
+        (owner, &self.drawn[owner])
+    }
+
+    /// Returns true for the head of a dragon.
+    pub fn is_head(&self, bench: usize) -> bool {
+        self.owner(bench).1.first == bench
+    }
+
+    /// Returns true for the tail of a dragon.
+    pub fn is_tail(&self, bench: usize) -> bool {
+        let of = self.owner(bench).1;
+        let benches = of.motion.team().benches;
+        benches > 1 && bench == of.first + benches - 1
+    }
+
+    /// Returns the colour of a bench's dragon, if there are several.
+    pub fn colour(&self, bench: usize, palette: &Palette) -> Option<&'static str> {
+        let (light, dark) = SERIES[self.owner(bench).0 % SERIES.len()];
+        let is_light = palette.ground == super::palette::LIGHT.ground;
+        self.are_several().then_some(if is_light { light } else { dark })
+    }
+
+    /// Returns the name of a bench in the picture: for heads, tails, and touching benches if they are few.
+    pub fn label(&self, bench: usize, outlined: &[usize]) -> Option<String> {
+        let concerned = outlined.len() <= 4 && outlined.contains(&bench);
+        let of = self.owner(bench).1;
+        let number = bench - of.first + 1;
+        let words = match number {
+            1 if concerned => "head (bench 1)".to_owned(),
+            1 => "head".to_owned(),
+            _ if concerned => format!("bench {number}"),
+            _ if number == of.motion.team().benches => "tail".to_owned(),
+            _ => return None,
+        };
+        Some(if of.name.is_empty() { words } else { format!("{words} of {}", of.name) })
+    }
+}

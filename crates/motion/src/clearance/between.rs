@@ -1,0 +1,267 @@
+//! The nearest two boards of different dragons of a frame.
+//!
+//! In: the chain of all dragons on the stage, and the clearance of the nearest two boards found so far. Out: a nearer
+//! pair, if there is one. The show calls it if a scene has several dragons and alerts.
+//!
+//! The broad phase is that of [`super::search`]: every bench carries from frame to frame a lower bound of its distance to
+//! the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A bench is tested
+//! again only when its bound comes within the limit. The box about each dragon gives a wide bound to benches that are far
+//! from all others; among the others a grid finds the near ones.
+
+use super::grid::Grid;
+use super::{Nearest, PairClearance, board, circle_radius, corner_reach};
+use crate::model::board::Board;
+use crate::model::separation::{separation_board_board, signed_distance_board_board};
+use crate::model::team::Team;
+use crate::model::{Point, Vector};
+use crate::solve::Chain;
+
+/// Metres that a bound reaches beyond the limit at most, if others are near.
+const SKIN: f64 = 0.5;
+
+/// Metres of approach after which all bounds are computed again, so that their rounding stays within its allowance.
+const MOST_MOVED: f64 = 100.0;
+
+/// Margin for rounding: metres, and as a share of the coordinates.
+const ROUNDING: (f64, f64) = (1e-9, 1e-12);
+
+/// The board of no bench.
+const NO_BOARD: Board =
+    Board { centre: Point::new(0.0, 0.0), axis: Vector::new(1.0, 0.0), half_length: 0.0, half_width: 0.0 };
+
+/// A dragon of the frame.
+#[derive(Debug, Clone)]
+struct Part {
+    team: Team,
+    first: usize,
+    /// The box about its handles: left, right, low, high.
+    bounds: [f64; 4],
+}
+
+impl Part {
+    fn benches(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.team.benches
+    }
+
+    fn board(&self, chain: &Chain, bench: usize) -> Board {
+        board(chain, &self.team, bench)
+    }
+
+    fn enclose(&mut self, chain: &Chain) {
+        let handles = self.first..self.first + self.team.handles();
+        let least = |numbers: &[f64]| numbers.iter().fold(f64::INFINITY, |a, b| if *b < a { *b } else { a });
+        let most = |numbers: &[f64]| numbers.iter().fold(f64::NEG_INFINITY, |a, b| if *b > a { *b } else { a });
+        let (x, y) = (&chain.x[handles.clone()], &chain.y[handles]);
+        self.bounds = [least(x), most(x), least(y), most(y)];
+    }
+
+    /// Returns the metres from a place to the box; 0 inside.
+    fn distance(&self, x: f64, y: f64) -> f64 {
+        let [left, right, low, high] = self.bounds;
+        let (dx, dy) = ((left - x).max(x - right).max(0.0), (low - y).max(y - high).max(0.0));
+        (dx * dx + dy * dy).sqrt()
+    }
+}
+
+/// Finds the nearest two boards of different dragons. All memory is reserved by the constructor.
+#[derive(Debug, Clone)]
+pub struct BetweenMonitor {
+    parts: Vec<Part>,
+    /// Metres by which a dragon's points may be outside the box about its handles, and the radius of the largest board.
+    beyond: f64,
+    /// Greatest approach of two boards per metre of displacement of their handles.
+    reach: f64,
+    /// The handles of the previous frame.
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Greatest approach of two boards since the beginning, metres.
+    closed: f64,
+    /// By bench: a bound plus the value of `closed` when the bound was made; infinite where there is no bench.
+    sums: Vec<f64>,
+    grid: Grid,
+    /// By bench: its board in this frame, once the grid is filled, and the radius of the circle about it.
+    boards: Vec<(Board, f64)>,
+    last_pair: Option<(usize, usize)>,
+    tested: u64,
+}
+
+impl BetweenMonitor {
+    /// Creates a monitor for chains of these teams, one behind the other. The error of every link must be at most
+    /// `link_error` metres.
+    pub fn new(teams: &[Team], link_error: f64) -> Self {
+        let mut first = 0;
+        let mut part = |team: &Team| {
+            let part = Part { team: *team, first, bounds: [0.0; 4] };
+            first += team.handles();
+            part
+        };
+        let parts: Vec<Part> = teams.iter().map(&mut part).collect();
+        let most =
+            |of: fn(&Team, usize) -> f64| teams.iter().map(|team| of(team, 0).max(of(team, 1))).fold(0.0, f64::max);
+        let shortest = teams.iter().map(Team::shortest_link).fold(f64::INFINITY, f64::min);
+        Self {
+            beyond: most(circle_radius) + link_error,
+            reach: 2.0 * most(corner_reach) * (1.0 + 2.0 * link_error / shortest),
+            x: vec![0.0; first],
+            y: vec![0.0; first],
+            closed: f64::INFINITY,
+            sums: vec![f64::INFINITY; first],
+            grid: Grid::new(first),
+            boards: vec![(NO_BOARD, 0.0); first],
+            last_pair: None,
+            tested: 0,
+            parts,
+        }
+    }
+
+    /// Returns the pairs of boards tested so far.
+    pub fn pairs_tested(&self) -> u64 {
+        self.tested
+    }
+
+    /// Returns the nearest two boards of different dragons if they are nearer than `limit` metres.
+    pub fn nearest(&mut self, chain: &Chain, limit: f64) -> Option<PairClearance> {
+        self.follow(chain);
+        let mut nearest = Nearest { value: limit, ..Nearest::NONE };
+        if let Some((a, b)) = self.last_pair {
+            self.test(chain, &mut nearest, (a, b));
+        }
+        let mut filled = false;
+        for k in 0..self.parts.len().saturating_sub(1) {
+            let benches = self.parts[k].benches();
+            let within = |sum: f64, nearest: &Nearest, closed: f64| sum <= nearest.value + closed + 1e-8;
+            for start in benches.clone().step_by(64) {
+                let stop = benches.end.min(start + 64);
+                let least = self.sums[start..stop].iter().fold(f64::INFINITY, |a, b| if *b < a { *b } else { a });
+                if !within(least, &nearest, self.closed) {
+                    continue;
+                }
+                for a in start..stop {
+                    if within(self.sums[a], &nearest, self.closed) {
+                        if !filled {
+                            self.enclose_and_fill(chain, nearest.value);
+                            filled = true;
+                        }
+                        self.sums[a] = self.against_later(&mut nearest, k, a) + self.closed;
+                    }
+                }
+            }
+        }
+        let found = nearest.finish();
+        if let Some(found) = &found {
+            self.last_pair = Some((found.bench_a, found.bench_b));
+        }
+        found
+    }
+
+    /// Lowers the bounds by the displacement of the handles since the previous frame.
+    fn follow(&mut self, chain: &Chain) {
+        const LANES: usize = 8;
+        let (mut most, mut sum) = ([0.0; LANES], [0.0; LANES]);
+        let old = self.x.chunks_mut(LANES).zip(self.y.chunks_mut(LANES));
+        for ((old_x, old_y), (x, y)) in old.zip(chain.x.chunks(LANES).zip(chain.y.chunks(LANES))) {
+            for k in 0..x.len() {
+                let (dx, dy) = (x[k] - old_x[k], y[k] - old_y[k]);
+                let squared = dx * dx + dy * dy;
+                most[k] = if squared > most[k] { squared } else { most[k] };
+                sum[k] += squared;
+                (old_x[k], old_y[k]) = (x[k], y[k]);
+            }
+        }
+        self.closed += self.reach * most.into_iter().fold(0.0, f64::max).sqrt();
+        // NaN appears in the sum, too.
+        if !(sum.iter().sum::<f64>() < f64::INFINITY && self.closed < MOST_MOVED) {
+            self.closed = 0.0;
+            for part in &self.parts[..self.parts.len().saturating_sub(1)] {
+                self.sums[part.benches()].fill(f64::NEG_INFINITY);
+            }
+        }
+    }
+
+    fn enclose_and_fill(&mut self, chain: &Chain, limit: f64) {
+        self.parts.iter_mut().for_each(|part| part.enclose(chain));
+        let limit = if limit.is_finite() { limit.max(0.0) } else { 2.0 * self.beyond };
+        self.grid.clear(2.0 * self.beyond + limit + SKIN);
+        for (k, part) in self.parts.iter().enumerate() {
+            for bench in part.benches() {
+                let board = part.board(chain, bench);
+                self.boards[bench] = (board, board.circle_radius());
+                // Only later dragons are looked up.
+                if k > 0 {
+                    self.grid.add(bench, board.centre.x, board.centre.y);
+                }
+            }
+        }
+    }
+
+    /// Tests a bench of the dragon `k` against the boards of later dragons that can be within the limit. Returns a lower
+    /// bound of its distance to all of them.
+    fn against_later(&mut self, nearest: &mut Nearest, k: usize, a: usize) -> f64 {
+        let (board_a, radius_a) = self.boards[a];
+        let (x, y) = (board_a.centre.x, board_a.centre.y);
+        let margin = ROUNDING.0 + ROUNDING.1 * (x.abs() + y.abs());
+        let later = self.parts[k + 1..].iter().map(|part| part.distance(x, y));
+        let apart = later.fold(f64::INFINITY, f64::min) - 2.0 * self.beyond - margin;
+        if apart > nearest.value {
+            return apart;
+        }
+        let limit = if nearest.value.is_finite() { nearest.value.max(0.0) } else { self.sight() };
+        let distance = 2.0 * self.beyond + limit + SKIN + margin;
+        let mut bound = limit + SKIN;
+        let first = self.parts[k + 1].first;
+        let Self { grid, boards, tested, .. } = self;
+        let mut visit = |b: usize| {
+            let (board_b, radius_b) = boards[b];
+            let apart = (board_b.centre - board_a.centre).norm() - radius_a - radius_b - margin;
+            if apart > nearest.value {
+                bound = bound.min(apart);
+                return;
+            }
+            *tested += 1;
+            let separation = separation_board_board(&board_a, &board_b);
+            let value = if separation > nearest.value {
+                separation
+            } else {
+                let value = signed_distance_board_board(&board_a, &board_b);
+                nearest.consider(value, (a, b), &board_a, &board_b);
+                value
+            };
+            bound = bound.min(value);
+        };
+        grid.visit_near((x, y), distance, first, &mut visit);
+        bound
+    }
+
+    /// Returns the metres across the boxes about all dragons: no two boards are further apart.
+    fn sight(&self) -> f64 {
+        let edge = |side: usize| self.parts.iter().map(move |part| part.bounds[side]);
+        let wide = edge(1).fold(f64::NEG_INFINITY, f64::max) - edge(0).fold(f64::INFINITY, f64::min);
+        let high = edge(3).fold(f64::NEG_INFINITY, f64::max) - edge(2).fold(f64::INFINITY, f64::min);
+        wide + high
+    }
+
+    fn test(&mut self, chain: &Chain, nearest: &mut Nearest, (a, b): (usize, usize)) {
+        let part = |bench: usize| &self.parts[self.parts.partition_point(|part| part.first <= bench) - 1];
+        let (board_a, board_b) = (part(a).board(chain, a), part(b).board(chain, b));
+        self.tested += 1;
+        nearest.consider(signed_distance_board_board(&board_a, &board_b), (a, b), &board_a, &board_b);
+    }
+}
+
+/// Returns the nearest two boards of different dragons by testing all pairs, as the reference.
+pub fn nearest_between_all_pairs(chain: &Chain, teams: &[Team]) -> Option<PairClearance> {
+    let parts = BetweenMonitor::new(teams, 0.0).parts;
+    let mut nearest = Nearest::NONE;
+    for (k, one) in parts.iter().enumerate() {
+        for a in one.benches() {
+            let board_a = one.board(chain, a);
+            for other in &parts[k + 1..] {
+                for b in other.benches() {
+                    let board_b = other.board(chain, b);
+                    nearest.consider(signed_distance_board_board(&board_a, &board_b), (a, b), &board_a, &board_b);
+                }
+            }
+        }
+    }
+    nearest.finish()
+}

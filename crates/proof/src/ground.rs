@@ -1,0 +1,236 @@
+//! The obstacles of a stage: their shapes in the path's own coordinates, boards that stay clear of them (Lemma 9 of
+//! docs/proofs.md), and boards that have come within their keep-out.
+
+use serde::Deserialize;
+
+use super::boards::{Board, covers};
+use super::elementary;
+use super::interval::{Interval, Vector};
+
+/// Limit of obstacles and of the corners of one.
+const MOST: usize = 100_000;
+
+/// Directions from a point in which its crossings of a polygon's sides are counted, until one is certain.
+const RAYS: [[f64; 2]; 4] = [[1.0, 0.0], [0.3, 1.0], [-1.0, 0.7], [-0.2, -1.0]];
+
+/// A shape from which boards stay away, or the boundary inside which they stay.
+pub(super) struct Obstacle {
+    kind: Kind,
+    /// The corners; of a circle, its centre.
+    points: Vec<Vector>,
+    radius: Interval,
+    keep_out: Interval,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Circle,
+    Line,
+    Polygon,
+    Boundary,
+}
+
+impl Obstacle {
+    /// Returns the sides, each as its two ends.
+    fn sides(&self) -> Vec<[Vector; 2]> {
+        let mut sides: Vec<_> = self.points.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        if let (Kind::Polygon | Kind::Boundary, Some(last), Some(first)) =
+            (self.kind, self.points.last(), self.points.first())
+        {
+            sides.push([*last, *first]);
+        }
+        sides
+    }
+
+    /// Returns true if the board is shown to be further away than the keep-out for all positions of its handles.
+    pub fn is_avoided_by(&self, board: &Board) -> bool {
+        let metres = self.keep_out + self.radius;
+        match self.kind {
+            Kind::Circle => board.is_clear_of(&self.points, &metres),
+            Kind::Boundary => self.is_inside(board.inner_point()) == Some(true) && self.are_sides_avoided_by(board),
+            Kind::Line => board.is_roughly_clear_of(&self.points, &metres) || self.are_sides_avoided_by(board),
+            Kind::Polygon => {
+                board.is_roughly_clear_of(&self.points, &metres)
+                    || self.is_inside(board.inner_point()) == Some(false) && self.are_sides_avoided_by(board)
+            }
+        }
+    }
+
+    fn are_sides_avoided_by(&self, board: &Board) -> bool {
+        self.sides().iter().all(|side| board.is_clear_of(side, &self.keep_out))
+    }
+
+    /// Returns true if a point is shown to be inside the polygon, false if outside; `None` if neither is.
+    fn is_inside(&self, point: &Vector) -> Option<bool> {
+        let sides = self.sides();
+        RAYS.iter().find_map(|[x, y]| {
+            let ray = Vector::new(*x, *y);
+            let mut inside = false;
+            for [from, to] in &sides {
+                let (from, to) = (from.minus(point), to.minus(point));
+                let (before, after) = (is_left(&ray, &from)?, is_left(&ray, &to)?);
+                if before != after {
+                    // The side crosses the line of the ray, in front of the point or behind it.
+                    inside ^= is_left(&from, &to)? == after;
+                }
+            }
+            Some(inside)
+        })
+    }
+
+    /// Returns true if a point of the board is shown to be within the keep-out, or on the wrong side.
+    pub fn is_reached_by(&self, board: &Board, point: &Vector) -> bool {
+        let is_in_board = covers(board, point);
+        if self.kind == Kind::Circle {
+            let metres = self.keep_out + self.radius;
+            return is_in_board && self.points[0].minus(point).norm().is_at_most(&metres);
+        }
+        if is_in_board && matches!(self.kind, Kind::Polygon | Kind::Boundary) {
+            let is_wrong = self.kind == Kind::Polygon;
+            if self.is_inside(point) == Some(is_wrong) {
+                return true;
+            }
+        }
+        self.sides().iter().any(|[from, to]| {
+            // A point of the side, near the one that is nearest.
+            let (along, offset) = (to.minus(from), point.minus(from));
+            let share = (offset.dot(&along).rough() / along.norm_squared().rough()).clamp(0.0, 1.0);
+            let on_side = from.plus(&along.scaled(&Interval::new(share)));
+            covers(board, &on_side) || is_in_board && on_side.minus(point).norm().is_at_most(&self.keep_out)
+        })
+    }
+}
+
+/// Returns true if `to` is to the left of `from`, false if to the right.
+fn is_left(from: &Vector, to: &Vector) -> Option<bool> {
+    let cross = from.cross(to);
+    if cross.is_positive() {
+        Some(true)
+    } else if cross.is_negative() {
+        Some(false)
+    } else {
+        None
+    }
+}
+
+/// The table `[stage]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StageText {
+    boundary: Option<BoundaryText>,
+    #[serde(default)]
+    obstacles: Vec<ObstacleText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoundaryText {
+    polygon: Vec<[f64; 2]>,
+    #[serde(default)]
+    keep_out: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObstacleText {
+    #[serde(rename = "name")]
+    _name: String,
+    circle: Option<CircleText>,
+    polygon: Option<Vec<[f64; 2]>>,
+    line: Option<Vec<[f64; 2]>>,
+    #[serde(default)]
+    keep_out: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CircleText {
+    center: [f64; 2],
+    radius: f64,
+}
+
+/// The table `[placement]`.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlacementText {
+    #[serde(default)]
+    origin: [f64; 2],
+    #[serde(default)]
+    rotation_turns: f64,
+    #[serde(default)]
+    mirror: bool,
+}
+
+/// The way from the stage's coordinates to those of a path that starts at `start` in its own.
+struct Mapping {
+    origin: Vector,
+    sine: Interval,
+    cosine: Interval,
+    mirror: bool,
+    start: Vector,
+}
+
+impl Mapping {
+    fn point(&self, [x, y]: [f64; 2]) -> Vector {
+        let Vector { x, y } = Vector::new(x, y).minus(&self.origin);
+        let turned = Vector { x: self.cosine * x + self.sine * y, y: self.cosine * y - self.sine * x };
+        let own = if self.mirror { Vector { y: -turned.y, ..turned } } else { turned };
+        own.minus(&self.start)
+    }
+}
+
+impl StageText {
+    /// Returns the obstacles in the order of the scene, the boundary last, for a route that starts at `start`.
+    ///
+    /// # Errors
+    /// A sentence about the field that is wrong.
+    pub fn read(&self, placement: &PlacementText, start: [f64; 2]) -> Result<Vec<Obstacle>, String> {
+        let numbers = [placement.origin[0], placement.origin[1], placement.rotation_turns, start[0], start[1]];
+        if !numbers.iter().all(|number| number.is_finite()) || self.obstacles.len() > MOST {
+            return Err("the placement or the number of obstacles is out of range".to_owned());
+        }
+        let (sine, cosine) = elementary::sin_cos(&elementary::turns(placement.rotation_turns));
+        let mapping = Mapping {
+            origin: Vector::new(placement.origin[0], placement.origin[1]),
+            sine,
+            cosine,
+            mirror: placement.mirror,
+            start: Vector::new(start[0], start[1]),
+        };
+        let of = |text: &ObstacleText| match (&text.circle, &text.polygon, &text.line) {
+            (Some(circle), None, None) => {
+                obstacle(&mapping, Kind::Circle, &[circle.center], circle.radius, text.keep_out)
+            }
+            (None, Some(corners), None) => obstacle(&mapping, Kind::Polygon, corners, 0.0, text.keep_out),
+            (None, None, Some(corners)) => obstacle(&mapping, Kind::Line, corners, 0.0, text.keep_out),
+            _ => Err("an obstacle has one of circle, polygon and line".to_owned()),
+        };
+        let obstacles = self.obstacles.iter().map(of);
+        let boundary = self.boundary.iter();
+        let boundary = boundary.map(|text| obstacle(&mapping, Kind::Boundary, &text.polygon, 0.0, text.keep_out));
+        obstacles.chain(boundary).collect()
+    }
+}
+
+fn obstacle(
+    mapping: &Mapping,
+    kind: Kind,
+    corners: &[[f64; 2]],
+    radius: f64,
+    keep_out: f64,
+) -> Result<Obstacle, String> {
+    let least = match kind {
+        Kind::Circle => 1,
+        Kind::Line => 2,
+        Kind::Polygon | Kind::Boundary => 3,
+    };
+    if corners.len() < least || corners.len() > MOST || !corners.iter().flatten().all(|number| number.is_finite()) {
+        return Err(format!("an obstacle has {} corners, or one that is no number", corners.len()));
+    }
+    let is_length = |metres: f64| metres.is_finite() && metres >= 0.0;
+    if !is_length(radius) || !is_length(keep_out) {
+        return Err(format!("a radius or keep_out of an obstacle is {radius:?} or {keep_out:?}"));
+    }
+    let points = corners.iter().map(|corner| mapping.point(*corner)).collect();
+    Ok(Obstacle { kind, points, radius: Interval::new(radius), keep_out: Interval::new(keep_out) })
+}

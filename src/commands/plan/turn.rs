@@ -1,0 +1,124 @@
+//! `plan turn`: the least turn radius.
+
+use bench_dragon::certify::plan::{LeastTurn, TurnLimit, least_turn};
+use bench_dragon::messages::state::EventKind;
+use bench_dragon::show::scene::{Accepted, Scene};
+use serde::Serialize;
+
+use super::super::events::bench_name;
+use super::super::{CommandError, Common, Output, progress_bar};
+use super::expect_no_obstacles;
+
+/// The line of `plan turn --json`.
+#[derive(Serialize)]
+struct TurnLine {
+    plan: &'static str,
+    status: &'static str,
+    value: Option<f64>,
+    value_lo: Option<f64>,
+    value_hi: Option<f64>,
+    length: Option<f64>,
+    arc_ratio: f64,
+    limit: Option<&'static str>,
+    bench_a: Option<u32>,
+    bench_b: Option<u32>,
+}
+
+/// Plans the turn.
+pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandError> {
+    if let Some(ratio) = arc_ratio {
+        Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
+    }
+    let scene: Scene = common.scene_text()?.parse()?;
+    expect_no_obstacles(&scene)?;
+    let Some(pitch) = scene.motion.description().pitch() else {
+        let sentence =
+            "the scene's path is a route, which has no pitch: expected path.kind \"spiral\" or \"turnaround\"";
+        return Err(CommandError::BadInput(sentence.to_owned()));
+    };
+    let bar = progress_bar(1000, common).with_message("searching for the turn");
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let found = least_turn(scene.team(), pitch, arc_ratio, &mut progress)?;
+    bar.finish_and_clear();
+    let mut output = Output::standard();
+    if common.json {
+        output.json(&line(&found))?;
+    } else {
+        for sentence in sentences(&scene, pitch, arc_ratio.is_none(), &found) {
+            output.line(&sentence)?;
+        }
+    }
+    output.finish()
+}
+
+fn line(found: &LeastTurn) -> TurnLine {
+    let LeastTurn { value_lo, value_hi, length, arc_ratio, limit, proved, intervals, .. } = *found;
+    TurnLine {
+        plan: "turn",
+        status: if proved { "proved" } else { "given_up" },
+        value: value_hi,
+        value_lo: (intervals > 0).then_some(value_lo),
+        value_hi,
+        length,
+        arc_ratio,
+        limit: limit.map(|limit| limit.kind.name()),
+        bench_a: limit.map(|limit| limit.bench_a),
+        bench_b: limit.and_then(|limit| limit.bench_b),
+    }
+}
+
+fn sentences(scene: &Scene, pitch: f64, is_best: bool, found: &LeastTurn) -> Vec<String> {
+    let LeastTurn { value_lo, value_hi, length, from, arc_ratio, limit, proved, intervals, leads, .. } = *found;
+    let mut sentences = Vec::new();
+    if let (Some(radius), Some(length)) = (value_hi, length) {
+        sentences.push(format!(
+            "With a turn radius of {radius} m and an arc ratio of {arc_ratio} the team turns round on a pitch of {pitch} m: \
+             the S is {length:.8} m long."
+        ));
+    }
+    if let Some(limit) = limit {
+        sentences.push(limit_sentence(scene, value_lo, &limit));
+    }
+    sentences.push(match (value_hi, leads) {
+        (Some(value_hi), Some([lead_in, lead_out])) => format!(
+            "{} with every radius from {from} m to {value_lo} m a link stalls or locks, or two boards overlap; with \
+             {value_hi} m nothing of this happens, from any distance ({lead_in:.3} m before the S in steps, further out by \
+             Lemma 8) until the head is {lead_out:.3} m past the S and the last bench has turned. Larger radii are not \
+             covered.",
+            if proved { "Proved:" } else { "Not decided to 1e-8 m. What is proved:" }
+        ),
+        _ if intervals > 0 => format!(
+            "Not decided: the search was given up after {intervals} intervals of radii. What is proved: with every radius \
+             from {from} m to {value_lo} m a link stalls or locks, or two boards overlap."
+        ),
+        _ => "Not decided: the search was given up, and nothing is proved.".to_owned(),
+    });
+    if is_best {
+        sentences.push(format!(
+            "The arc ratio {arc_ratio} is the best that the search found; that no other is better is not proved."
+        ));
+    }
+    sentences.push(
+        "This is the least among S-curves that begin and end at the same radius; with unequal radii shorter ones exist."
+            .to_owned(),
+    );
+    sentences
+}
+
+fn limit_sentence(scene: &Scene, value_lo: f64, limit: &TurnLimit) -> String {
+    let TurnLimit { kind, bench_a, bench_b, past } = *limit;
+    let bench = bench_name(scene, bench_a);
+    let place = format!("{past:.6} m past the beginning of the S");
+    match (kind, bench_b) {
+        (EventKind::Lock, _) => {
+            format!("With {value_lo} m {bench} (counting from 1) locks, its rear handle being {place}.")
+        }
+        (EventKind::Stall, _) => {
+            format!("With {value_lo} m {bench} (counting from 1) stalls, its front handle being {place}.")
+        }
+        (_, other) => format!(
+            "With {value_lo} m {bench} and {} (counting from 1) overlap, the head being {place}.",
+            bench_name(scene, other.unwrap_or(bench_a))
+        ),
+    }
+}
