@@ -279,9 +279,8 @@ function help() {
 }
 /** Says where the head is, for a screen reader; again if the words are the same. */
 function speak() {
-  const { isThere, places } = whose;
-  if (!isThere || !places) return;
-  const speed = speedOf(places, 0), values = { x: places[0].toFixed(2), y: places[1].toFixed(2), speed: Number.isNaN(speed) ? say("notSent") : say("perSecond", { speed: speed.toFixed(2) }), clearance: element("metres").textContent };
+  if (!whose.isThere) return;
+  const { handles } = whose.newest, speed = speedOf(handles, 0), values = { x: handles[0].toFixed(2), y: handles[1].toFixed(2), speed: Number.isNaN(speed) ? say("notSent") : say("perSecond", { speed: speed.toFixed(2) }), clearance: element("metres").textContent };
   put("spoken", "");
   setTimeout(() => put("spoken", whose.own(say("spokenNow", values))), 100);
 }
