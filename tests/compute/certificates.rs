@@ -152,6 +152,10 @@ fn every_scene_of_the_repository_agrees() {
             {
                 continue;
             }
+            // Shows of several dragons have no certificate.
+            if ["coil", "crossing"].contains(&name.as_str()) {
+                continue;
+            }
             let is_given_up = given_up.contains(&name.as_str());
             let most_steps = if is_given_up { STEPS_IN_VAIN } else { STEPS };
             let (outcomes, timeline) = outcomes(&Scene::load(&file).unwrap(), most_steps);

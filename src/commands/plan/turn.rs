@@ -52,11 +52,11 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
 }
 
 fn line(found: &LeastTurn) -> TurnLine {
-    let LeastTurn { value_lo, value_hi, length, arc_ratio, limit, proved, intervals, .. } = *found;
+    let LeastTurn { value_lo, value_hi, value, length, arc_ratio, limit, proved, intervals, .. } = *found;
     TurnLine {
         plan: "turn",
         status: if proved { "proved" } else { "given_up" },
-        value: value_hi,
+        value,
         value_lo: (intervals > 0).then_some(value_lo),
         value_hi,
         length,
@@ -68,12 +68,13 @@ fn line(found: &LeastTurn) -> TurnLine {
 }
 
 fn sentences(scene: &Scene, pitch: f64, is_best: bool, found: &LeastTurn) -> Vec<String> {
-    let LeastTurn { value_lo, value_hi, length, from, arc_ratio, limit, proved, intervals, leads, .. } = *found;
+    let LeastTurn { value_lo, value_hi, value, length, from, arc_ratio, limit, proved, intervals, leads, .. } = *found;
     let mut sentences = Vec::new();
-    if let (Some(radius), Some(length)) = (value_hi, length) {
+    if let (Some(radius), Some(length)) = (value, length) {
         sentences.push(format!(
-            "With a turn radius of {radius} m and an arc ratio of {arc_ratio} the team turns round on a pitch of {pitch} m: \
-             the S is {length:.8} m long."
+            "With a turn radius of {radius} m and an arc ratio of {arc_ratio} the team turns round on a pitch of {pitch} m{}: \
+             the S is {length:.8} m long.",
+            if proved { "" } else { ", as far as the ordinary search finds" }
         ));
     }
     if let Some(limit) = limit {

@@ -21,7 +21,10 @@ pub struct LeastTurn {
     pub value_lo: f64,
     /// Upper bound, metres: with this radius the team turns round. `None` if this is shown for no radius.
     pub value_hi: Option<f64>,
-    /// Metres of the S with the radius `value_hi`.
+    /// Least radius with which the ordinary search finds no event, metres: within 1e-8 m of `value_lo`, and equal to
+    /// `value_hi` if `proved`. `None` if the search was given up before.
+    pub value: Option<f64>,
+    /// Metres of the S with the radius `value`.
     pub length: Option<f64>,
     /// The least radius that is tested, metres.
     pub from: f64,
@@ -106,6 +109,7 @@ pub fn least_turn(
     let mut found = LeastTurn {
         value_lo,
         value_hi: None,
+        value: None,
         length: None,
         from,
         arc_ratio: family.arc_ratio,
@@ -117,12 +121,12 @@ pub fn least_turn(
     if intervals == 0 || upper > Accepted::LENGTH.greatest || family.event(upper).is_some() {
         return Ok(found);
     }
+    (found.value, found.length) = (Some(upper), Some(family.length(upper)));
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
         let Some(passage) = Passage::new(team, (pitch, family.arc_ratio), upper) else { break };
         if passage.is_free(team, &mut |share| progress(0.5 + 0.5 * share)) {
             found.value_hi = Some(upper);
-            found.length = Some(family.length(upper));
             found.leads = Some([passage.lead_in, passage.lead_out]);
             found.proved = upper - value_lo <= 1e-8;
             break;

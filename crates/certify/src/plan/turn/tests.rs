@@ -17,7 +17,8 @@ fn encloses(found: &LeastTurn, radius: f64, digits: f64, length: f64) {
     let hi = found.value_hi.unwrap();
     assert!(found.value_lo <= radius + digits && hi >= radius - digits, "{found:?}");
     assert!(radius - found.value_lo <= 1e-8 + digits && hi - radius <= 1e-5, "{found:?}");
-    assert!((found.length.unwrap() - length).abs() < 4.0 * (hi - found.value_lo) + 4.0 * digits, "{found:?}");
+    assert!((found.value.unwrap() - radius).abs() <= 1e-8 + digits, "{found:?}");
+    assert!((found.length.unwrap() - length).abs() < 4e-8 + 4.0 * digits, "{found:?}");
 }
 
 #[test]
