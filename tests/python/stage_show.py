@@ -250,7 +250,7 @@ def speaks_chinese(page):
     everything = page.inner_text("body") + "".join(page.evaluate("picture.labels.map((one) => one.text)")) + page.evaluate("document.title.split('（')[1]")
     everything += "".join(page.evaluate("[...document.querySelectorAll('[aria-label]')].filter((one) => !one.closest('#conduct')).map((one) => one.getAttribute('aria-label'))"))
     name = page.evaluate("document.getElementById('name').textContent")
-    english = [word for word in re.findall(r"[A-Za-z]{2,}", everything.replace(name.split(" · ")[-1], "").replace("paper", "")) if word not in ("mm", "cm", "Esc")]
+    english = [word for word in re.findall(r"[A-Za-z]{2,}", everything.replace(name.split(" · ")[-1], "").replace("paper", "")) if word not in ("mm", "cm", "Esc", "Shift", "Enter")]
     assert not english, f"not in Chinese: {english}"
 
 

@@ -192,7 +192,12 @@ fn one_process_publishes_two_shows_and_follows_each_through_its_death() {
         return;
     }
     let [gold, silver] = ["two_gold", "two_silver"];
-    let start = |name: &str| Process::start(program(name).args(["run", "--json", "--start", "300"]));
+    // The queues hold all frames by which the process falls behind while it opens the topics of the other show.
+    let scenes = [gold, silver].map(|name| (name, scene_file(name, &[("[publish]", "[publish]\nqueue = 480")])));
+    let start = |name: &str| {
+        let scene = &scenes.iter().find(|(of, _)| *of == name).unwrap().1;
+        Process::start(program(name).arg("--scene").arg(scene).args(["run", "--json", "--start", "300"]))
+    };
     let bridge = Process::start(program(gold).args(["--name", &unique(silver), "send", "ros2", "--json"]));
     let stage = "stage:reliable:transient_local";
     let (_of_gold, gold_lines) = peer(gold, &["handles", stage]);
