@@ -80,7 +80,10 @@ fn a_running_show_gets_its_scenes_topics_late_and_loses_them_again() {
     let topics = "[publish.ros2]\nrate = 20.0\ntopics = [\"handles\", \"stage\"]\n";
     let settings = scene_file(name, &[]);
     std::fs::write(&settings, format!("{}\n{topics}", std::fs::read_to_string(&settings).unwrap())).unwrap();
-    let publisher = Process::start(program(name).args(["run", "--json", "--start", "300"]));
+    // The queues hold all frames by which a subscriber falls behind on a busy machine.
+    let scene = scene_file("attached_run", &[("[publish]", "[publish]\nqueue = 960\nsubscribers = 4")]);
+    let mut publisher = program(name);
+    let publisher = Process::start(publisher.arg("--scene").arg(&scene).args(["run", "--json", "--start", "300"]));
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
     let seconds = watch.lines();
     seconds.until("\"state\":\"moving\"", 60);
