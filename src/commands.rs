@@ -25,6 +25,7 @@ pub mod replay;
 mod ros2_process;
 pub mod ros_args;
 pub mod run;
+mod scene_facts;
 pub mod send;
 mod service_manager;
 pub mod soak;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
+use std::time::Duration;
 
 use bench_dragon::chase::artnet;
 use bench_dragon::chase::live::{Chase, ChaseError, Leader, Notice, TimecodeLeader, TrackerLeader};
@@ -15,7 +16,8 @@ use bench_dragon::chase::sources::{self, Input, SourceError};
 use bench_dragon::chase::status::StatusError;
 use bench_dragon::chase::timecode::{FrameRate, Label};
 use bench_dragon::chase::track::Track;
-use bench_dragon::client::feed::Delivery;
+use bench_dragon::client::connection::Wake;
+use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::poll_until;
 use bench_dragon::messages::ChaseStatus;
 use bench_dragon::messages::chase::{ChaseSource, ChaseState};
@@ -23,8 +25,12 @@ use bench_dragon::messages::json::ChaseObject;
 use bench_dragon::messages::sentence::chase_sentence;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::proof::scene_hash;
+use bench_dragon::show::scene::SceneText;
 
 use super::{CommandError, Common, Output, expect_exact_motion, stop_on_signals, wall_seconds};
+
+/// The interval of polls for the scene of a show.
+const SCENE_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Arguments of `chase`.
 #[derive(Debug, Clone, clap::Args)]
@@ -57,7 +63,7 @@ enum Kind {
         #[command(flatten)]
         timecode: TimecodeArguments,
     },
-    /// A performer with a tracker, by PosiStageNet; needs the scene of the show
+    /// A performer with a tracker, by PosiStageNet; without --scene the show's own scene gives the path
     Psn(PsnArguments),
 }
 
@@ -155,9 +161,35 @@ impl TimecodeArguments {
     }
 }
 
+/// Returns the text of --scene, or else of the show's own scene, for which a publisher is waited for; `None` if a signal comes
+/// first.
+fn scene_text(common: &Common, stop: &AtomicBool) -> Result<Option<SceneText>, CommandError> {
+    if common.scene.is_some() {
+        return common.scene_text().map(Some);
+    }
+    let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::Never, frames: Delivery::Newest })?;
+    let mut found = None;
+    while found.is_none() && !stop.load(Ordering::Relaxed) {
+        feed.poll(SCENE_INTERVAL, &mut |event| {
+            if let FeedEvent::Scene { text, .. } = event {
+                found = Some(text.to_owned());
+            }
+        })?;
+    }
+    if found.as_ref().is_some_and(String::is_empty) {
+        let sentence = format!(
+            "the show \"{}\" does not send its scene, expected --scene with the scene of the show: its path is needed",
+            common.name()
+        );
+        return Err(CommandError::BadInput(sentence));
+    }
+    let file = format!("the scene of \"{}\"", common.name());
+    Ok(found.map(|text| SceneText { text, file, stem: common.name().to_owned() }))
+}
+
 fn psn(common: &Common, arguments: &PsnArguments, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
     let PsnArguments { tracker, group, interface, axes, freewheel } = *arguments;
-    let text = common.scene_text()?;
+    let Some(text) = scene_text(common, stop)? else { return Ok(()) };
     let scene_hash = scene_hash(&text.text);
     let scene = text.parse()?;
     expect_exact_motion(&scene)?;

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bench_dragon::messages::hexadecimal;
-use bench_dragon::outputs::view::{AllowedOrigin, Certificate, Proofs, Ready, ViewError, ViewOptions, serve};
+use bench_dragon::outputs::view::{AllowedOrigin, Certificate, Facts, Proofs, Ready, ViewError, ViewOptions, serve};
 use bench_dragon::proof::{Proved, Refused, scene_hash};
 use serde::Serialize;
 use serde_json::json;
 
+use super::scene_facts::scene_facts;
 use super::verify::certificate::reason;
 use super::{CommandError, Common, Output, stop_on_signals};
 
@@ -56,7 +57,8 @@ pub fn view(common: &Common, arguments: &ViewArguments) -> Result<(), CommandErr
     let certificates = certificate.iter().map(|file| opened(file)).collect::<Result<Vec<_>, _>>()?;
     let proofs = Arc::new(Proofs::expected(&certificates));
     let address = SocketAddr::new(listen, port);
-    let options = ViewOptions { address, control, origins: allow_origin, pages, proofs: Arc::clone(&proofs) };
+    let facts = Arc::new(Facts::new(scene_facts));
+    let options = ViewOptions { address, control, origins: allow_origin, pages, proofs: Arc::clone(&proofs), facts };
     serve(&common.names, options, &stop, |ready| {
         announce(common, arguments, ready)?;
         check_in_background(certificates, proofs, common.json)

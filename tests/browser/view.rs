@@ -1,7 +1,7 @@
 //! The stage picture as its users meet it: browsers, programs that read its WebSocket, and clients without rights.
 //!
 //! The browser is Debian's Chromium; its tests are in `tests/python/stage_picture.py`, `stage_motion.py`,
-//! `stage_show.py` and `stage_places.py`. No test asserts a speed.
+//! `stage_show.py`, `stage_places.py` and `stage_reach.py`. No test asserts a speed.
 
 use crate::{ONE_AT_A_TIME, harness};
 
@@ -258,6 +258,10 @@ fn in_place(scenario: &str) {
     run_scenario("tests/python/stage_places.py", scenario);
 }
 
+fn in_reach(scenario: &str) {
+    run_scenario("tests/python/stage_reach.py", scenario);
+}
+
 pub(crate) fn run_scenario(script: &str, scenario: &str) {
     if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
         return;
@@ -369,4 +373,39 @@ fn frozen_before_it_was_seen() {
 #[test]
 fn five_thousand_boards_are_drawn() {
     in_place("five_thousand_boards_are_drawn");
+}
+
+#[test]
+fn the_picture_keeps_half_of_the_window() {
+    in_reach("the_picture_keeps_half_of_the_window");
+}
+
+#[test]
+fn a_head_that_moves_outward_has_room() {
+    in_reach("a_head_that_moves_outward_has_room");
+}
+
+#[test]
+fn paper_is_white() {
+    in_reach("paper_is_white");
+}
+
+#[test]
+fn everybody_is_told() {
+    in_reach("everybody_is_told");
+}
+
+#[test]
+fn distances_are_measured() {
+    in_reach("distances_are_measured");
+}
+
+#[test]
+fn the_clearance_of_the_whole_show_is_a_curve() {
+    in_reach("the_clearance_of_the_whole_show_is_a_curve");
+}
+
+#[test]
+fn the_chase_stands_in_the_header() {
+    in_reach("the_chase_stands_in_the_header");
 }

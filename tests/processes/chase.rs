@@ -168,8 +168,10 @@ fn a_second_chase_is_refused_and_holds_and_deaths_are_told() {
 fn a_show_follows_the_tracker_of_another_one() {
     let (leader, follower) = ("chase_leader", "chase_follower");
     let (from, to) = (port().to_string(), port().to_string());
-    let _leading = publisher(leader, &["--start", "20"]);
-    let _following = publisher(follower, &["--paused", "--start", "20"]);
+    // Another scene than the built-in one: the chase has its path from the show.
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/config/wide.toml");
+    let _leading = publisher(leader, &["--scene", scene, "--start", "20"]);
+    let _following = publisher(follower, &["--scene", scene, "--paused", "--start", "20"]);
     let address = format!("127.0.0.1:{from}");
     let _sent = Process::start(program(leader).args(["send", "psn", "--trackers", "head", "--to", &address]));
     let (_chase, lines) = chase(follower, &["psn", "--group", &format!("127.0.0.1:{to}")]);
@@ -182,6 +184,30 @@ fn a_show_follows_the_tracker_of_another_one() {
     let result = result(follower, relay);
     assert!(result["p99"].as_f64().unwrap() < 0.1 && result["frames"].as_u64().unwrap() > 400, "{result}");
     state(&lines, "lost");
+}
+
+#[test]
+fn the_log_of_a_chased_show_replays_bit_for_bit() {
+    let name = "chase_log";
+    let port = port().to_string();
+    let log = result_file(name).with_extension("jsonl");
+    let mut run = publisher(name, &["--paused", "--log", log.to_str().unwrap()]);
+    let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
+    let sender = sender(name, &["--port", &port, "--seconds", "8", "--jump", "100"]);
+    state(&lines, "locked");
+    result(name, sender);
+    run.signal(Signal::SIGINT);
+    let ended = run.output_within(60);
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let verified = Process::start(program(name).args(["--json", "verify"]).arg(&log)).output_within(120);
+    let verdict = String::from_utf8_lossy(&verified.stdout).into_owned();
+    assert!(verified.status.success(), "{verdict}{}", String::from_utf8_lossy(&verified.stderr));
+    println!("{verdict}");
+    let text = std::fs::read_to_string(&log).unwrap();
+    let count = |command: &str| text.lines().filter(|line| line.contains(command)).count();
+    assert!(count("\"command\":\"rate\"") > 3, "a chase commands rates: {text}");
+    assert!(count("\"command\":\"seek\"") > 0, "a jump is a seek: {text}");
+    let _ = std::fs::remove_file(log);
 }
 
 #[test]

@@ -155,6 +155,7 @@ def keyboard(page):
     page.mouse.click(640, 5)
     page.evaluate("document.activeElement.blur()")
     before = state()["sim_time"]
+    keys_are_off(page, before)
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowLeft")
@@ -183,6 +184,28 @@ def keyboard(page):
     until(lambda: state()["playback"] == "playing", "on from the cue")
 
 
+def keys_are_off(page, before):
+    """Letters typed anywhere conduct nothing, and the bar says so; with the focus in the bar they do. Then they are switched
+    on, and stay so."""
+    for key in ("h", ".", "Space", "ArrowRight"):
+        page.keyboard.press(key)
+    says(page, "Keys conduct only in this bar")
+    assert (state()["playback"], state()["sim_time"]) == ("paused", before), state()
+    page.focus("#conduct-restart")
+    page.keyboard.press("h")
+    until(lambda: state()["playback"] == "held", "H in the bar holds")
+    page.keyboard.press("h")
+    until(lambda: state()["playback"] == "paused", "H in the bar releases")
+    page.click("#help")
+    assert page.is_visible("#keys-conduct") and not page.is_checked("#keys-on")
+    page.check("#keys-on")
+    page.keyboard.press("Escape")
+    page.reload()
+    until(lambda: page.evaluate("picture.drawn > 0") and bar_is_shown(page), "the page again")
+    assert page.is_checked("#keys-on"), "the choice is forgotten"
+    page.evaluate("document.activeElement.blur()")
+
+
 def seek(page, moment):
     page.evaluate("(time) => { const line = document.getElementById('conduct-seek'); line.value = time; line.onchange(); }", moment)
 
@@ -205,7 +228,7 @@ def held(page):
 def at_the_end(page, browser, url):
     """A page that loads while the show is paused sets its speed, and at the end the button does as it says."""
     page.close()
-    page = opened(browser, url)
+    page = opened(browser, f"{url}#keys")
     until(lambda: bar_is_shown(page) and page.locator("#conduct-rate option").count() > 1, "the speeds")
     assert page.locator("#conduct-rate").input_value() == "", "the speed of a paused show is unknown"
     page.keyboard.press("]")
@@ -243,8 +266,8 @@ def token_and_own_pages():
         assert page.url == f"{here}#dark", "the token does not stay in the address"
         page.reload()
         until(lambda: page.evaluate("picture.drawn > 0") and bar_is_shown(page), "the bar, loaded again")
-        page.keyboard.press("Space")
-        until(lambda: state()["playback"] == "paused", "space pauses")
+        page.click("#conduct-toggle")
+        until(lambda: state()["playback"] == "paused", "the button pauses")
     own = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory="examples/page"))
     threading.Thread(target=own.serve_forever, daemon=True).start()
     elsewhere = f"http://127.0.0.1:{own.server_port}"

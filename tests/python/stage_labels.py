@@ -67,7 +67,7 @@ def labels_point_at_their_boards():
         for width, height in SIZES:
             page.set_viewport_size({"width": width, "height": height})
             page.goto("about:blank")
-            page.goto(url)
+            page.goto(f"{url}#keys")
             drawn(page)
             for moment in TIMES:
                 command("seek", moment)

@@ -216,6 +216,7 @@ def hands_move_the_picture():
         page.click("#whole")
         pinch(page, box)
         assert math.isclose(scale(), 2 * size, rel_tol=0.02), "two fingers do not enlarge"
+        page.focus("#stage")
         page.keyboard.press("f")
         time.sleep(0.3)
         assert numpy.allclose(at_head(), [box["width"] / 2, box["height"] / 2], atol=1.0), "the camera does not follow"

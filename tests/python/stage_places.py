@@ -26,7 +26,7 @@ CUT = """() => {
     const nav = document.querySelector("nav").getBoundingClientRect();
     const place = (one) => [one, one.getBoundingClientRect()];
     return [...document.querySelectorAll("#name, #playback, #playback-detail, #state, #until, #left, #alert, #meter, #metres, #legend, #scale, #time, #full, #follow, #whole, #conduct:not([hidden]) :is(button, select, input)")]
-        .map(place).filter(([one, {bottom, right}]) => !one.checkVisibility() || bottom > innerHeight + 1 || right > innerWidth + 1
+        .map(place).filter(([one, {bottom, right}]) => !one.checkVisibility() || bottom + scrollY > Math.max(innerHeight, document.scrollingElement.scrollHeight) + 1 || right > innerWidth + 1
             || (one.closest(".figure, #time") && bottom > nav.top + 1 && nav.top > one.getBoundingClientRect().top && nav.left < right))
         .map(([one]) => one.id || one.tagName);
 }"""

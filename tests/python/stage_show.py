@@ -246,7 +246,7 @@ def speaks_chinese(page):
     """All words are Chinese; stage_places.py tests the transport bar."""
     assert page.evaluate("document.documentElement.lang") == "zh-Hans"
     assert "第 9 节板凳" in page.get_by_role("alert").inner_text() and "(1.474, 2.111) m" in page.get_by_role("alert").inner_text().replace("\xa0", " "), words(page)
-    page.keyboard.press("?")
+    page.click("#help")
     everything = page.inner_text("body") + "".join(page.evaluate("picture.labels.map((one) => one.text)")) + page.evaluate("document.title.split('（')[1]")
     everything += "".join(page.evaluate("[...document.querySelectorAll('[aria-label]')].filter((one) => !one.closest('#conduct')).map((one) => one.getAttribute('aria-label'))"))
     name = page.evaluate("document.getElementById('name').textContent")
@@ -421,7 +421,7 @@ def nothing_is_complained_about():
     signal.alarm(seconds + 120)
     with server() as url, publisher("--start", "408.5", "--loop"), browser(viewport={"width": 640, "height": 480}) as (page, complaints):
         show, seen = opened(page.context.browser, viewport={"width": 640, "height": 480})
-        page.goto(f"{url}#sound,follow")
+        page.goto(f"{url}#sound,follow,keys")
         show.goto(f"{url}#show,lang=zh,sound")
         page.keyboard.press("?")
         page.keyboard.press("Escape")

@@ -4,11 +4,12 @@
 //! Called by the `view` command. `reader` reads a publisher's shared memory on a separate thread, since ports cannot
 //! leave the thread that created them, and hands over the newest picture. `browser` sends the picture to one browser at
 //! its pace, over one WebSocket for each publisher; `wire` is its layout. `origin` decides which pages may connect,
-//! `authorization` which browsers may command; `certificates` has the proofs of scenes.
+//! `authorization` which browsers may command; `certificates` has the proofs of scenes, `facts` what takes time to compute.
 
 mod authorization;
 mod browser;
 mod certificates;
+mod facts;
 pub(crate) mod origin;
 mod reader;
 mod wire;
@@ -39,6 +40,7 @@ use bench_dragon_client::connection::Wake;
 use bench_dragon_client::feed::{Delivery, Feed, FeedOptions};
 use bench_dragon_client::shared_memory::{OpenError, service_name};
 pub use certificates::{Certificate, Proofs, SceneHash};
+pub use facts::{ClearanceCurve, Facts, LeastOfShow, SceneFacts};
 use origin::Admission;
 pub use origin::AllowedOrigin;
 
@@ -54,6 +56,8 @@ struct Picture {
     waiting: Utf8Bytes,
     stage: Utf8Bytes,
     alert: Utf8Bytes,
+    facts: Utf8Bytes,
+    chase: Utf8Bytes,
     /// The latest cues, each with its number among all cues of this server, so that none is left out.
     cues: Arc<[(u64, Utf8Bytes)]>,
     frame: Bytes,
@@ -96,6 +100,8 @@ pub struct ViewOptions {
     pub pages: Option<PathBuf>,
     /// The proofs of scenes; they may grow while pages are served.
     pub proofs: Arc<Proofs>,
+    /// The facts about scenes that are computed while pages are served.
+    pub facts: Arc<Facts>,
 }
 
 /// The data that browsers need to connect.
@@ -147,7 +153,7 @@ pub fn serve<Refused: From<ViewError>>(
     stop: &Arc<AtomicBool>,
     ready: impl FnOnce(&Ready) -> Result<(), Refused>,
 ) -> Result<(), Refused> {
-    let ViewOptions { address, control, origins, pages, proofs } = options;
+    let ViewOptions { address, control, origins, pages, proofs, facts } = options;
     names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(ViewError::from)?;
     if let Some(folder) = &pages {
         std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
@@ -165,9 +171,10 @@ pub fn serve<Refused: From<ViewError>>(
     for (name, authorization) in names.iter().zip(authorizations) {
         let (sender, pictures) = watch::channel(Picture::default());
         channels.push(Channel { name: name.clone(), pictures, authorization });
-        let (name, proofs, stop) = (name.clone(), Arc::clone(&proofs), Arc::clone(stop));
+        let (name, stop) = (name.clone(), Arc::clone(stop));
+        let (proofs, facts) = (Arc::clone(&proofs), Arc::clone(&facts));
         readers.push(std::thread::spawn(move || {
-            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &proofs, &sender, &stop));
+            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, (&proofs, &facts), &sender, &stop));
             stop.store(true, Ordering::Relaxed);
             read
         }));
@@ -209,22 +216,26 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/boards.js", file("text/javascript; charset=utf-8", include_str!("view/boards.js")))
         .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
         .route("/cameras.js", file("text/javascript; charset=utf-8", include_str!("view/cameras.js")))
+        .route("/curve.js", file("text/javascript; charset=utf-8", include_str!("view/curve.js")))
         .route("/dragon.js", file("text/javascript; charset=utf-8", include_str!("view/dragon.js")))
         .route("/dragon_figure.js", file("text/javascript; charset=utf-8", include_str!("view/dragon_figure.js")))
         .route("/dragon_head.js", file("text/javascript; charset=utf-8", include_str!("view/dragon_head.js")))
         .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
         .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
+        .route("/key_switch.js", file("text/javascript; charset=utf-8", include_str!("view/key_switch.js")))
         .route("/label_layout.js", file("text/javascript; charset=utf-8", include_str!("view/label_layout.js")))
         .route("/labels.js", file("text/javascript; charset=utf-8", include_str!("view/labels.js")))
         .route("/lantern_view.js", file("text/javascript; charset=utf-8", include_str!("view/lantern_view.js")))
         .route("/lanterns.js", file("text/javascript; charset=utf-8", include_str!("view/lanterns.js")))
         .route("/lock.js", file("text/javascript; charset=utf-8", include_str!("view/lock.js")))
         .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
+        .route("/measure.js", file("text/javascript; charset=utf-8", include_str!("view/measure.js")))
         .route("/pace.js", file("text/javascript; charset=utf-8", include_str!("view/pace.js")))
         .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
         .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
         .route("/pointer_input.js", file("text/javascript; charset=utf-8", include_str!("view/pointer_input.js")))
         .route("/publishers.js", get(move || async move { served("text/javascript; charset=utf-8", names) }))
+        .route("/resolution.js", file("text/javascript; charset=utf-8", include_str!("view/resolution.js")))
         .route("/roster.js", file("text/javascript; charset=utf-8", include_str!("view/roster.js")))
         .route("/seat.js", file("text/javascript; charset=utf-8", include_str!("view/seat.js")))
         .route("/seat_sprites.js", file("text/javascript; charset=utf-8", include_str!("view/seat_sprites.js")))

@@ -3,7 +3,7 @@
 /**
  * Words without a value, words with numbers (as many as named) or a word after `=`, and those of them that may have none.
  */
-const ALONE = ["show", "moon", "hands", "desk", "tell", "transparent", "nolabels", "dark", "light", "sound"];
+const ALONE = ["show", "moon", "hands", "desk", "tell", "transparent", "nolabels", "keys", "dark", "light", "sound"];
 const OPTIONAL = ["follow", "seat"];
 const WITH = { follow: /^[1-9]\d*$/, bench: /^[1-9]\d*$/, rotate: /^-?\d+(\.\d+)?$/, view: /^-?[\d.]+,-?[\d.]+,[\d.]+$/, lang: /^(en|zh)$/, seat: /^-?[\d.]+(,[\d.]+){0,2}$/ };
 

@@ -27,7 +27,10 @@ export function benchAt(stage, places, x, y, most) {
   return found;
 }
 
-/** Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap. */
+/**
+ * Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap; with these
+ * points as `ends`, and their distance `away`, m.
+ */
 export function nearest(stage, places, ...pair) {
   const [a, b] = pair.map((bench) => rectangle(stage, places, bench));
   let best = Infinity, place = null;
@@ -38,7 +41,8 @@ export function nearest(stage, places, ...pair) {
       const nu = Math.max(-other.l, Math.min(other.l, u)), nv = Math.max(-other.w, Math.min(other.w, v)), away = Math.hypot(u - nu, v - nv);
       if (away >= best) continue;
       best = away;
-      place = { x: (x + other.x + nu * other.c - nv * other.s) / 2, y: (y + other.y + nu * other.s + nv * other.c) / 2 };
+      const foot = { x: other.x + nu * other.c - nv * other.s, y: other.y + nu * other.s + nv * other.c };
+      place = { x: (x + foot.x) / 2, y: (y + foot.y) / 2, ends: [{ x, y }, foot], away };
     }
   }
   return place;
@@ -59,14 +63,12 @@ function gap(a, b) {
 }
 
 /**
- * Returns the two boards that share no handle and overlap most, and their overlap in metres; null if no two boards are
- * nearer than `tolerance` metres, the rounding of their places. Boards are compared with those of the same and the
- * adjacent squares of a grid.
+ * Calls `found` with each two boards that share no handle and whose gap is at most `most` metres, and with that gap. Boards
+ * are compared with those of the same and the adjacent squares of a grid.
  */
-export function overlapping(stage, places, tolerance) {
-  const count = places.length / STRIDE - 1, side = Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width) + tolerance;
+function eachWithin(stage, places, most, found) {
+  const count = places.length / STRIDE - 1, side = Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width) + Math.max(0, most);
   const squares = new Map(), boards = [];
-  let deepest = null;
   for (let bench = 0; bench < count; bench++) {
     const board = rectangle(stage, places, bench), column = Math.floor(board.x / side), row = Math.floor(board.y / side);
     for (let right = -1; right <= 1; right++) {
@@ -74,7 +76,7 @@ export function overlapping(stage, places, tolerance) {
         for (const other of squares.get(`${column + right},${row + up}`) ?? []) {
           if (bench - other < 2) continue;
           const apart = gap(boards[other], board);
-          if (apart <= (deepest ? -deepest.depth : tolerance)) deepest = { pair: [other, bench], depth: -apart };
+          if (apart <= most) found([other, bench], apart);
         }
       }
     }
@@ -82,5 +84,26 @@ export function overlapping(stage, places, tolerance) {
     const key = `${column},${row}`, here = squares.get(key);
     here ? here.push(bench) : squares.set(key, [bench]);
   }
+}
+
+/**
+ * Returns the two boards that share no handle and overlap most, and their overlap in metres; null if no two boards are
+ * nearer than `tolerance` metres, the rounding of their places.
+ */
+export function overlapping(stage, places, tolerance) {
+  let deepest = null;
+  eachWithin(stage, places, tolerance, (pair, apart) => {
+    if (!deepest || -apart > deepest.depth) deepest = { pair, depth: -apart };
+  });
   return deepest && { ...deepest, place: nearest(stage, places, ...deepest.pair) };
+}
+
+/** Returns the nearest two boards that share no handle, and their place; null if none are within `most` metres. */
+export function nearestPair(stage, places, most) {
+  let best = null;
+  eachWithin(stage, places, most, (pair) => {
+    const place = nearest(stage, places, ...pair);
+    if (place.away < (best?.place.away ?? Infinity)) best = { pair, place };
+  });
+  return best;
 }

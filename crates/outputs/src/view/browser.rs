@@ -102,7 +102,7 @@ async fn wait_for(pictures: &mut watch::Receiver<Picture>, due: Instant) -> Resu
 
 /// Returns the messages about changes besides the frame.
 fn changed_messages(picture: &Picture, known: &Picture) -> Vec<Message> {
-    let parts = |of: &Picture| [of.waiting.clone(), of.stage.clone(), of.alert.clone()];
+    let parts = |of: &Picture| [&of.waiting, &of.stage, &of.alert, &of.facts, &of.chase].map(Clone::clone);
     let changed = parts(picture).into_iter().zip(parts(known)).filter(|(new, old)| new != old && !new.is_empty());
     let newest_cue = known.cues.iter().map(|(number, _)| *number).max().unwrap_or(0);
     let cues = picture.cues.iter().filter(|(number, _)| *number > newest_cue);

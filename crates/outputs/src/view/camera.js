@@ -10,6 +10,10 @@ const BOARDS_FOLLOWED = 2.5;
 const LEAST_FILLED = 0.75;
 /** The time in which the camera moves most of the way to a new frame, ms. */
 const EASING = 700;
+/** The room ahead of a head that moves outward: metres, at most a head's board, and at least this share of the shorter side. */
+const LEAD = 3, LEAD_SHARE = 0.12;
+/** The distance of a head from the middle of the box, as a share of half the box, beyond which it needs room. */
+const OUTER = 0.7;
 
 export class Camera {
   constructor() {
@@ -18,6 +22,8 @@ export class Camera {
     this.frame = this.goal = null;
     /** The greatest distance of a bench from the centre so far, m. */
     this.reach = 1;
+    /** True for a user who prefers no motion: a new frame is shown at once. */
+    this.still = false;
     this.followed = 0;
     this.turn(0);
     this.whole();
@@ -52,14 +58,18 @@ export class Camera {
     this.zoom = 1;
   }
 
-  /** Updates the frame: all teams, each with `stage` and `places`, and the team of the followed bench. */
-  update(teams, passed, followed = teams[0]) {
+  /**
+   * Updates the frame: all teams, each with `stage` and `places`, the team of the followed bench, and the simulated seconds
+   * per second of the fastest show, with which the camera keeps up.
+   */
+  update(teams, passed, followed = teams[0], rate = 1) {
     this.longest = Math.max(...teams.map(({ stage }) => Math.max(stage.head_length, stage.body_length)));
-    const box = teams.map(({ stage, places }) => this.box(stage, places)).reduce(around), { places } = followed;
+    const all = teams.map(({ stage, places }) => this.box(stage, places)).reduce(around), { places } = followed;
+    const box = teams.reduce((box, { stage, places }) => this.ahead(box, all, stage, places), all);
     if (!this.goal || this.stale || outgrown(this.goal, box)) this.goal = grown(box);
     if (!this.frame || this.stale) this.frame = this.goal;
     this.stale = false;
-    const part = 1 - Math.exp(-passed / EASING), close = Math.max(...this.frame.map((one, k) => Math.abs(one - this.goal[k]))) < 1e-4 * this.goal[2];
+    const part = this.still ? 1 : 1 - Math.exp((-passed * Math.max(1, rate)) / EASING), close = Math.max(...this.frame.map((one, k) => Math.abs(one - this.goal[k]))) < 1e-4 * this.goal[2];
     this.frame = close ? this.goal : this.frame.map((one, k) => one + part * (this.goal[k] - one));
     if (this.mode === "whole") this.aim(this.frame);
     const k = STRIDE * Math.min(this.followed, places.length / STRIDE - 1);
@@ -82,6 +92,18 @@ export class Camera {
     }
     const edge = stage.width + stage.hole_inset;
     return [(left + right) / 2, (low + high) / 2, (right - left) / 2 + edge, (high - low) / 2 + edge];
+  }
+
+  /** Returns a box with room ahead of a head that leaves the box `all` of everything, in the outer part of it. */
+  ahead(box, [x, y, wide, high], stage, places) {
+    const [px, py, heading] = places, { c, s } = this, dx = Math.cos(heading), dy = Math.sin(heading);
+    const lead = Math.max(Math.min(LEAD, stage.head_length), 2 * LEAD_SHARE * Math.min(wide, high));
+    const axes = [[px * c - py * s, dx * c - dy * s, x, wide], [px * s + py * c, dx * s + dy * c, y, high]];
+    const room = axes.map(([at, along, middle, half]) => {
+      const isLeaving = Math.abs(at - middle) > OUTER * half && (at - middle) * along > 0;
+      return isLeaving ? at + Math.sign(along) * lead * Math.abs(along) : at;
+    });
+    return around(box, [room[0], room[1], 0, 0]);
   }
 
   /** Pixels of the screen (not of the canvas) for a metre. */

@@ -65,8 +65,10 @@ function canPause(streams) {
 /** Returns true if a publisher can execute commands. */
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
 
-/** `keysConduct`: true if keys conduct; in the show look only on request. */
-export function conduct(dragons, keysConduct) {
+/**
+ * `keysConduct`: true if keys conduct; in the show look only on request. `keySwitch` says whether they do outside the bar.
+ */
+export function conduct(dragons, keysConduct, keySwitch) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
   bar.innerHTML = BAR;
   translate(bar);
@@ -228,6 +230,8 @@ export function conduct(dragons, keysConduct) {
       greeted.set(stream, stream.socket);
       allowed.set(stream, message.allowed);
       bar.hidden = ![...allowed.values()].some(Boolean);
+      // The curve of the clearance stands under the time line where there is one.
+      if (!bar.hidden) line.parentElement.after(document.getElementById("curve"));
       if (stream === lead()) [sought, wanted] = [null, null];
       show();
     }
@@ -298,6 +302,11 @@ export function conduct(dragons, keysConduct) {
     if (usedBy(target, key)) return within && event.stopPropagation();
     const act = keys[key.length === 1 ? key.toLowerCase() : key];
     if (!act && !(target === line && /^(Arrow|Home|End|Page)/.test(key))) return;
+    if (!within && !keySwitch.on) {
+      // Arrows move the picture or the page, and letters may be the picture's.
+      if (!key.startsWith("Arrow") && !event.repeat) report(say("keysOff"));
+      return;
+    }
     // The picture's own keys do not act as well.
     event.stopPropagation();
     if (!act) return;

@@ -3,7 +3,7 @@
 
 import { centreOf, obstaclesOf, pathOf } from "./drawing.js";
 import { STRIDE } from "./hermite.js";
-import { Overlap, marksOf } from "./marks.js";
+import { Nearest, Overlap, marksOf } from "./marks.js";
 import { SpeedScale } from "./palette.js";
 import { Show } from "./show.js";
 import { Stream } from "./stream.js";
@@ -53,6 +53,7 @@ export class Dragon {
     this.colours = new SpeedScale();
     this.show = show ? new Show(still) : null;
     this.overlap = new Overlap();
+    this.nearest = new Nearest();
     this.transport = new Transport();
     /** The handles at the moment of the picture, and the two frames around it. */
     this.places = this.shown = null;
@@ -95,7 +96,7 @@ export class Dragon {
     const silent = !trouble && newest && silence > Math.max(SILENCE, 3 * (playback.isPaced ? playback.interval : LONGEST_PERIOD)) ? Math.floor(silence / 1000) : null;
     const lost = trouble ?? (newest && stage ? null : "noStage");
     const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
-    this.transport.look(now, newest, lost ?? (silent === null ? null : "silent"), (number) => this.cueOf(number));
+    this.transport.look(now, newest, lost ?? (silent === null ? null : "silent"), (number) => this.cueOf(number), this.stream.facts?.loop_stand ?? null);
     let [seconds, ahead] = [NaN, null];
     if (!lost && silent === null && newest.playback !== ENDED && !current.happened) {
       ahead = alert?.event ?? "path_end";
@@ -127,7 +128,8 @@ export class Dragon {
     this.measure(stage, newest);
     const { alert } = this.stream, known = stage.states[newest.state] ?? UNKNOWN;
     const deepest = known.happened && known.severity !== "ok" ? this.overlap.look(stage, this.places, newest, this.reach, now) : null;
-    const all = marksOf({ state: known, alert, stage, places: this.places, overlap: deepest });
+    const near = newest.playing || this.show ? null : this.nearest.look(stage, this.places, newest);
+    const all = marksOf({ state: known, alert, stage, places: this.places, overlap: deepest, near });
     // Marks are for the crew; an audience sees lanterns that burn white.
     this.marks = this.show ? [] : this.named(all, deepest);
     this.sight.now = deepest && !this.sight.trouble ? overlapWords(deepest) : "";
@@ -187,6 +189,7 @@ export class Dragon {
       mark.names = mark.pair.map((bench) => this.own(nameOf(bench)));
       const benches = mark.pair.length ? benchesOf(mark.pair) : "", { alert } = this.stream;
       if (mark.kind === "coming") mark.text = this.own(say(time === null ? "comingStill" : "coming", { kind: say(alert.event), benches, time }));
+      if (mark.line) mark.text = this.own(say("distance", { metres: mark.place.away.toFixed(3) }));
       if (mark.kind === "overlap") mark.text = this.own(overlapWords(deepest));
     }
     return marks;

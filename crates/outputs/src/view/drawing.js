@@ -4,7 +4,7 @@ import { rectangle } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 import { NARROW } from "./labels.js";
 import { SHADES } from "./palette.js";
-import { doubled, scaleBar, target } from "./signs.js";
+import { between, doubled, scaleBar, target } from "./signs.js";
 
 /** Edges drawn at once: a path with thousands takes several times as long. */
 const BATCH = 100;
@@ -208,16 +208,18 @@ export class Ground {
  * Draws everything. `scene` has: ground, labels (null: no words are written), and dragons, each with stage, places (STRIDE
  * numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench, or -1),
  * its chosenName, its endNames, stale (true if it is stale beside live ones), and identity (see
- * palette.js; null for a single dragon). Returns the words written, as boxes in pixels.
+ * palette.js; null for a single dragon); the measure, and whether the picture has the focus. Returns the words written, as
+ * boxes in pixels.
  */
-export function draw(context, camera, palette, { ground, dragons, labels }) {
+export function draw(context, camera, palette, { ground, dragons, labels, measure, hasFocus }) {
   ground.cover(context, camera, palette, dragons.map(({ path, obstacles, identity }) => ({ lines: path, obstacles, dashes: identity?.dashes ?? [] })));
   const stale = dragons.filter((dragon) => dragon.stale);
   for (const dragon of stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (stale.length) ground.dim(context, DIMMED);
   for (const dragon of dragons) if (!dragon.stale) drawDragon(context, camera, palette, ground.transparent, dragon);
-  if (!labels) return [];
-  const keep = [scaleBar(context, camera, palette)], { items, rings, marked } = wordsOf(dragons, palette, camera.width < NARROW);
+  const measured = measure.draw(context, camera, palette, hasFocus);
+  if (!labels) return measured;
+  const keep = [scaleBar(context, camera, palette), ...measured], { items, rings, marked } = wordsOf(dragons, palette, camera.width < NARROW);
   return labels.draw(context, camera, palette, { dragons, items, rings: rings.map(({ x, y }) => camera.toPixel(x, y)), marked, keep });
 }
 
@@ -243,7 +245,10 @@ function drawDragon(context, camera, palette, transparent, dragon) {
   // The first in the list lies on top.
   for (const { pair, ink, dashes } of marks.toReversed()) pair.filter((bench) => bench < count).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
   if (chosen >= 0 && chosen < count) mark(chosen, palette.ink, 3, [7, 4]);
-  for (const { place, ink, ghost } of marks.toReversed()) if (place) target(context, place, palette, pixel, palette[ink], ghost);
+  for (const { kind, place, line, ink, ghost } of marks.toReversed()) {
+    if (place && kind !== "nearest") target(context, place, palette, pixel, palette[ink], ghost);
+    if (line) between(context, line, palette, pixel, palette[ink]);
+  }
 }
 
 /**

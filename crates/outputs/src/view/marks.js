@@ -1,6 +1,6 @@
 // The marks on the picture: the next event and its place, the nearest boards now, and the overlap after a contact.
 
-import { nearest, overlapping } from "./boards.js";
+import { nearest, nearestPair, overlapping } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 
 /** The greatest error of a gap by the rounding of places to 32 bits, metres for each metre from the centre. */
@@ -8,6 +8,8 @@ const ROUNDING = 1e-6;
 /** The interval of searches for overlapping boards in a team of more benches than `SMALL`, ms. */
 const SEARCH_INTERVAL = 200;
 const SMALL = 500;
+/** The clearance up to which the nearest two boards of a show that stands are searched, m: beyond it nothing is near. */
+const FAR = 5;
 
 /** The benches among these numbers: those of obstacles follow the handles. */
 const benchesOf = (stage, ...numbers) => numbers.filter((number) => number !== null && number !== undefined && number < stage.benches);
@@ -28,17 +30,36 @@ export class Overlap {
   }
 }
 
+/** The nearest two boards of a show that stands: searched once for each frame that is shown. */
+export class Nearest {
+  constructor() {
+    this.found = null;
+    this.key = null;
+  }
+
+  look(stage, places, newest) {
+    const key = [newest.run, newest.sequence, newest.time].join();
+    if (!(newest.clearance > 0 && newest.clearance < FAR)) return null;
+    if (this.key !== key) [this.key, this.found] = [key, nearestPair(stage, places, newest.clearance + 1e-3)];
+    return this.found;
+  }
+}
+
 /**
  * The marks of a state: each with the benches it concerns (`pair`), a place, a colour of the palette, whether the place
- * is a ghost (in the future), whether the outlines are dashed. The caller, which knows the language, sets `text` and
- * `names`.
+ * is a ghost (in the future), whether the outlines are dashed, and a `line` between the two. The caller, which knows the
+ * language, sets `text` and `names`. `near` are the nearest two boards of a show that stands, or null.
  */
-export function marksOf({ state, alert, stage, places, overlap }) {
-  if (state.severity === "ok" || !alert) return [];
+export function marksOf({ state, alert, stage, places, overlap, near }) {
+  const still = near && !overlap ? [{ kind: "nearest", pair: [], place: near.place, line: near.place.ends, ink: "ink" }] : [];
+  if (state.severity === "ok" || !alert) return still;
   if (!state.happened) {
     const event = benchesOf(stage, alert.event_bench_a, alert.event_bench_b), now = benchesOf(stage, alert.bench_a, alert.bench_b);
     const marks = [];
-    if (now.length === 2 && Math.max(...now) < places.length / STRIDE - 1) marks.push({ kind: "now", pair: now, place: nearest(stage, places, ...now), ink: "warning", dashes: [7, 5] });
+    if (now.length === 2 && Math.max(...now) < places.length / STRIDE - 1) {
+      const place = nearest(stage, places, ...now);
+      marks.push({ kind: "now", pair: now, place, line: place.away > 0 ? place.ends : null, ink: "warning", dashes: [7, 5] });
+    }
     if (alert.event_x !== null) marks.push({ kind: "coming", pair: event, place: { x: alert.event_x, y: alert.event_y }, ink: "danger", ghost: true });
     return marks.reverse();
   }

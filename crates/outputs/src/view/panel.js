@@ -1,7 +1,7 @@
 // The panel beside the picture: the state, the countdown, the sentence, the figures. Draws nothing.
 
 import { STRIDE, speedOf } from "./hermite.js";
-import { capital, proofOf, remaining, say, sentenceOf } from "./words.js";
+import { capital, chaseOf, proofOf, remaining, say, sentenceOf } from "./words.js";
 
 /** By severity; the list of the states, with the severity of each, comes with the stage. */
 export const SIGNS = { ok: "○", warning: "△", error: "✖" };
@@ -85,6 +85,20 @@ function countdown({ state, seconds, ahead, stands }, last, own) {
   const mark = near ? ([10, 5, 3].findLast((mark) => seconds <= mark) ?? Infinity) : Infinity;
   if (mark < last.mark && state.severity !== "ok" && !stands) put("spoken", own(say("seconds", { seconds: Math.ceil(seconds) })));
   last.mark = mark;
+}
+
+/** The time without a status after which a chase counts as dead (ms). It sends five a second. */
+const CHASE_SILENCE = 2000;
+
+/** The chase of the dragon of the header, as long as one runs; `of` is its name, or null for a single dragon. */
+export function showChase(chase, now, of) {
+  const { dataset } = document.body, runs = Boolean(chase) && chase.state !== "ended", hasDied = runs && now - chase.at > CHASE_SILENCE;
+  element("chase").hidden = !runs;
+  if (!runs) return (dataset.chase = "");
+  const words = hasDied ? say("chaseDied") : chaseOf(chase), state = hasDied ? "died" : chase.state;
+  put("chase", of ? `${of}: ${words}` : words);
+  if (dataset.chase !== state) put("spoken", element("chase").textContent);
+  dataset.chase = state;
 }
 
 /** Clearance, speeds and time; empty without frames. */

@@ -2,7 +2,7 @@
 
 /**
  * `acts` has: pan(x, y) and zoomAt(by, x, y) in pixels, isFree() (true if two fingers may move the picture), tap(x, y),
- * and `keys`, an action for each key.
+ * `keys`, an action for each key, and isWanted(event), true if the key of a letter or a sign may act.
  */
 export function attach(canvas, acts) {
   const fingers = new Map();
@@ -41,6 +41,7 @@ export function attach(canvas, acts) {
     if (typing && event.key !== "Escape") return;
     if (typing) event.target.blur();
     if (event.target.closest?.("dialog")) return;
-    acts.keys[event.key.length === 1 ? event.key.toLowerCase() : event.key]?.();
+    if (event.key.length === 1 && !acts.isWanted(event)) return;
+    acts.keys[event.key.length === 1 ? event.key.toLowerCase() : event.key]?.(event);
   });
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 
-use super::{Picture, Proofs, SceneHash, wire};
+use super::{Facts, Picture, Proofs, SceneHash, wire};
 use bench_dragon_client::feed::{Feed, FeedEvent};
 use bench_dragon_messages::{LoopStatus, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
@@ -21,25 +21,21 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 const KEPT_CUES: usize = 16;
 
 /// Keeps the picture up to date until `stop` is set, through any number of publishers of a name.
-pub(super) fn read(mut feed: Feed, name: &str, proofs: &Proofs, sender: &watch::Sender<Picture>, stop: &AtomicBool) {
-    let (picture, publisher) = (Picture::waiting(None), name.to_owned());
-    let mut reader = Reader {
-        picture,
-        publisher,
-        proofs,
-        stage: None,
-        proved: None,
-        unproved: None,
-        status: None,
-        cues: 0,
-        has_several: false,
-    };
+pub(super) fn read(
+    mut feed: Feed,
+    name: &str,
+    (proofs, facts): (&Proofs, &Arc<Facts>),
+    sender: &watch::Sender<Picture>,
+    stop: &AtomicBool,
+) {
+    let mut reader = Reader::new(name, proofs, facts);
     let mut reason: Option<String> = None;
     sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {
         let mut changed = false;
         let polled = feed.poll(POLL_INTERVAL, &mut |event| changed |= reader.handle(event));
         changed |= reader.look_for_proof();
+        changed |= reader.look_for_facts();
         // The services may become usable while this continues: a program of another version ends, a subscriber leaves.
         let now = polled.err().map(|error| error.to_string());
         if now != reason {
@@ -69,6 +65,7 @@ struct Reader<'a> {
     /// The publisher's name.
     publisher: String,
     proofs: &'a Proofs,
+    facts: &'a Arc<Facts>,
     stage: Option<StageMessage>,
     /// The proofs of the scene of that stage.
     proved: Option<Arc<[ProvedEvent]>>,
@@ -80,9 +77,27 @@ struct Reader<'a> {
     cues: u64,
     /// True for a show of several dragons, until it has gone.
     has_several: bool,
+    /// The run and the scene whose facts are not computed yet.
+    unknown: Option<(u64, SceneHash)>,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    fn new(name: &str, proofs: &'a Proofs, facts: &'a Arc<Facts>) -> Self {
+        Self {
+            picture: Picture::waiting(None),
+            publisher: name.to_owned(),
+            proofs,
+            facts,
+            stage: None,
+            proved: None,
+            unproved: None,
+            status: None,
+            cues: 0,
+            has_several: false,
+            unknown: None,
+        }
+    }
+
     /// Applies an event. Returns true if the picture changed.
     fn handle(&mut self, event: FeedEvent<'_>) -> bool {
         match event {
@@ -118,7 +133,7 @@ impl Reader<'_> {
             FeedEvent::Frame { header, handles, .. } => self.picture.frame = wire::frame(header, handles).into(),
             FeedEvent::Gone => {
                 self.picture = Picture::waiting(None);
-                (self.stage, self.proved, self.status) = (None, None, None);
+                (self.stage, self.proved, self.status, self.unknown) = (None, None, None, None);
                 return true;
             }
             // The page itself counts the time since the latest frame.
@@ -129,9 +144,18 @@ impl Reader<'_> {
                 self.describe();
                 return true;
             }
-            FeedEvent::Silent | FeedEvent::Started { .. } | FeedEvent::Scene { .. } | FeedEvent::Chase(_) => {
+            FeedEvent::Scene { header, text } => {
+                if !text.is_empty() {
+                    self.facts.request(header.hash, text);
+                    self.unknown = Some((header.run_id, header.hash));
+                }
                 return false;
             }
+            FeedEvent::Chase(status) => {
+                self.picture.chase = wire::chase(status).into();
+                return true;
+            }
+            FeedEvent::Silent | FeedEvent::Started { .. } => return false,
         }
         self.picture.waiting = Default::default();
         true
@@ -149,6 +173,15 @@ impl Reader<'_> {
             self.describe();
         }
         self.proved.is_some()
+    }
+
+    /// Looks for facts about the scene that have been computed. Returns true if they change the picture.
+    fn look_for_facts(&mut self) -> bool {
+        let Some((run, scene)) = self.unknown else { return false };
+        let Some(facts) = self.facts.of(&scene) else { return false };
+        self.picture.facts = wire::facts(run, &facts).into();
+        self.unknown = None;
+        true
     }
 
     /// Warns once for each scene that all certificates are for other scenes.

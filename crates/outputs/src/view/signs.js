@@ -34,6 +34,20 @@ export function target(context, { x, y }, palette, pixel, ink, ghost) {
   doubled(context, palette, pixel, ink, 3, ring, ghost ? [9, 5] : []);
 }
 
+/** A line between two places, with a dot at each end. */
+export function between(context, ends, palette, pixel, ink) {
+  doubled(context, palette, pixel, ink, 2.5, () => {
+    context.beginPath();
+    for (const { x, y } of ends) {
+      context.moveTo(x + 2.5 * pixel, y);
+      context.arc(x, y, 2.5 * pixel, 0, 7);
+    }
+    context.moveTo(ends[0].x, ends[0].y);
+    context.lineTo(ends[1].x, ends[1].y);
+    context.stroke();
+  });
+}
+
 /** Draws the length of a round number of metres in the lower right corner; returns its box. */
 export function scaleBar(context, camera, palette) {
   const { ratio, unit, width, height } = camera;
@@ -62,4 +76,18 @@ export function scaleBar(context, camera, palette) {
   context.strokeText(text, right, bottom - 7 * unit);
   context.fillText(text, right, bottom - 7 * unit);
   return { x: right - length / 2, y: bottom - 12 * unit, half: Math.max(length / 2, 30 * unit), tall: 18 * unit, text };
+}
+
+/** Writes words on a plate whose middle is at a pixel, moved into the picture; returns its box. */
+export function plate(context, camera, palette, x, y, text) {
+  const { unit, width, height } = camera, size = 15 * unit, tall = size / 2 + 4 * unit;
+  Object.assign(context, { font: `600 ${size}px system-ui, sans-serif`, textAlign: "center", textBaseline: "middle", fillStyle: palette.ground });
+  const half = context.measureText(text).width / 2 + 6 * unit;
+  const within = (at, most, edge) => Math.max(edge, Math.min(most - edge, at));
+  const box = { x: within(x, width, half), y: within(y, height, tall), half, tall, text };
+  context.fillRect(box.x - half, box.y - tall, 2 * half, 2 * tall);
+  Object.assign(context, { strokeStyle: palette.ink, lineWidth: 1.2 * unit, fillStyle: palette.ink });
+  context.strokeRect(box.x - half, box.y - tall, 2 * half, 2 * tall);
+  context.fillText(text, box.x, box.y);
+  return box;
 }

@@ -6,16 +6,21 @@ import { wordsOf } from "./address.js";
 import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Cameras } from "./cameras.js";
+import { Curve } from "./curve.js";
 import { Dragon } from "./dragon.js";
 import { Labels } from "./labels.js";
 import { Lanterns } from "./lanterns.js";
 import { lock } from "./lock.js";
 import { Ground, draw } from "./drawing.js";
+import { speedOf } from "./hermite.js";
+import { KeySwitch } from "./key_switch.js";
+import { Measure } from "./measure.js";
 import { Pace } from "./pace.js";
 import { attach } from "./pointer_input.js";
 import { identityOf, paletteOf } from "./palette.js";
-import { element, put, showBench, showFigures, showNames, showProofs, showSituation, showTransport } from "./panel.js";
+import { element, put, showBench, showChase, showFigures, showNames, showProofs, showSituation, showTransport } from "./panel.js";
 import { publishers } from "./publishers.js";
+import { Resolution } from "./resolution.js";
 import { Roster } from "./roster.js";
 import { Seat } from "./seat.js";
 import { Sound } from "./sound.js";
@@ -29,13 +34,13 @@ const HEADER_LEAD = 1;
 const words = wordsOf(location.hash), root = document.documentElement, stillness = matchMedia("(prefers-reduced-motion: reduce)");
 // A seat is a place in the audience of a show.
 words.show ??= words.seat && true;
-setLanguage(words.lang);
+setLanguage(words.lang ?? navigator.language);
 translate(document);
 for (const word of ["show", "transparent", "tell"]) root.toggleAttribute(`data-${word}`, Boolean(words[word]));
 if (words.dark || words.light || words.show) root.dataset.theme = words.light ? "light" : "dark";
 
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: "transparent" in words });
-const camera = new Camera(), ground = new Ground("transparent" in words), sound = new Sound();
+const camera = new Camera(), resolution = new Resolution(), ground = new Ground("transparent" in words), sound = new Sound();
 const labels = "nolabels" in words ? null : new Labels(stillness.matches);
 const seat = words.seat ? new Seat(words.seat === true ? [] : words.seat) : null, pace = seat ? new Pace() : null;
 const lanterns = seat ?? (words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null);
@@ -43,12 +48,19 @@ const lanterns = seat ?? (words.show ? new Lanterns({ transparent: words.transpa
 const eye = seat ?? camera;
 const several = publishers.length > 1, dragons = publishers.map((name) => new Dragon(name, { several, show: words.show, still: stillness.matches }));
 root.toggleAttribute("data-several", several);
+const keySwitch = new KeySwitch(words.keys || words.desk || words.hands, element("keys-on"));
+const curve = new Curve(element("curve"));
+const measure = new Measure((said) => {
+  put("measured", said);
+  element("measured").hidden = !said;
+  element("measure").setAttribute("aria-pressed", measure.on);
+});
 const roster = several ? new Roster(dragons, select) : null;
 /**
  * `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon of the figures, null for that of
  * the header.
  */
-let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0;
+let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0, drawnAt = -Infinity;
 
 /**
  * For tests and measurements: the received and drawn data. `shown` is the simulated time and the handles of the
@@ -60,8 +72,10 @@ const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequ
 window.picture = picture;
 
 function fitCanvas() {
-  const { width, height } = canvas.getBoundingClientRect(), ratio = devicePixelRatio;
-  Object.assign(camera, { width, height, ratio });
+  const { width, height } = canvas.getBoundingClientRect();
+  if (width !== camera.width || height !== camera.height) resolution.clear();
+  const ratio = resolution.ratio(devicePixelRatio, width, height);
+  Object.assign(camera, { width, height, ratio, still: stillness.matches });
   const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
   if (canvas.width === wide && canvas.height === high) return;
   [canvas.width, canvas.height] = [wide, high];
@@ -95,7 +109,7 @@ function pass() {
     showText(now);
     return drawNothing();
   }
-  camera.update(there, passed, there.includes(whose) ? whose : there[0]);
+  camera.update(there, passed, there.includes(whose) ? whose : there[0], Math.max(...there.map(({ newest }) => newest.scale)));
   camera.reach = Math.max(...there.map(({ path }) => path.reach));
   showText(now);
   const soonest = dragons.map(({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
@@ -108,15 +122,17 @@ function pass() {
 /** Draws the picture, only if it has changed: a show that stands still costs nothing. */
 function paint(there) {
   if (lanterns) return light(there);
-  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground, labels?.settled === false && performance.now()].join();
+  const hasFocus = document.activeElement === canvas;
+  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground, measure.key, hasFocus && measure.on, labels?.settled === false && performance.now()].join();
   if (look === last) return;
-  last = look;
+  if (last) resolution.take(passedAt - drawnAt);
+  [last, drawnAt] = [look, passedAt];
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
     const { stage, places, colours, path, marks, sight } = dragon, own = dragon === whose ? chosen : -1;
     return { stage, places, colours, path: path.lines, obstacles: path.obstacles, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
   });
-  const written = draw(context, camera, palette, { ground, dragons: scene, labels });
+  const written = draw(context, camera, palette, { ground, dragons: scene, labels, measure, hasFocus });
   picture.drawn++;
   Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels: written });
   // A dragon that has stopped is drawn again while another one moves: this is no latency of its frames.
@@ -127,7 +143,8 @@ function paint(there) {
 function light(there) {
   const isDue = pace?.begin(passedAt) ?? true, look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, seat?.key].join();
   if (look === last || !isDue) return;
-  last = look;
+  if (last && !seat) resolution.take(passedAt - drawnAt);
+  [last, drawnAt] = [look, passedAt];
   lanterns.draw(context, camera, there);
   pace?.drawn(passedAt);
   picture.drawn++;
@@ -161,6 +178,7 @@ function showText(now) {
   showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of });
   showTransport(first.transport, { now, of, keys: !element("conduct").hidden });
   roster?.show(first, selected);
+  showChase(first.stream.chase, now, of);
   const notices = dragons.map((one) => one.notice()).filter(Boolean);
   // The style sheet shows them in the show look only on request.
   if (words.show && !notices.length && sight.trouble) notices.push(capital(say(sight.trouble)));
@@ -168,6 +186,7 @@ function showText(now) {
   put("notice", notices.join("\n"));
   showSeat();
   const shown = selected ?? first, { newest, stage, colours, stream } = shown;
+  curve.show(shown.isThere ? stream.facts : null, stage?.freeze_time, newest?.time);
   // The scene of a picture that stays may no longer be played.
   showProofs(shown.isThere && !shown.sight.trouble ? stage : null);
   // The rest changes too often to be readable at every pass.
@@ -225,6 +244,20 @@ function dressed() {
   palette = paletteOf(canvas);
   last = null;
 }
+/** Paper is white: the picture is printed light, and then has its theme again. */
+function print(isBegin) {
+  if (lanterns) return;
+  if (isBegin) root.dataset.printed = root.dataset.theme ?? "";
+  const before = root.dataset.printed;
+  if (isBegin) root.dataset.theme = "light";
+  else if (before) root.dataset.theme = before;
+  else delete root.dataset.theme;
+  dressed();
+  const there = dragons.filter(({ isThere, places }) => isThere && places);
+  if (there.length) paint(there);
+}
+addEventListener("beforeprint", () => print(true));
+addEventListener("afterprint", () => print(false));
 function toggleTheme() {
   const theme = root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
   root.dataset.theme = theme === "dark" ? "light" : "dark";
@@ -240,15 +273,31 @@ function toggleSound() {
   sound.turn(!sound.on);
   element("sound").setAttribute("aria-pressed", sound.on);
 }
-const help = () => element("keys").showModal();
+function help() {
+  element("keys-conduct").hidden = element("conduct").hidden;
+  element("keys").showModal();
+}
+/** Says where the head is, for a screen reader; again if the words are the same. */
+function speak() {
+  if (!whose.isThere) return;
+  const { handles } = whose.newest, speed = speedOf(handles, 0), values = { x: handles[0].toFixed(2), y: handles[1].toFixed(2), speed: Number.isNaN(speed) ? say("notSent") : say("perSecond", { speed: speed.toFixed(2) }), clearance: element("metres").textContent };
+  put("spoken", "");
+  setTimeout(() => put("spoken", whose.own(say("spokenNow", values))), 100);
+}
+const measureMiddle = () => measure.on && document.activeElement === canvas && measure.take(camera.toStage(camera.width / 2, camera.height / 2));
+function escape() {
+  if (measure.on) return measure.toggle(false);
+  choose(-1);
+}
 
 const zoom = (by) => () => eye.zoomAt(by);
 const keys = {
   "+": zoom(1.25), "=": zoom(1.25), "-": zoom(0.8), 0: whole, Home: whole,
-  f: follow, t: toggleTheme, p: fill, s: toggleSound, "?": help, Escape: () => choose(-1),
+  f: follow, t: toggleTheme, p: fill, s: toggleSound, "?": help, i: speak, m: () => measure.toggle(), Enter: measureMiddle, Escape: escape,
   ArrowLeft: () => pan(60, 0), ArrowRight: () => pan(-60, 0), ArrowUp: () => pan(0, 60), ArrowDown: () => pan(0, -60),
 };
 function tap(x, y) {
+  if (measure.on) return measure.take(camera.toStage(x, y));
   const there = dragons.filter(({ isThere, places }) => isThere && places), place = camera.toStage(x, y), reach = 16 / camera.scale;
   if (!there.length) return;
   // A hit board has priority over a near one.
@@ -263,14 +312,14 @@ function tap(x, y) {
 // An audience's picture obeys no hand that happens to touch it.
 if (words.show) lock(() => `${say("locked")} · ${element("time").textContent} · ${element("playback").textContent}`);
 if (words.show) keys["?"] = () => null;
-if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (eye.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench" });
+if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (eye.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench", isWanted: (event) => keySwitch.acts(event, canvas) });
 if (!words.show || words.hands) new Cameras(eye, seat ? "seat" : "stage", element("camera-note"));
 element("pick").oninput = ({ target }) => {
   chosen = target.value === "" ? -1 : Math.floor(target.value) - 1;
   if (several && chosen >= 0) [whose, selected] = [selected ?? foremost(), selected ?? foremost()];
   showFollow();
 };
-Object.entries({ follow, whole, theme: toggleTheme, full: fill, sound: toggleSound, help, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
+Object.entries({ follow, whole, theme: toggleTheme, full: fill, sound: toggleSound, help, measure: keys.m, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
 matchMedia("(prefers-color-scheme: dark)").onchange = dressed;
 stillness.onchange = () => dragons.forEach(({ show }) => show && (show.still = stillness.matches));
 // Sound set in the address begins with the first key or click, if the browser requires one.
@@ -286,5 +335,5 @@ if (words.follow) camera.follow(words.follow === true ? 0 : words.follow[0] - 1)
 if (words.unknown.length) put("address", say("address", { words: words.unknown.join(", ") }));
 element("address").hidden = !words.unknown.length;
 showFollow();
-conduct(dragons, !words.show || words.desk);
+conduct(dragons, !words.show || words.desk, keySwitch);
 pass();

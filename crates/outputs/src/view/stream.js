@@ -113,7 +113,7 @@ export class Stream {
   constructor(name = null) {
     this.name = name;
     this.playback = new Playback();
-    this.messages = { stage: {}, alert: {}, cue: {} };
+    this.messages = { stage: {}, alert: {}, cue: {}, facts: {}, chase: {} };
     /** The reason why no frames come: a key of the page's words, or the server's reason; null while they come. */
     this.trouble = "server";
     this.received = 0;
@@ -200,6 +200,7 @@ export class Stream {
     // The sizes and the path of the first dragon are those of the stage.
     if (message.type === "stage") Object.assign(message, { ...message.dragons[0], name: message.name });
     if (message.type === "waiting") this.lose(message.reason ?? "publisher");
+    message.at = performance.now();
     if (this.messages[message.type]) this.messages[message.type].newest = message;
   }
 
@@ -226,6 +227,16 @@ export class Stream {
   /** The latest cue of that run, or null. */
   get cue() {
     return this.ofRun("cue");
+  }
+
+  /** The facts about that run's scene that take time to compute, or null. */
+  get facts() {
+    return this.ofRun("facts");
+  }
+
+  /** The latest status of a chase of that run, or null. */
+  get chase() {
+    return this.ofRun("chase");
   }
 
   /** Messages of the next run may come before its first frame: until then those of the last run are kept. */

@@ -12,6 +12,8 @@ const LOST = { server: "noServer", silent: "noFrames", noStage: "noStageYet", ve
 const AT_CUE = 1e-6;
 /** The time for which the name of a passed cue is shown while the show plays (ms). */
 const CUE_TIME = 6000;
+/** The difference of two ends of a loop that are alike, s. */
+const ALIKE = 0.5;
 
 export class Transport {
   constructor() {
@@ -25,11 +27,21 @@ export class Transport {
     /** The last known rate of the run; 1 before the show has played. */
     this.pace = 1;
     this.frame = null;
+    /** The wall seconds for which a looped show stands at its end; null if it is not known to begin again. */
+    this.stand = null;
+    /** That time as this page last saw it, and whether it saw the present end begin. */
+    this.seen = NaN;
+    this.isWhole = false;
   }
 
-  /** Updates the state at a moment. `lost` is the reason why nothing comes, or null; `cueOf` finds a cue by its number. */
-  look(now, newest, lost, cueOf) {
-    const before = this.key;
+  /**
+   * Updates the state at a moment. `lost` is the reason why nothing comes, or null; `cueOf` finds a cue by its number;
+   * `stand` is the scene's time at the end of a loop, s, or null.
+   */
+  look(now, newest, lost, cueOf, stand) {
+    const before = this.key, was = this.kind;
+    if (newest && newest.run !== this.frame?.run) [this.stand, this.seen] = [null, NaN];
+    this.stand ??= stand;
     if (newest && newest.run !== this.frame?.run) this.pace = 1;
     if (newest?.scale > 0) this.pace = newest.scale;
     if (newest && !lost) this.pass(now, newest, cueOf);
@@ -37,7 +49,17 @@ export class Transport {
     this.frame = newest;
     const waits = this.cue?.pauses && newest?.playback === 1 && Math.abs(newest.time - this.cue.time) < AT_CUE;
     this.kind = lost ? "lost" : waits ? "go" : KINDS[newest.playback] ?? "playing";
-    if (this.key !== before) this.since = now;
+    if (was === "ended" && this.kind === "playing" && this.isWhole) this.learn((now - this.since) / 1000);
+    if (this.key === before) return;
+    // The end is timed only if its beginning was seen.
+    this.isWhole = was === "playing" && this.kind === "ended";
+    this.since = now;
+  }
+
+  /** An option of the publisher may give another time than the scene; one end alone may have been cut short by a command. */
+  learn(seconds) {
+    if (Math.abs(seconds - this.seen) < ALIKE) this.stand = seconds;
+    this.seen = seconds;
   }
 
   /** Keeps the cue of a frame. A cue that passed before this page came, or in another epoch, is not announced. */
@@ -68,7 +90,10 @@ export class Transport {
     if (kind === "held") return say(keys ? "heldFor" : "sinceThen", { passed });
     if (kind === "go") return say("goDetail", { cue: named, passed });
     if (kind === "paused") return say("sinceThen", { passed });
-    if (kind === "ended") return say("endedAt", { time: frame.time.toFixed(1) });
+    if (kind === "ended") {
+      const time = frame.time.toFixed(1), left = this.stand - (now - this.since) / 1000;
+      return this.isWhole && this.stand !== null ? say("endedAgain", { time, seconds: Math.max(0, Math.ceil(left)) }) : say("endedAt", { time });
+    }
     const rate = frame.scale === 1 ? "" : say("times", { rate: +frame.scale.toPrecision(3) });
     return [rate, cue && now - this.cueAt < CUE_TIME ? named : ""].filter(Boolean).join(" · ");
   }

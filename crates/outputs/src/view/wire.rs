@@ -24,11 +24,13 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use bench_dragon_messages::json::{AlertObject, CueObject, Exact, StageObject};
-use bench_dragon_messages::sentence::{Figures, alert_sentence, state_sentence};
+use bench_dragon_messages::json::{AlertObject, ChaseObject, CueObject, Exact, StageObject};
+use bench_dragon_messages::sentence::{Figures, alert_sentence, chase_sentence, state_sentence};
 use bench_dragon_messages::state::{FrameState, Level, Severity};
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageMessage};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
+
+use super::SceneFacts;
 
 const VERSION: u8 = 3;
 const HEADER_BYTES: usize = 72;
@@ -80,6 +82,29 @@ pub(super) fn stage(
 /// Returns the message about a cue that the show has reached.
 pub(super) fn cue(cue: &Cue) -> String {
     json!(CueObject::from(cue)).to_string()
+}
+
+/// Returns the facts about the scene of a run that have been computed.
+pub(super) fn facts(run_id: u64, facts: &SceneFacts) -> String {
+    #[derive(Serialize)]
+    struct FactsMessage<'a> {
+        r#type: &'static str,
+        run_id: Exact,
+        #[serde(flatten)]
+        facts: &'a SceneFacts,
+    }
+    json!(FactsMessage { r#type: "facts", run_id: Exact(run_id), facts }).to_string()
+}
+
+/// Returns the status of a chase, with its sentence.
+pub(super) fn chase(status: &ChaseStatus) -> String {
+    #[derive(Serialize)]
+    struct ChaseMessage {
+        #[serde(flatten)]
+        status: ChaseObject,
+        sentence: String,
+    }
+    json!(ChaseMessage { status: status.into(), sentence: chase_sentence(status) }).to_string()
 }
 
 /// The facts about a state, so that a page can show states that it does not know.

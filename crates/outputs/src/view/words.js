@@ -8,6 +8,7 @@ const WORDS = {
   titleSeveral: ["{publishers}: stage picture", "{publishers}：舞台画面"],
   stage: ["Bench dragon: stage picture", "板凳龙：舞台画面"],
   canvas: ["The stage from above. Arrow keys move the picture, plus and minus zoom, F follows the head, 0 shows all, question mark lists the keys.", "从上方看的舞台。方向键移动画面，加减号缩放，F 跟随龙头，0 显示全部，问号列出按键。"],
+  stageRole: ["stage", "舞台"],
   dragons: ["All dragons", "全部舞龙队"],
   clearance: ["Clearance", "间距"],
   speed: ["Speed, m/s", "速度（m/s）"],
@@ -33,7 +34,37 @@ const WORDS = {
   key_p: ["full screen", "全屏"],
   key_s: ["sound: a tick at 3, 2, 1, a gong at the event", "声音：倒数 3、2、1 时滴答，事件发生时锣响"],
   key_escape: ["choose no bench", "取消选择"],
+  key_i: ["say where the head is, its speed and the clearance", "读出龙头位置、速度和间距"],
+  key_m: ["measure: two clicks, or Enter at the middle of the picture", "测距：点击两处，或按 Enter 取画面中点"],
   key_help: ["this list", "本列表"],
+  key_space: ["play or pause", "播放或暂停"],
+  key_seek: ["5 s back or on", "后退或前进 5 秒"],
+  key_rate: ["half or twice the speed", "速度减半或加倍"],
+  key_step: ["one step, while paused", "单步（暂停时）"],
+  key_h: ["hold all, or release", "全部锁定或解除"],
+  keysOn: ["Keys act everywhere. Off: letters only while the picture has the focus, and keys that conduct only in the bar.", "按键处处有效。关闭时：字母键仅在画面获得焦点时有效，操控键仅在操控栏内有效。"],
+  keysOff: ["Keys conduct only in this bar: press Tab until it has the focus, or switch them on under “?”.", "按键仅在此栏内有效：请按 Tab 键移入此栏，或在“?”中打开。"],
+  measure: ["Measure", "测距"],
+  measureFirst: ["Measure: click two places, or press Enter for the middle of the picture.", "测距：点击两处，或按 Enter 取画面中点。"],
+  measured: ["{metres} m from ({ax}, {ay}) to ({bx}, {by})", "({ax}, {ay}) 至 ({bx}, {by})：{metres} m"],
+  curve: ["Clearance over the whole show, from 1 mm to 1 m", "整场演出的间距，1 毫米至 1 米"],
+  leastClearance: ["least clearance {metres} m at {time} s, {benches}", "最小间距 {metres} m，{time} 秒，{benches}"],
+  chaseTracker: ["{source} tracker {tracker}", "{source} 追踪点 {tracker}"],
+  chaseMs: [", {ms} ms", "，{ms} 毫秒"],
+  chaseOff: [", {metres} m off the path", "，偏离路径 {metres} 米"],
+  chaseDied: ["The chase has died: the show stays at its last rate.", "跟随程序已终止：演出保持最后的倍速。"],
+  chase_silent: ["", "没有信号"],
+  chase_locking: ["", "正在锁定"],
+  chase_locked: ["", "已锁定"],
+  chase_freewheeling: ["", "自由运行"],
+  chase_standing: ["", "时码静止：演出停在此处"],
+  chase_backward: ["", "时码倒走：演出已暂停"],
+  chase_lost: ["", "信号丢失：演出已暂停"],
+  chase_held: ["", "等待：演出已锁定"],
+  chase_paused: ["", "等待：演出被暂停，继续后恢复"],
+  chase_sought: ["", "等待：演出被跳转，暂停并继续后恢复"],
+  distance: ["{metres}\u00a0m", "{metres}\u00a0m"],
+  spokenNow: ["Head at {x}, {y} metres. Speed {speed}. Clearance {clearance}.", "龙头位于 {x}、{y} 米。速度 {speed}。间距 {clearance}。"],
 
   // States and kinds of events.
   moving: ["moving", "行进中"],
@@ -145,6 +176,7 @@ const WORDS = {
   heldFor: ["for {passed} · release: H", "已 {passed} · 按 H 解除"],
   goDetail: ["{cue} · waits {passed}", "{cue} · 已等待 {passed}"],
   endedAt: ["at {time} s", "停于 {time} 秒"],
+  endedAgain: ["at {time} s · again in {seconds} s", "停于 {time} 秒 · {seconds} 秒后重新开始"],
   times: ["× {rate}", "× {rate}"],
   cueNamed: ["cue {number} · {name}", "提示点 {number} · {name}"],
   pictureFrom: ["picture from t = {time} s, {ago} ago", "画面停在 t = {time} 秒，{ago} 之前"],
@@ -176,9 +208,10 @@ const WORDS = {
 
 let language = 0;
 
+/** Sets the language by its tag: Chinese, or else English. */
 export function setLanguage(name) {
-  language = name === "zh" ? 1 : 0;
-  document.documentElement.lang = name === "zh" ? "zh-Hans" : "en";
+  language = /^zh\b/i.test(name) ? 1 : 0;
+  document.documentElement.lang = language ? "zh-Hans" : "en";
 }
 
 /**
@@ -189,10 +222,11 @@ export function say(key, values = {}) {
   return words.replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
 }
 
-/** Sets the words of elements with `data-word`, `data-label` or `data-title` in the page's language. */
+/** Sets the words of elements with `data-word`, `data-label`, `data-role` or `data-title` in the page's language. */
 export function translate(root) {
   for (const one of root.querySelectorAll("[data-word]")) one.textContent = say(one.dataset.word);
   for (const one of root.querySelectorAll("[data-title]")) one.title = say(one.dataset.title);
+  for (const one of root.querySelectorAll("[data-role]")) one.setAttribute("aria-roledescription", say(one.dataset.role));
   for (const one of root.querySelectorAll("[data-label]")) one.setAttribute("aria-label", say(one.dataset.label));
 }
 
@@ -247,6 +281,18 @@ export function proofOf({ event, status, time_lo, time_hi, obstacle }, freeze) {
   // Without an end of the path the proof only says that the lock comes first.
   if (status === "none") return { text: lo === null ? say("provedNone", { kind }) : say("provedNoneBefore", { kind, lo }), canCome: event !== "path_end" };
   return { text: "", canCome: false };
+}
+
+const SOURCES = { artnet: "ArtTimeCode", mtc: "MTC", ltc: "LTC", psn: "PSN" };
+
+/** Returns the status of a chase as a sentence. The English one is the server's. */
+export function chaseOf({ source, state, timecode, tracker, error, distance, sentence }) {
+  const words = WORDS[`chase_${state}`]?.[1];
+  if (language === 0 || !words) return sentence;
+  const title = SOURCES[source] ?? source, subject = timecode ? `${title} ${timecode}` : tracker === null ? title : say("chaseTracker", { source: title, tracker });
+  const isAtWork = error !== null && ["locked", "freewheeling"].includes(state);
+  const ms = isAtWork ? say("chaseMs", { ms: (1000 * error).toFixed(1) }) : "";
+  return `${subject} ${words}${ms}${distance === null ? "" : say("chaseOff", { metres: distance.toFixed(2) })}`;
 }
 
 /** A bench's name on the picture. */
