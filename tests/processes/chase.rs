@@ -191,7 +191,7 @@ fn the_log_of_a_chased_show_replays_bit_for_bit() {
     let name = "chase_log";
     let port = port().to_string();
     let log = result_file(name).with_extension("jsonl");
-    let mut run = publisher(name, &["--paused", "--log", log.to_str().unwrap()]);
+    let run = publisher(name, &["--paused", "--log", log.to_str().unwrap()]);
     let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
     let sender = sender(name, &["--port", &port, "--seconds", "8", "--jump", "100"]);
     state(&lines, "locked");
