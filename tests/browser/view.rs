@@ -409,3 +409,8 @@ fn the_clearance_of_the_whole_show_is_a_curve() {
 fn the_chase_stands_in_the_header() {
     in_reach("the_chase_stands_in_the_header");
 }
+
+#[test]
+fn a_loop_is_announced() {
+    in_reach("a_loop_is_announced");
+}

@@ -194,6 +194,8 @@ def keys_are_off(page, before):
     page.focus("#conduct-restart")
     page.keyboard.press("h")
     until(lambda: state()["playback"] == "held", "H in the bar holds")
+    # A second H releases once the page knows of the hold.
+    until(lambda: page.get_attribute("#conduct-hold", "aria-pressed") == "true", "the button is latched")
     page.keyboard.press("h")
     until(lambda: state()["playback"] == "paused", "H in the bar releases")
     page.click("#help")

@@ -134,6 +134,34 @@ def everybody_is_told():
         assert not complaints, complaints
 
 
+def a_loop_is_announced():
+    """As the scene says; or, for an option of the publisher, after two ends that were alike."""
+    with server() as url, browser() as (page, complaints):
+        page.goto(url)
+        said = page.evaluate("""async () => {
+            const { Transport } = await import("/transport.js");
+            const ends = (stand, ...lengths) => {
+                const one = new Transport(), said = [];
+                let now = 0, epoch = 0;
+                const look = (playback) => one.look(now, { run: "1", epoch, time: playback === 3 ? 412.5 : 400, playback, scale: 1, cue: 0, at: now }, null, () => null, stand);
+                look(0);
+                for (const length of lengths) {
+                    now += 1000;
+                    look(3);
+                    said.push(one.detail(now + 600, false));
+                    now += 1000 * length;
+                    epoch++;
+                    look(0);
+                }
+                return said;
+            };
+            return [ends(5, 5), ends(null, 3, 3.1, 3), ends(null, 3, 9, 4), ends(5, 2, 2, 2)];
+        }""")
+        end, again = "at 412.5 s", "at 412.5 s · again in {} s".format
+        assert said == [[again(5)], [end, end, again(3)], [end, end, end], [again(5), again(5), again(2)]], said
+        assert not complaints, complaints
+
+
 def distances_are_measured():
     """By two clicks, or by Enter at the middle of the picture; and the nearest two boards of a show that stands."""
     with server() as url, publisher("--start", "300", "--paused"), browser() as (page, complaints):
@@ -237,4 +265,4 @@ def the_chase_stands_in_the_header():
 
 
 if __name__ == "__main__":
-    play(the_picture_keeps_half_of_the_window, a_head_that_moves_outward_has_room, paper_is_white, everybody_is_told, distances_are_measured, the_clearance_of_the_whole_show_is_a_curve, the_chase_stands_in_the_header)
+    play(the_picture_keeps_half_of_the_window, a_head_that_moves_outward_has_room, paper_is_white, everybody_is_told, a_loop_is_announced, distances_are_measured, the_clearance_of_the_whole_show_is_a_curve, the_chase_stands_in_the_header)

@@ -99,7 +99,7 @@ def cameras_are_kept():
     change."""
     corner = "[picture.toPixel(0, 0), picture.toPixel(1, 1)].flat().map((one) => one.toFixed(2)).join()"
     with server() as url, publisher(*STILL), browser() as (page, complaints):
-        for address, arrow in [("", "ArrowLeft"), ("#seat,hands", "ArrowUp")]:
+        for address, arrow in [("#keys", "ArrowLeft"), ("#seat,hands", "ArrowUp")]:
             page.goto("about:blank")
             page.goto(f"{url}{address}")
             drawn(page)
@@ -124,7 +124,7 @@ def cameras_are_kept():
             page.keyboard.press("Digit9")
             assert page.evaluate(corner) == kept, "an empty camera moves the picture"
         page.goto("about:blank")
-        page.goto(url)
+        page.goto(f"{url}#keys")
         drawn(page)
         page.keyboard.press("Digit9")
         until(page, "document.getElementById('camera-note').checkVisibility() && document.getElementById('camera-note').textContent.includes('empty')", "a sentence about an empty camera")

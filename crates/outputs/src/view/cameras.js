@@ -7,15 +7,19 @@ import { say } from "./words.js";
 const SHOWN = 2500;
 
 export class Cameras {
-  /** `look` tells the cameras of one look from those of another; `note` is an element for a sentence. */
-  constructor(eye, look, note) {
-    Object.assign(this, { eye, note, name: `bench-dragon cameras ${look}`, timer: null });
+  /**
+   * `look` tells the cameras of one look from those of another; `note` is an element for a sentence; `isWanted` says of an
+   * event whether its key may act.
+   */
+  constructor(eye, look, note, isWanted) {
+    Object.assign(this, { eye, note, isWanted, name: `bench-dragon cameras ${look}`, timer: null });
     addEventListener("keydown", (event) => this.press(event));
   }
 
-  press({ code, shiftKey, ctrlKey, metaKey, altKey, repeat, target }) {
+  press(event) {
+    const { code, shiftKey, ctrlKey, metaKey, altKey, repeat, target } = event;
     const number = /^(?:Digit|Numpad)([1-9])$/.exec(code)?.[1];
-    if (!number || ctrlKey || metaKey || altKey || repeat || target.closest?.("input, select, dialog")) return;
+    if (!number || ctrlKey || metaKey || altKey || repeat || target.closest?.("input, select, dialog") || !this.isWanted(event)) return;
     const all = this.read();
     if (shiftKey) {
       const isKept = this.write({ ...all, [number]: this.eye.kept() });

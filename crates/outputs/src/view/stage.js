@@ -309,11 +309,12 @@ function tap(x, y) {
   }
   choose(-1);
 }
+const isWanted = (event) => keySwitch.acts(event, canvas);
 // An audience's picture obeys no hand that happens to touch it.
 if (words.show) lock(() => `${say("locked")} · ${element("time").textContent} · ${element("playback").textContent}`);
 if (words.show) keys["?"] = () => null;
-if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (eye.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench", isWanted: (event) => keySwitch.acts(event, canvas) });
-if (!words.show || words.hands) new Cameras(eye, seat ? "seat" : "stage", element("camera-note"));
+if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (eye.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench", isWanted });
+if (!words.show || words.hands) new Cameras(eye, seat ? "seat" : "stage", element("camera-note"), isWanted);
 element("pick").oninput = ({ target }) => {
   chosen = target.value === "" ? -1 : Math.floor(target.value) - 1;
   if (several && chosen >= 0) [whose, selected] = [selected ?? foremost(), selected ?? foremost()];
