@@ -111,7 +111,7 @@ fn what_is_no_certificate_is_refused_with_a_sentence() {
     let lines = view.lines();
     let verdict: Value = serde_json::from_str(&lines.until("\"certificate\"", DEADLINE)).unwrap();
     assert_eq!(verdict["verdict"], "refused");
-    assert!(verdict["problem"].as_str().unwrap().ends_with("the file ends before its four results"), "{verdict}");
+    assert!(verdict["problem"].as_str().unwrap().ends_with("the file ends before its results"), "{verdict}");
     view.signal(Signal::SIGTERM);
     let output = view.output_within(DEADLINE);
     let logged = text(&output.stderr);

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::harness::{Lines, Process, not_run, program, python, unique};
+use crate::harness::{Lines, Process, can_run, long, not_run, program, python, text, unique};
 use nix::sys::signal::Signal;
 
 /// Returns a port that no other test has.
@@ -191,7 +191,7 @@ fn the_log_of_a_chased_show_replays_bit_for_bit() {
     let name = "chase_log";
     let port = port().to_string();
     let log = result_file(name).with_extension("jsonl");
-    let mut run = publisher(name, &["--paused", "--log", log.to_str().unwrap()]);
+    let run = publisher(name, &["--paused", "--log", log.to_str().unwrap()]);
     let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
     let sender = sender(name, &["--port", &port, "--seconds", "8", "--jump", "100"]);
     state(&lines, "locked");
@@ -232,4 +232,37 @@ fn bad_options_are_refused_with_one_sentence() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {sentence}");
         assert!(sentence.contains(expected), "{arguments:?}: {sentence}");
     }
+}
+
+/// Needs node and npm, which fetches the sender: a library made by others.
+#[test]
+fn a_show_follows_the_art_net_timecode_of_another_library() {
+    if !long() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut npm = Command::new("npm");
+    npm.args(["install", "--no-audit", "--no-fund", "@arcanewizards/artnet@0.1.8"]).current_dir(folder.path());
+    let installed = npm.output().map_err(|error| format!("no npm ({error})"));
+    let installed =
+        installed.and_then(|output| if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) });
+    if !can_run(installed) {
+        return;
+    }
+    let (name, port) = ("chase_npm", port().to_string());
+    let _publisher = publisher(name, &["--paused"]);
+    let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
+    let package = folder.path().join("node_modules/@arcanewizards/artnet");
+    let mut sender = Command::new("node");
+    sender.arg("tests/python/artnet_npm.mjs").arg(package).args([&port, "8"]);
+    let sender = Process::start(&mut sender);
+    let locked = state(&lines, "locked");
+    assert_eq!((&locked["source"], &locked["frame_rate"]), (&"artnet".into(), &"25".into()));
+    let output = sender.output_within(60);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    // The last label is 00:00:17:24; the show goes on for the time of the freewheel.
+    state(&lines, "lost");
+    let shown = Process::start(program(name).args(["--json", "control", "state"])).output_within(60);
+    let time = serde_json::from_slice::<Value>(&shown.stdout).unwrap()["sim_time"].as_f64().unwrap();
+    assert!((17.9..22.0).contains(&time), "{time}");
 }

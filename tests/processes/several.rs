@@ -37,7 +37,7 @@ fn a_show_of_two_runs_is_recorded_and_proved() {
     let told = text(&run.output_within(60).stderr);
     assert!(told.contains("bench 1 (the head) of gold and bench 1 (the head) of jade touched at"), "{told}");
     for (file, verdict) in [(&log, "same"), (&recording, "close")] {
-        let proof = program("verify").args(["--json", "verify"]).arg(file).output().unwrap();
+        let proof = program("several_verify").args(["--json", "verify"]).arg(file).output().unwrap();
         assert_eq!(proof.status.code(), Some(0), "{}", text(&proof.stderr));
         assert_eq!(json_lines(&proof).pop().unwrap()["verdict"], verdict);
     }

@@ -300,7 +300,8 @@ fn exists(process: Pid) -> bool {
 
 /// Returns the report of a soak test whose publisher gets a signal from another process.
 fn report_of_bereft(signal: Signal) -> Value {
-    let place = Place::new("bereft");
+    // Two tests at a time: each has shared memory of its own.
+    let place = Place::new(&format!("bereft_{}", signal.as_str()));
     let mut soak = place.program();
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
     let soak = Process::start(&mut soak);

@@ -114,8 +114,9 @@ def labels_move_with_their_boards():
         page.goto(f"{url}#bench=40")
         drawn(page)
         seen = 0
-        deadline = time.monotonic() + 8
-        while time.monotonic() < deadline:
+        # Eight seconds, and on a busy machine as long as a hundred labels take; the contact is 10 s of wall time away.
+        began = time.monotonic()
+        while time.monotonic() < began + 8 or (seen <= 100 and time.monotonic() < began + 60):
             found = labels_of(page)
             assert not wrong(found), wrong(found)
             seen += len(found)

@@ -80,7 +80,10 @@ fn a_running_show_gets_its_scenes_topics_late_and_loses_them_again() {
     let topics = "[publish.ros2]\nrate = 20.0\ntopics = [\"handles\", \"stage\"]\n";
     let settings = scene_file(name, &[]);
     std::fs::write(&settings, format!("{}\n{topics}", std::fs::read_to_string(&settings).unwrap())).unwrap();
-    let publisher = Process::start(program(name).args(["run", "--json", "--start", "300"]));
+    // The queues hold all frames by which a subscriber falls behind on a busy machine.
+    let scene = scene_file("attached_run", &[("[publish]", "[publish]\nqueue = 960\nsubscribers = 4")]);
+    let mut publisher = program(name);
+    let publisher = Process::start(publisher.arg("--scene").arg(&scene).args(["run", "--json", "--start", "300"]));
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
     let seconds = watch.lines();
     seconds.until("\"state\":\"moving\"", 60);
@@ -192,7 +195,12 @@ fn one_process_publishes_two_shows_and_follows_each_through_its_death() {
         return;
     }
     let [gold, silver] = ["two_gold", "two_silver"];
-    let start = |name: &str| Process::start(program(name).args(["run", "--json", "--start", "300"]));
+    // The queues hold all frames by which the process falls behind while it opens the topics of the other show.
+    let scenes = [gold, silver].map(|name| (name, scene_file(name, &[("[publish]", "[publish]\nqueue = 480")])));
+    let start = |name: &str| {
+        let scene = &scenes.iter().find(|(of, _)| *of == name).unwrap().1;
+        Process::start(program(name).arg("--scene").arg(scene).args(["run", "--json", "--start", "300"]))
+    };
     let bridge = Process::start(program(gold).args(["--name", &unique(silver), "send", "ros2", "--json"]));
     let stage = "stage:reliable:transient_local";
     let (_of_gold, gold_lines) = peer(gold, &["handles", stage]);

@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use super::matching::Matches;
 use super::{Ros2Config, Ros2Error};
-use bench_dragon_messages::{QUEUE_BYTES, Stage};
+use bench_dragon_messages::{MOST_CUES, MOST_DRAGONS, MOST_OBSTACLES, QUEUE_BYTES, Stage};
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 use bench_dragon_ros2_messages::{HasStamp, MessageType, Time};
 
@@ -28,7 +28,10 @@ const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
 /// An upper bound of a message's bytes besides its handles.
 pub(super) const HEADER_BYTES: usize = 200;
 /// An upper bound of an event-driven message's bytes; the largest is the stage.
-pub(super) const EVENT_BYTES: usize = HEADER_BYTES + size_of::<Stage>();
+pub(super) const EVENT_BYTES: usize =
+    HEADER_BYTES + size_of::<Stage>() + NAME_BYTES * (MOST_DRAGONS + MOST_OBSTACLES + MOST_CUES);
+/// CDR adds the length and the end of a name.
+const NAME_BYTES: usize = 8;
 
 /// The writer of one topic.
 pub(super) struct TopicWriter<Message: Serialize> {

@@ -11,7 +11,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
-use bench_dragon::outputs::view::{Ready, ViewError, ViewOptions, serve};
+use bench_dragon::outputs::view::{Facts, Ready, ViewError, ViewOptions, serve};
 use fastrand::Rng;
 use serde_json::Value;
 
@@ -44,6 +44,7 @@ fn address() -> SocketAddr {
                 origins: vec!["https://show.example".parse().expect("an origin")],
                 pages: Some(pages),
                 proofs: Arc::default(),
+                facts: Arc::new(Facts::new(|_| None)),
             };
             let stop = Arc::new(AtomicBool::new(false));
             let served: Result<(), ViewError> =

@@ -167,7 +167,7 @@ fn what_does_not_follow_is_refused() {
     refused(13, "in this order", &|lines| lines.swap(13, 14));
     refused(17, "too many", &|lines| lines.push(lines[16].clone()));
     refused(13, "nothing but results", &|lines| lines.insert(13, step(10.0, 11.0)));
-    refused(0, "ends before its four results", &|lines| lines.truncate(16));
+    refused(0, "ends before its results", &|lines| lines.truncate(16));
     refused(12, "none does not follow", &|lines| drop(lines.remove(12)));
     // Lines.
     refused(1, "unknown field", &|lines| lines[1]["more"] = json!(1));
@@ -264,10 +264,11 @@ fn a_scene_of_the_papers_rules_is_refused() {
 }
 
 #[test]
-fn a_scene_with_obstacles_is_refused() {
+fn an_obstacle_needs_its_result() {
     let mut lines = certificate();
-    lines[0]["scene"] = json!(format!("{SCENE}[stage]\n"));
+    let post = "[stage]\n[[stage.obstacles]]\nname = \"post\"\ncircle = { center = [50.0, 50.0], radius = 0.5 }\n";
+    lines[0]["scene"] = json!(format!("{SCENE}{post}"));
     let refused = check(&lines).unwrap_err();
-    assert!(matches!(&refused, Refused::Form { problem, .. } if problem.contains("[stage]")), "{refused:?}");
+    assert!(refused.to_string().contains("ends before its results"), "{refused:?}");
     assert!(check(&certificate()).is_ok());
 }
