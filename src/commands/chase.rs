@@ -226,7 +226,14 @@ fn follow(
             Notice::End => *has_ended = true,
             Notice::OtherScene => other_scene = true,
         }
-        let is_over = *has_ended && matches!(latest, ChaseState::Silent | ChaseState::Locking | ChaseState::Lost);
+        // A source that has ended steers nothing: neither a show that has been paused at its end, nor one for which the
+        // chase waits.
+        let steers = match latest {
+            ChaseState::Locked | ChaseState::Freewheeling | ChaseState::Standing | ChaseState::Backward => true,
+            ChaseState::Silent | ChaseState::Locking | ChaseState::Lost => false,
+            ChaseState::Held | ChaseState::Paused | ChaseState::Sought | ChaseState::Ended => false,
+        };
+        let is_over = *has_ended && !steers;
         stop.fetch_or(is_over || other_scene || printed.is_err(), Ordering::Relaxed);
     };
     let mut chase = Chase::new(common.name(), source, leader, inputs, &mut notify)?;

@@ -97,6 +97,8 @@ struct Show {
     /// The state that the latest commands have led to.
     plays: bool,
     epoch: u32,
+    /// True after a seek without an answer: the show may still execute it.
+    has_open_seek: bool,
     /// True until a show that was paused when it was found has been told to go on.
     is_new: bool,
     /// True if another client has made the show play while it should stand.
@@ -143,6 +145,7 @@ impl Steering {
                 settled_tick: 0,
                 plays,
                 epoch: header.epoch,
+                has_open_seek: false,
                 is_new: !plays,
                 is_released: false,
             });
@@ -156,7 +159,9 @@ impl Steering {
         if show.pending.is_some() || header.tick < show.settled_tick {
             return;
         }
-        let is_sought = header.epoch != show.epoch;
+        let has_jumped = header.epoch != show.epoch;
+        let is_sought = has_jumped && !show.has_open_seek;
+        show.has_open_seek &= !has_jumped;
         show.epoch = header.epoch;
         match playback {
             Some(PlaybackState::Held) => self.waiting = Some(Waiting::Held),
@@ -182,7 +187,10 @@ impl Steering {
     pub fn answered(&mut self, answer: Option<(Code, u64)>) {
         let Some(show) = &mut self.show else { return };
         let Some(Pending { command, sent_ns }) = show.pending.take() else { return };
-        let Some((code, tick)) = answer else { return };
+        let Some((code, tick)) = answer else {
+            show.has_open_seek |= matches!(command, Command::Seek(_));
+            return;
+        };
         show.settled_tick = tick;
         if matches!(code, Code::Done | Code::Already) {
             match command {

@@ -77,7 +77,7 @@ where
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let answer = runtime.block_on(async {
         let call = async {
-            let found = tokio::time::timeout(Duration::from_secs(90), client.wait_for_service(&node)).await;
+            let found = tokio::time::timeout(Duration::from_secs(180), client.wait_for_service(&node)).await;
             assert!(found.is_ok(), "{service} was not discovered");
             tokio::time::timeout(Duration::from_secs(seconds), client.async_call_service(Fields(request))).await
         };
