@@ -86,7 +86,8 @@ pub fn name_in(stage: &Stage, number: u32) -> String {
             return if dragon.is_empty() { name } else { format!("{name} of {dragon}") };
         }
     }
-    let Some(obstacle) = obstacle_number(stage, number) else { return format!("bench {}", u64::from(number) + 1) };
+    // Before the stage has come, only the head is known by its number.
+    let Some(obstacle) = obstacle_number(stage, number) else { return bench_name(number, NO_BENCH) };
     match stage.obstacles.get(obstacle as usize) {
         Some(named) => format!("the {}", named.name.as_str()),
         None => format!("obstacle {}", u64::from(obstacle) + 1),
