@@ -293,3 +293,27 @@ impl Show {
         (is_other && may_set_rate).then_some(Command::Rate(wanted))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn playing(tick: u64, epoch: u32, sim_time: f64) -> FrameHeader {
+        let playback = PlaybackState::Playing as u32;
+        FrameHeader { run_id: 1, tick, epoch, sim_time, playback, time_scale: 1.0, ..FrameHeader::default() }
+    }
+
+    #[test]
+    fn a_seek_whose_answer_is_lost_is_no_seek_of_another_client() {
+        let mut steering = Steering::new(Limits { take_up: 0.1, seek_above: 0.5, seeks_back: true });
+        let at = |tick: u64| 1_000_000_000 + tick * 16_666_667;
+        (0..3).for_each(|tick| steering.frame_came(&playing(tick, 0, tick as f64 / 60.0), at(tick)));
+        let command = steering.command(Goal::Follow { time: 50.0, rate: 1.0 }, at(2));
+        assert!(matches!(command, Some(Command::Seek(_))), "{command:?}");
+        steering.answered(None);
+        steering.frame_came(&playing(3, 1, 50.0), at(3));
+        assert_eq!(steering.waiting(), None);
+        steering.frame_came(&playing(4, 2, 70.0), at(4));
+        assert_eq!(steering.waiting(), Some(Waiting::Sought));
+    }
+}
