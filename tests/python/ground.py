@@ -3,9 +3,9 @@
     ground.py PROGRAM SCENE.toml
     ground.py PROGRAM --random SEED COUNT [FAMILY]
 
-The paths, the followers and the search are written here again; shapely measures the distances of the boards. Prints a line
-for each obstacle, and ends with an error at the first difference. Only the end of the motion and the first contact of two
-boards are the program's: `tests/compute/oracle` has a brute force of these.
+The paths, the followers and the search are written here again; shapely measures the distances of the boards. Prints
+what it compared, and ends with an error if there was a difference. Only the end of the motion and the first contact of
+two boards are the program's: `tests/compute/oracle` has a brute force of these.
 """
 
 import collections
@@ -123,8 +123,8 @@ class Path:
         assert np.hypot(*(point + spiral(1.0, np.array(inner)))) < 1e-12 * (radius + 1)
         out = float(length(inner)) - begin
         self.add(begin, lambda s: spiral(-1.0, angle(out + s)))
-        length_of_team = team["head_length"] + (team["benches"] - 1) * team["body_length"] - team["benches"] * 2 * team["hole_inset"]
-        self.end = begin + path.get("lead_out", length_of_team)
+        boards = team["head_length"] + (team["benches"] - 1) * team["body_length"]
+        self.end = begin + path.get("lead_out", boards - team["benches"] * 2 * team["hole_inset"])
 
     def points(self, s):
         """Returns the points, turned as the placement turns them."""
@@ -139,7 +139,10 @@ class Path:
     def follower(self, s, link):
         """Returns the first places behind `s` at the distance of a link."""
         front, step = self.points(s), link / 64
-        distance = lambda back, at=slice(None): np.hypot(*np.moveaxis(self.points(s[at] - back) - front[at], -1, 0)) - link
+
+        def distance(back, at=slice(None)):
+            return np.hypot(*np.moveaxis(self.points(s[at] - back) - front[at], -1, 0)) - link
+
         # A chord is no longer than its path.
         near = np.full(s.shape, link * (1 - 1e-13))
         far = near + step
@@ -239,7 +242,7 @@ class Obstacle:
         return found
 
     def depth(self, corners):
-        """Returns the least translation that frees boards which overlap, by the sum of Minkowski; infinity if none does."""
+        """Returns the least translation that frees boards which overlap, by Minkowski sums; infinity if none."""
         centres = corners.mean(axis=-2)
         if self.radius:
             along, across = corners[..., 0, :] - corners[..., 3, :], corners[..., 0, :] - corners[..., 1, :]
@@ -366,7 +369,8 @@ def judge(program, file, counts, is_quiet=False):
     if last["event"] == "lock":
         end = end * (1 - 1e-9) - 1e-9
     else:
-        assert abs(end - show.path.end / show.speed) < TIME, f"the path ends at {show.path.end / show.speed} s, not {last}"
+        ends = show.path.end / show.speed
+        assert abs(end - ends) < TIME, f"the path ends at {ends} s, not {last}"
     stops = scene["motion"].get("on_contact", "stop") == "stop"
     touches = [event["time"] for event in events if event["event"] in ("contact", "obstacle")]
     freeze = min(touches + [end]) if stops else end
@@ -396,7 +400,7 @@ def judge(program, file, counts, is_quiet=False):
                 counts["graze"] += 1
             counts["touch"] += 1
         else:
-            assert event[0] == math.inf or event[0] > end - 1e-8, f"{name}: by brute force {event}, the program reports none"
+            assert event[0] == math.inf or event[0] > end - 1e-8, f"{name}: by brute force {event}, not none"
             counts["none"] += 1
         line = least[name]
         value, time, bench = line["clearance"], line["time"], line["bench"]

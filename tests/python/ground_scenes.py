@@ -46,7 +46,8 @@ def shape(random, centre, reach):
     kind = random.choice(["circle", "circle", "star", "thin", "comb", "around", "line", "zigzag", "short", "triangle"])
     at = spread(random, centre, reach)
     if kind == "circle":
-        return f"circle = {{ center = {at}, radius = {random.choice([random.uniform(0.2, 2), random.uniform(0.001, 0.02)])!r} }}"
+        radius = random.choice([random.uniform(0.2, 2), random.uniform(0.001, 0.02)])
+        return f"circle = {{ center = {at}, radius = {radius!r} }}"
     if kind in ("line", "short"):
         size = 12 if kind == "line" else 0.02
         return f"line = {[at, spread(random, at, size)]}"
@@ -84,7 +85,8 @@ def route(random, least_radius):
             pieces.append(f'{{ kind = "line", length = {random.choice([random.uniform(0.5, 8), 1.0])!r} }}')
         else:
             side = random.choice(["left", "right"])
-            radius, turns = random.uniform(least_radius, 3 * least_radius), random.choice([0.25, random.uniform(0.05, 0.9)])
+            radius = random.uniform(least_radius, 3 * least_radius)
+            turns = random.choice([0.25, random.uniform(0.05, 0.9)])
             pieces.append(f'{{ kind = "arc", radius = {radius!r}, side = "{side}", turns = {turns!r} }}')
     return pieces
 
