@@ -40,6 +40,7 @@ pub struct Shape {
     points: Vec<Point>,
     /// Metres; 0 unless the shape is a circle.
     radius: f64,
+    is_convex: bool,
     /// A circle about the outline.
     bounding_centre: Point,
     bounding_radius: f64,
@@ -55,7 +56,7 @@ impl Shape {
     /// Creates a circle; its radius, metres, must be positive.
     pub fn circle(centre: Point, radius: f64) -> Self {
         let (kind, points) = (ShapeKind::Circle, vec![centre]);
-        Self { kind, points, radius, bounding_centre: centre, bounding_radius: radius }
+        Self { kind, points, radius, is_convex: true, bounding_centre: centre, bounding_radius: radius }
     }
 
     /// Creates a polygon from at least three corners; its sides must not meet except at their corners.
@@ -80,12 +81,23 @@ impl Shape {
         let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
         let bounding_centre = Point::from(0.5 * (low + high));
         let bounding_radius = points.iter().map(|point| (point - bounding_centre).norm()).fold(0.0, f64::max);
-        Self { kind, points, radius: 0.0, bounding_centre, bounding_radius }
+        let is_convex = match kind {
+            ShapeKind::Circle => true,
+            ShapeKind::Polygon => turns_one_way(&points),
+            ShapeKind::Line => points.len() == 2,
+            ShapeKind::Boundary => false,
+        };
+        Self { kind, points, radius: 0.0, is_convex, bounding_centre, bounding_radius }
     }
 
     /// Returns the kind.
     pub fn kind(&self) -> ShapeKind {
         self.kind
+    }
+
+    /// Returns true if the shape is convex: then the depth of an overlap changes no faster than the board moves.
+    pub fn is_convex(&self) -> bool {
+        self.is_convex
     }
 
     /// Returns the corners; of a circle, its centre.
@@ -203,6 +215,16 @@ impl Shape {
         // Every constructor gives a shape at least one side.
         nearest.map_or((board.centre, board.centre), |(_, on_board, on_side)| (on_board, on_side))
     }
+}
+
+/// Returns true if the corners of a simple polygon turn to one side only.
+fn turns_one_way(corners: &[Point]) -> bool {
+    let count = corners.len();
+    let turn = |k: usize| {
+        let [before, at, after] = [0, 1, 2].map(|by| corners[(k + by) % count]);
+        (at - before).perp(&(after - at))
+    };
+    (0..count).all(|k| turn(k) >= 0.0) || (0..count).all(|k| turn(k) <= 0.0)
 }
 
 /// Returns a point in the frame of a board.
