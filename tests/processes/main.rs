@@ -12,6 +12,7 @@ mod light;
 mod live;
 mod log;
 mod metrics;
+mod placed;
 mod python_module;
 mod readers;
 mod record;
