@@ -40,7 +40,7 @@ pub struct SoakClientArguments {
 pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
-    let scene = common.load_scene()?;
+    let scene = common.load_any_scene()?;
     let rate = arguments.rate.unwrap_or(scene.rate);
     let mut output = std::io::stdout().lock();
     load_generator::conduct(common.name(), rate, arguments.seed, facts_of(&scene), &stop, &mut |conducted| -> Result<
@@ -55,7 +55,7 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
 
 /// Returns the facts of a scene's show. Searches for its events.
 fn facts_of(scene: &Scene) -> ShowFacts {
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.timeline(&mut |_| ());
     let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
     let stops = scene.alerts.is_some() && scene.on_contact == OnContact::Stop;
     let cue = |cue: &Cue| Some((cue.time(&scene.motion, &timeline)?, cue.then == CueAction::Pause));
