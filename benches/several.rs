@@ -17,8 +17,13 @@ const BATCH: u64 = 4;
 const ROUNDS: u64 = 2_500;
 const WARM_UP: u64 = 50;
 /// Cases: name, dragons, and whether they coil in pairs or are all far from each other.
-const CASES: [(&str, usize, bool); 5] =
-    [("two far apart", 2, false), ("two that coil", 2, true), ("four that coil", 4, true), ("16 far apart", 16, false), ("16 that coil", 16, true)];
+const CASES: [(&str, usize, bool); 5] = [
+    ("two far apart", 2, false),
+    ("two that coil", 2, true),
+    ("four that coil", 4, true),
+    ("16 far apart", 16, false),
+    ("16 that coil", 16, true),
+];
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
@@ -55,7 +60,8 @@ fn several(dragons: usize, coil: bool) -> Scene {
 fn one(number: usize, coil: bool) -> Scene {
     let tables = dragon(number, coil, "");
     let (placement, tables) = tables.split_once('\n').expect("several lines");
-    let placement = placement.trim_start_matches("placement = {").trim_end_matches('}').replace(", rotation", "\nrotation");
+    let placement =
+        placement.trim_start_matches("placement = {").trim_end_matches('}').replace(", rotation", "\nrotation");
     let text = format!("[alerts]\n[placement]\n{placement}\n{tables}");
     Scene::parse(&text, "one.toml", "one").expect("a scene of one")
 }

@@ -305,15 +305,6 @@ pub fn expect_empty_ground(scene: &Scene) -> Result<(), CommandError> {
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 
-/// Refuses a scene of several dragons where `what` knows one.
-pub fn expect_one(scene: &Scene, what: &str) -> Result<(), CommandError> {
-    if scene.ensemble.is_none() {
-        return Ok(());
-    }
-    let sentence = format!("{what} knows one dragon and the scene has several, expected a scene with [team]");
-    Err(CommandError::BadInput(sentence))
-}
-
 /// Refuses a scene of several dragons, whose motions no proof knows.
 pub fn expect_one_dragon(scene: &Scene) -> Result<(), CommandError> {
     if scene.ensemble.is_none() {

@@ -27,8 +27,8 @@ use super::events::{bench_name, find_least_clearance, least_clearance, sentence}
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{
-    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, expect_one_dragon, figure,
-    number, progress_bar, search_timeline,
+    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, expect_one_dragon, figure, number,
+    progress_bar, search_timeline,
 };
 
 /// Arguments of `check`.
@@ -311,7 +311,8 @@ impl CheckArguments {
     /// Writes the file of --swept and returns what it holds.
     fn covered(&self, scene: &Scene, timeline: &Timeline, common: &Common) -> Result<Option<Swept>, CommandError> {
         let Some(file) = &self.swept else { return Ok(None) };
-        let stretch = Stretch { from: self.from.as_deref(), until: self.until.as_deref(), benches: self.benches.as_ref() };
+        let stretch =
+            Stretch { from: self.from.as_deref(), until: self.until.as_deref(), benches: self.benches.as_ref() };
         let ground = swept(scene, timeline, stretch, common)?;
         ground.write(scene, file)?;
         Ok(Some(ground))

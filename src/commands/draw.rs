@@ -132,7 +132,8 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
         }
         _ => {
             let time = time_of("--at", &arguments.at, &timeline)?;
-            let stretch = Stretch { from: Some(&many.from), until: many.until.as_deref(), benches: many.benches.as_ref() };
+            let stretch =
+                Stretch { from: Some(&many.from), until: many.until.as_deref(), benches: many.benches.as_ref() };
             let ground = many.swept.then(|| swept(&scene, &timeline, stretch, common)).transpose()?;
             session.draw_one(look, time, ground.as_ref().map(|ground| &ground.area))
         }

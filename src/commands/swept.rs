@@ -43,8 +43,10 @@ pub fn benches(text: &str) -> Result<Benches, String> {
         (Ok(first), Ok(last)) if 1 <= first && first <= last => {
             Ok(Benches { dragon: dragon.map(str::to_owned), range: (first, last) })
         }
-        _ => Err("expected benches counted from 1, as in 200-223, or of one of several dragons, as in gold:1-20"
-            .to_owned()),
+        _ => {
+            Err("expected benches counted from 1, as in 200-223, or of one of several dragons, as in gold:1-20"
+                .to_owned())
+        }
     }
 }
 

@@ -51,13 +51,9 @@ fn what_knows_one_dragon_refuses_several_with_one_sentence() {
     for arguments in [
         vec!["events", "--certify", file],
         vec!["check", "--prove"],
-        vec!["check", "--swept", file],
         vec!["plan", "pitch", "--reach-radius", "4.5"],
         vec!["plan", "speed", "--max-handle-speed", "2"],
-        vec!["trade"],
-        vec!["soak", "--duration", "1"],
-        vec!["draw", "--look", "lanterns"],
-        vec!["draw", "--swept"],
+        vec!["trade", "--plot", file],
         vec!["chase", "psn"],
     ] {
         let output = program("several_one").args(["--scene", COIL]).args(&arguments).output().unwrap();

@@ -265,7 +265,11 @@ fn a_conducted_show_of_two_passes() {
     let subscribers = report["subscribers"].as_array().unwrap();
     for subscriber in subscribers {
         let seen = &subscriber["seen"];
-        assert_eq!((number(seen, "missed"), number(seen, "disobedient"), number(seen, "wrong_links")), (0, 0, 0), "{seen}");
+        assert_eq!(
+            (number(seen, "missed"), number(seen, "disobedient"), number(seen, "wrong_links")),
+            (0, 0, 0),
+            "{seen}"
+        );
         assert!(number(seen, "links_checked") > 100 && number(seen, "times_checked") > 100, "{seen}");
         // A link between the dragons would be metres off.
         assert!(seen["worst_link_error"].as_f64().unwrap() < 1e-8, "{seen}");

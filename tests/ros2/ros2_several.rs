@@ -70,7 +70,8 @@ fn assert_paths(path: &Value) {
 fn assert_transforms(name: &str, message: &Value) {
     let transforms = message["transforms"].as_array().unwrap();
     let frames: Vec<_> = transforms.iter().map(|of| of["child_frame_id"].as_str().unwrap().to_owned()).collect();
-    let of = |(dragon, ..): (&str, usize, usize)| ["head", "tail"].map(|end| format!("{}/{dragon}/{end}", unique(name)));
+    let of =
+        |(dragon, ..): (&str, usize, usize)| ["head", "tail"].map(|end| format!("{}/{dragon}/{end}", unique(name)));
     assert_eq!(frames, DRAGONS.map(of).concat());
 }
 
@@ -94,7 +95,11 @@ fn a_show_of_two_is_on_every_topic_with_its_names() {
     let scene = scene(folder.path(), "");
     let text_of_scene = std::fs::read_to_string(&scene).unwrap();
     let settings = format!("[publish.ros2]\nrate = 10.0\ntopics = [{quoted}]\n[[cues]]\nname = \"near\"\nat = 325.5\n");
-    std::fs::write(&scene, text_of_scene.replace("[[dragons]]\nname = \"gold\"", &format!("{settings}[[dragons]]\nname = \"gold\""))).unwrap();
+    std::fs::write(
+        &scene,
+        text_of_scene.replace("[[dragons]]\nname = \"gold\"", &format!("{settings}[[dragons]]\nname = \"gold\"")),
+    )
+    .unwrap();
     let recording = folder.path().join("show.mcap");
     let mut record = program(name);
     let record = Process::start(record.args(["--json", "record", "-o"]).arg(&recording));
@@ -146,7 +151,9 @@ fn watch_to_the_contact(name: &str, topics: &[&str], go: impl FnOnce()) {
         messages(lines, topic("alerts")).iter().any(|alert| alert["level"] == 2)
     });
     until(&mut lines, "the contact in the markers", &|lines| {
-        messages(lines, topic("markers")).last().is_some_and(|message| texts(message).iter().any(|words| words.contains(contact)))
+        messages(lines, topic("markers"))
+            .last()
+            .is_some_and(|message| texts(message).iter().any(|words| words.contains(contact)))
     });
 
     let rosout: Vec<&str> =
@@ -168,7 +175,8 @@ fn watch_to_the_contact(name: &str, topics: &[&str], go: impl FnOnce()) {
     assert_eq!((&touched["event_bench_a"], &touched["event_bench_b"]), (&0.into(), &61.into()));
     assert_eq!(messages(&lines, topic("handles"))[0]["count"], 122);
     let stage = messages(&lines, topic("stage"))[0];
-    let dragons: Vec<_> = stage["dragons"].as_array().unwrap().iter().map(|of| (&of["first_handle"], &of["benches"])).collect();
+    let dragons: Vec<_> =
+        stage["dragons"].as_array().unwrap().iter().map(|of| (&of["first_handle"], &of["benches"])).collect();
     assert_eq!(dragons, [(&0.into(), &60.into()), (&61.into(), &60.into())]);
     let transforms = messages(&lines, topic("tf"));
     let frames = messages(&lines, topic("handles"));
@@ -177,7 +185,8 @@ fn watch_to_the_contact(name: &str, topics: &[&str], go: impl FnOnce()) {
         let frame = frames.iter().find(|frame| frame["header"]["stamp"] == parts[0]["header"]["stamp"]);
         // The peer keeps the first three handles and the last.
         frame.is_some_and(|frame| {
-            let (poses, of) = (frame["poses"].as_array().unwrap(), |k: usize| place(&parts[k]["transform"]["translation"]));
+            let (poses, of) =
+                (frame["poses"].as_array().unwrap(), |k: usize| place(&parts[k]["transform"]["translation"]));
             assert_eq!((place(&poses[0]), place(&poses[3])), (of(0), of(3)));
             true
         })

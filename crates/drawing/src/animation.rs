@@ -192,7 +192,8 @@ impl Drawing<'_> {
     fn concerned(&self, now: &Happened) -> String {
         if self.dragons.are_several() {
             let roster = &self.dragons.roster;
-            let names = now.benches().map(|bench| roster.bench(bench).replace(" (the head)", "").replace(" (the tail)", ""));
+            let names =
+                now.benches().map(|bench| roster.bench(bench).replace(" (the head)", "").replace(" (the tail)", ""));
             return names.collect::<Vec<_>>().join(" and ");
         }
         let benches: Vec<String> = now.benches().map(|bench| (bench + 1).to_string()).collect();

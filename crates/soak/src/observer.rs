@@ -258,8 +258,13 @@ mod tests {
     impl Received {
         fn new() -> Self {
             let mut received = Self::default();
-            let dragon =
-                StageDragon { benches: 2, head_length: 3.5, body_length: 1.5, hole_inset: 0.25, ..StageDragon::default() };
+            let dragon = StageDragon {
+                benches: 2,
+                head_length: 3.5,
+                body_length: 1.5,
+                hole_inset: 0.25,
+                ..StageDragon::default()
+            };
             let stage = Stage { dragons: List::of([dragon]), ..Stage::default() };
             received.observer.handle(&FeedEvent::Stage { stage: &stage, segments: &[] }, 0);
             received
