@@ -113,19 +113,11 @@ impl Common {
         self.names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Reads the scene that the command line names.
+    /// Reads the scene that the command line names, of one dragon or of several.
     ///
     /// # Errors
     /// Bad input: the sentence names the file, the line and the field.
     pub fn load_scene(&self) -> Result<Scene, CommandError> {
-        Ok(self.scene_text()?.parse()?)
-    }
-
-    /// Reads the scene, of one dragon or of several.
-    ///
-    /// # Errors
-    /// As [`Common::load_scene`].
-    pub fn load_any_scene(&self) -> Result<Scene, CommandError> {
         Ok(self.scene_text()?.parse_any()?)
     }
 

@@ -108,7 +108,7 @@ const VIEW: Accepted = Accepted { least: 1e-9, greatest: 1e9, unit: "metres" };
 
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
-    let scene = common.load_any_scene()?;
+    let scene = common.load_scene()?;
     let look = arguments.look.look()?;
     let timeline = search_timeline(&scene, common);
     let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);

@@ -176,7 +176,7 @@ fn print(report: &Report, common: &Common) -> Result<(), CommandError> {
 
 impl SoakArguments {
     fn check(&self, common: &Common) -> Result<(), CommandError> {
-        let scene = common.load_any_scene()?;
+        let scene = common.load_scene()?;
         let admitted = scene.subscribers;
         service_name(common.name(), "poses")?;
         if let Some(rate) = self.rate {
@@ -230,7 +230,7 @@ impl SoakArguments {
             .chain(role(Role::Slow, self.slow))
             .chain(role(Role::Flaky, self.flaky));
         let conduct = self.conduct.map(|seed| ConductPlan { seed, rate: self.rate, flaky_clients: self.flaky_clients });
-        let ros2 = self.ros2 || common.load_any_scene()?.ros2.is_some();
+        let ros2 = self.ros2 || common.load_scene()?.ros2.is_some();
         Ok(Plan { program: std::env::current_exe()?, common: shared, publisher, roles: roles.collect(), ros2, conduct })
     }
 
@@ -296,7 +296,7 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
     let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All })?;
-    let mut observer = Observer::new(common.load_any_scene()?.link_tolerance());
+    let mut observer = Observer::new(common.load_scene()?.link_tolerance());
     let mut output = std::io::stdout().lock();
     let mut print = |observer: &mut Observer| -> Result<(), CommandError> {
         serde_json::to_writer(&mut output, &observer.observation()).map_err(std::io::Error::from)?;

@@ -40,7 +40,7 @@ pub struct SoakClientArguments {
 pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
-    let scene = common.load_any_scene()?;
+    let scene = common.load_scene()?;
     let rate = arguments.rate.unwrap_or(scene.rate);
     let mut output = std::io::stdout().lock();
     load_generator::conduct(common.name(), rate, arguments.seed, facts_of(&scene), &stop, &mut |conducted| -> Result<

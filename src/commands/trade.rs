@@ -55,7 +55,7 @@ fn delay(text: &str) -> Result<f64, String> {
 pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
     /// Share of the solvers in the progress of a dragon.
     const SOLVERS: f64 = 0.85;
-    let scene = common.load_any_scene()?;
+    let scene = common.load_scene()?;
     let parts = parts(&scene);
     if parts.len() > 1 && (arguments.plot.is_some() || arguments.display_plot.is_some()) {
         let sentence = "--plot and --display-plot draw one dragon and the scene has several, expected neither of them";
@@ -73,7 +73,7 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     let mut output = Output::standard();
     let share = 1.0 / parts.len() as f64;
     for (k, part) in parts.iter().enumerate() {
-        let mut progress = |done: f64| bar.set_position((1000.0 * share * (k as f64 + done)) as u64);
+        let progress = |done: f64| bar.set_position((1000.0 * share * (k as f64 + done)) as u64);
         let timeline = part.scene.timeline(&mut |_| ());
         warn_of_gap(&timeline);
         bar.set_message("measuring");

@@ -1,7 +1,9 @@
 //! One dragon in play: from its own time to its chain on the stage, with the nearest of its boards.
 //!
-//! In: a motion and its own time. Out: the chain and its clearance. The show calls it, for its one dragon or for each of
-//! several.
+//! In: a motion and its own time. Out: the chain and its clearance. The show calls it, for its one dragon or for each
+//! of several.
+
+use std::ops::Range;
 
 use crate::scene::Scene;
 use bench_dragon_motion::Motion;
@@ -57,18 +59,44 @@ impl Dancer {
         self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
     }
 
-    /// Fills `chain` at a time of the dragon's own, measures its clearance and places both on the stage.
+    /// Fills `chain` on the stage at a time of the dragon's own, and measures its clearance.
     pub(crate) fn solve(&mut self, time: f64, moves: bool, chain: &mut Chain) -> Result<Closest, NoFollower> {
-        let solved = solve_at_or_just_before(self.solver.as_mut(), time, chain).map(|solved_at| {
-            let closest = self.measure(solved_at, chain);
+        let solved = self.solve_in_own_frame(time, chain);
+        if solved.is_ok() {
             self.placement.chain(chain);
-            closest
-        });
-        if !moves && self.velocities == Velocities::Computed {
-            let Chain { speed, vx, vy, .. } = chain;
-            [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
+        }
+        if !moves {
+            self.stand(chain, 0..chain.handles());
         }
         solved
+    }
+
+    /// The same for one of several, whose handles are those of `all` from `first` on. `own` holds its chain meanwhile.
+    pub(crate) fn solve_among(
+        &mut self,
+        (time, moves): (f64, bool),
+        own: &mut Chain,
+        first: usize,
+        all: &mut Chain,
+    ) -> Result<Closest, NoFollower> {
+        let closest = self.solve_in_own_frame(time, own)?;
+        self.placement.put(own, first, all);
+        if !moves {
+            self.stand(all, first..first + own.handles());
+        }
+        Ok(closest)
+    }
+
+    fn solve_in_own_frame(&mut self, time: f64, chain: &mut Chain) -> Result<Closest, NoFollower> {
+        let solved_at = solve_at_or_just_before(self.solver.as_mut(), time, chain)?;
+        Ok(self.measure(solved_at, chain))
+    }
+
+    fn stand(&self, chain: &mut Chain, handles: Range<usize>) {
+        if self.velocities == Velocities::Computed {
+            let Chain { speed, vx, vy, .. } = chain;
+            [speed, vx, vy].into_iter().for_each(|numbers| numbers[handles.clone()].fill(0.0));
+        }
     }
 
     fn measure(&mut self, solved_at: f64, chain: &Chain) -> Closest {

@@ -100,15 +100,14 @@ impl Member {
             return Ok(());
         }
         self.solved = None;
-        let Closest { boards, any } = self.dancer.solve(own_time, state.1, &mut self.chain)?;
         let (first, own_handles) = (self.handles.start, self.handles.len());
+        let Closest { boards, any } = self.dancer.solve_among(state, &mut self.chain, first, chain)?;
         let numbered = |pair: PairClearance| {
             let PairClearance { bench_a, bench_b, .. } = pair;
             let bench_b = if bench_b < own_handles { bench_b + first } else { bench_b - own_handles + all_handles };
             PairClearance { bench_a: bench_a + first, bench_b, ..pair }
         };
         self.closest = Closest { boards: boards.map(numbered), any: any.map(numbered) };
-        chain.put(first, &self.chain);
         self.solved = Some(state);
         Ok(())
     }
