@@ -147,11 +147,20 @@ class Path:
         near = np.full(s.shape, link * (1 - 1e-13))
         far = near + step
         low, high = np.full(s.shape, -1e-13 * link), distance(far)
+        before = low.copy()
         for _ in range(64 * 200):
+            # Near a lock the distance exceeds the link on a short way only.
+            peaks = np.flatnonzero((high < 0) & (low >= before) & (low >= high))
+            if len(peaks):
+                at, most = greatest(lambda back: distance(back, peaks), near[peaks] - step, far[peaks])
+                above = most >= 0
+                peaks = peaks[above]
+                near[peaks], low[peaks] = near[peaks] - step, before[peaks]
+                far[peaks], high[peaks] = at[above], most[above]
             open_ = np.flatnonzero(high < 0)
             if not len(open_):
                 break
-            near[open_], low[open_] = far[open_], high[open_]
+            before[open_], near[open_], low[open_] = low[open_], far[open_], high[open_]
             far[open_] += step
             high[open_] = distance(far[open_], open_)
         assert not len(open_), "a link has no follower"
@@ -169,6 +178,17 @@ class Path:
             if turn > 2 and (np.abs(value) <= 3e-15 * (link + np.abs(s))).all() and turn < 12 or turn > 70:
                 break
         return s - guess
+
+
+def greatest(function, low, high):
+    """Returns the places between `low` and `high` where functions with one maximum are greatest, and the maxima."""
+    share = 0.5 * (math.sqrt(5) - 1)
+    for _ in range(60):
+        first, last = high - share * (high - low), low + share * (high - low)
+        right = function(first) < function(last)
+        low, high = np.where(right, first, low), np.where(right, high, last)
+    at = 0.5 * (low + high)
+    return at, function(at)
 
 
 class Show:

@@ -40,7 +40,8 @@ pub struct Shape {
     points: Vec<Point>,
     /// Metres; 0 unless the shape is a circle.
     radius: f64,
-    is_convex: bool,
+    /// Of a convex shape: 1 if its corners stand counter-clockwise, -1 if clockwise, 0 of a circle or a segment.
+    convex: Option<f64>,
     /// A circle about the outline.
     bounding_centre: Point,
     bounding_radius: f64,
@@ -56,7 +57,7 @@ impl Shape {
     /// Creates a circle; its radius, metres, must be positive.
     pub fn circle(centre: Point, radius: f64) -> Self {
         let (kind, points) = (ShapeKind::Circle, vec![centre]);
-        Self { kind, points, radius, is_convex: true, bounding_centre: centre, bounding_radius: radius }
+        Self { kind, points, radius, convex: Some(0.0), bounding_centre: centre, bounding_radius: radius }
     }
 
     /// Creates a polygon from at least three corners; its sides must not meet except at their corners.
@@ -81,13 +82,12 @@ impl Shape {
         let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
         let bounding_centre = Point::from(0.5 * (low + high));
         let bounding_radius = points.iter().map(|point| (point - bounding_centre).norm()).fold(0.0, f64::max);
-        let is_convex = match kind {
-            ShapeKind::Circle => true,
-            ShapeKind::Polygon => turns_one_way(&points),
-            ShapeKind::Line => points.len() == 2,
-            ShapeKind::Boundary => false,
+        let convex = match kind {
+            ShapeKind::Polygon => sense(&points),
+            ShapeKind::Line => (points.len() == 2).then_some(0.0),
+            ShapeKind::Circle | ShapeKind::Boundary => None,
         };
-        Self { kind, points, radius: 0.0, is_convex, bounding_centre, bounding_radius }
+        Self { kind, points, radius: 0.0, convex, bounding_centre, bounding_radius }
     }
 
     /// Returns the kind.
@@ -97,7 +97,7 @@ impl Shape {
 
     /// Returns true if the shape is convex: then the depth of an overlap changes no faster than the board moves.
     pub fn is_convex(&self) -> bool {
-        self.is_convex
+        self.convex.is_some()
     }
 
     /// Returns the corners; of a circle, its centre.
@@ -217,14 +217,15 @@ impl Shape {
     }
 }
 
-/// Returns true if the corners of a simple polygon turn to one side only.
-fn turns_one_way(corners: &[Point]) -> bool {
+/// Returns the sense in which the corners of a simple polygon stand, 1 if it is counter-clockwise, -1 if clockwise;
+/// `None` unless the polygon is convex.
+fn sense(corners: &[Point]) -> Option<f64> {
     let count = corners.len();
     let turn = |k: usize| {
         let [before, at, after] = [0, 1, 2].map(|by| corners[(k + by) % count]);
         (at - before).perp(&(after - at))
     };
-    (0..count).all(|k| turn(k) >= 0.0) || (0..count).all(|k| turn(k) <= 0.0)
+    [1.0, -1.0].into_iter().find(|sense| (0..count).all(|k| sense * turn(k) >= 0.0))
 }
 
 /// Returns a point in the frame of a board.
