@@ -8,6 +8,7 @@
 mod disk;
 mod file;
 mod index;
+mod layout_history;
 mod messages;
 pub mod reader;
 pub mod recorder;
