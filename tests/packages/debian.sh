@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The packages on a clean Debian 12, which is installed into a folder: the .deb through lintian, installed, used; the wheel in
-# a fresh venv there, reading a publisher of the .deb; the user unit under systemd, which boots from that folder; removed. As
-# root; needs debootstrap, systemd-container, a mirror, PyPI, and what packaging/build needs.
+# The packages on a clean Debian 12, which is installed into a folder: the .deb through lintian, installed, used; the
+# wheel in a fresh venv there, reading a publisher of the .deb; the user unit under systemd, which boots from that
+# folder; removed. As root; needs debootstrap, systemd-container, a mirror, PyPI, and what packaging/build needs.
 set -euo pipefail
 [ $# = 1 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER" >&2; exit 2; }
 # Mounts of its own, which are gone when it ends.
@@ -12,12 +12,11 @@ folder=$(realpath -m "$1")
 cd "$repository"
 packaging/build wheel deb
 [ -e "$folder/etc/debian_version" ] || debootstrap --variant=minbase bookworm "$folder"
-# Authorities that this machine trusts, of a proxy perhaps.
-mkdir -p "$folder/etc/ssl/certs"
-cp -L /etc/ssl/certs/ca-certificates.crt "$folder/etc/ssl/certs/"
 rm -rf "$folder/opt/packages"
 mkdir -p "$folder/opt/packages"
-cp target/packaging/*.deb target/packaging/*.whl tests/packages/unit.sh tests/packages/unit.service "$folder/opt/packages/"
+# Authorities that this machine trusts, of a proxy perhaps.
+cp -L /etc/ssl/certs/ca-certificates.crt "$folder/opt/packages/authorities.crt"
+cp target/packaging/*.{deb,whl} tests/packages/unit.{sh,service} "$folder/opt/packages/"
 # Runs a command in the folder, with mounts that end with it.
 inside() {
   unshare --mount --propagation private bash -euo pipefail -c '
@@ -35,10 +34,10 @@ echo "== lintian"
 inside 'lintian --fail-on error --tag-display-limit 0 *.deb'
 echo "== installed, used"
 inside 'apt-get install --quiet=2 --yes --no-install-recommends ./*.deb >/dev/null
-  cd / && bench-dragon --version && bench-dragon --scene /usr/share/bench-dragon/scenes/school.toml check >/dev/null
+  bench-dragon --version && bench-dragon --scene /usr/share/bench-dragon/scenes/school.toml check >/dev/null
   bash -n /usr/share/bash-completion/completions/bench-dragon
   zcat /usr/share/man/man1/bench-dragon-run.1.gz | grep -q -- "\\\\-\\\\-realtime"
-  python3 -m venv /opt/packages/venv && /opt/packages/venv/bin/pip install --quiet /opt/packages/*.whl
+  python3 -m venv /opt/packages/venv && /opt/packages/venv/bin/pip install --quiet --cert authorities.crt *.whl
   /opt/packages/venv/bin/bench-dragon --version
   bench-dragon run --name packages --duration 60 >/dev/null 2>&1 & publisher=$!
   /opt/packages/venv/bin/python -c "
