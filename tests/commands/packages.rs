@@ -160,14 +160,25 @@ fn the_ros_2_package_installs_what_its_launch_file_names() {
     assert_eq!(mode & 0o111, 0o111, "publisher is not executable");
 }
 
-#[test]
-fn packages_install_on_a_clean_debian() {
-    if std::env::var_os("BENCH_DRAGON_LONG").is_none() || !can_run(root("install Debian into a folder")) {
-        return;
-    }
+/// Runs a script of `tests/packages` with a new folder, which needs minutes and the tools of `packaging/build`.
+fn run_in_the_long_run(script: &str, arguments: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
-    let mut script = Command::new("tests/packages/debian.sh");
-    script.current_dir(ROOT).arg(folder.path().join("debian"));
+    let mut script = Command::new(script);
+    script.current_dir(ROOT).arg(folder.path().join("made")).args(arguments);
     let output = Process::start(&mut script).output_within(3600);
     assert!(output.status.success(), "{}\n{}", text(&output.stdout), text(&output.stderr));
+}
+
+#[test]
+fn two_checkouts_give_the_same_sources_and_sbom() {
+    if std::env::var_os("BENCH_DRAGON_LONG").is_some() {
+        run_in_the_long_run("tests/packages/alike.sh", &["sbom", "ros2"]);
+    }
+}
+
+#[test]
+fn packages_install_on_a_clean_debian() {
+    if std::env::var_os("BENCH_DRAGON_LONG").is_some() && can_run(root("install Debian into a folder")) {
+        run_in_the_long_run("tests/packages/debian.sh", &[]);
+    }
 }
