@@ -23,6 +23,7 @@ const LEAST_PITCH: f64 = 1.5;
 pub fn data(motion: &Motion, camera: &Camera) -> String {
     let (view, outline) = (camera.view(), motion.outline());
     let mut data = String::new();
+    let mut is_route = false;
     match motion.description() {
         PathDescription::Spiral { pitch, .. } => {
             spiral(&mut data, Direction::Inward, *pitch, (0.0, f64::MAX), motion.placement(), camera);
@@ -32,6 +33,7 @@ pub fn data(motion: &Motion, camera: &Camera) -> String {
             spiral(&mut data, Direction::Inward, *pitch, (turn, f64::MAX), motion.placement(), camera);
         }
         PathDescription::Route { .. } => {
+            is_route = true;
             if let Some(SegmentOutline { start, heading, .. }) = outline.first() {
                 let reach = (view.centre() - start).norm() + view.width() + view.height();
                 line(&mut data, start - reach * direction(*heading), *start);
@@ -44,11 +46,13 @@ pub fn data(motion: &Motion, camera: &Camera) -> String {
                 line(&mut data, segment.start, segment.start + segment.length * direction(segment.heading));
             }
             OutlineKind::Arc { curvature } => arc(&mut data, &segment, curvature),
-            OutlineKind::Spiral { direction: Direction::Outward, pitch, first, last, .. } => {
-                spiral(&mut data, Direction::Outward, pitch, (first, last), motion.placement(), camera);
-            }
             // Drawn above, with the path behind the start.
-            OutlineKind::Spiral { direction: Direction::Inward, .. } => {}
+            OutlineKind::Spiral { direction: Direction::Inward, .. } if !is_route => {}
+            OutlineKind::Spiral { direction, pitch, first, last, .. } => {
+                if let Some(placement) = Placement::of_spiral(&segment) {
+                    spiral(&mut data, direction, pitch, (first.min(last), first.max(last)), &placement, camera);
+                }
+            }
         }
     }
     data
