@@ -536,7 +536,8 @@ fn spiral_from(
     };
     let is_mirrored = (way == Direction::Outward) != (side == Side::Left);
     let about_origin = of(None);
-    let (point, tangent) = (about_origin.point_of(first, sin_cos), about_origin.tangent_of(first[0] + first[1], sin_cos));
+    let (point, tangent) =
+        (about_origin.point_of(first, sin_cos), about_origin.tangent_of(first[0] + first[1], sin_cos));
     // Direction over tangent, as complex numbers.
     let [x, y] = if is_mirrored { [tangent[0], -tangent[1]] } else { tangent };
     let rotation = [direction[0] * x + direction[1] * y, direction[1] * x - direction[0] * y];

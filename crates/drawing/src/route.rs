@@ -187,6 +187,35 @@ mod tests {
         }
     }
 
+    /// A spiral piece is drawn from its beginning to its end, on the path's own points.
+    #[test]
+    fn the_spirals_of_a_route_lie_on_the_path() {
+        for (side, direction) in [(Side::Left, Direction::Inward), (Side::Right, Direction::Outward)] {
+            let piece = RouteStep::Spiral { side, direction, pitch: 1.7, radius: 6.0, turns: 2.25 };
+            let steps = vec![RouteStep::Line { length: 3.0 }, piece];
+            let description = PathDescription::Route { heading_turns: 0.1, steps };
+            let motion = Motion::new(description, TEAM, 1.0, Method::Newton).unwrap();
+            let motion = motion.placed(Placement::new(Vector::new(2.0, -1.0), 0.3, true));
+            let drawn = data(&motion, &camera(60.0));
+            // The line behind the start, the line, the spiral.
+            let moves: Vec<usize> = drawn.match_indices('M').map(|(at, _)| at).collect();
+            let drawn = curves(&drawn[moves[2]..]);
+            let path = motion.path();
+            let ends = [3.0, path.length()].map(|s| motion.placement().point(path.point(path.param_at(s))));
+            let apart = |end: Point| drawn.iter().map(|curve| (curve[0] - end).norm().min((curve[3] - end).norm()));
+            assert!(ends.into_iter().all(|end| apart(end).fold(f64::INFINITY, f64::min) < 1e-6));
+            let on_path: Vec<Point> = (0..20_000)
+                .map(|k| path.point(path.param_at(3.0 + f64::from(k) * (path.length() - 3.0) / 19_999.0)))
+                .map(|point| motion.placement().point(point))
+                .collect();
+            for [a, b, c, d] in drawn {
+                let middle = Point::from((a.coords + 3.0 * b.coords + 3.0 * c.coords + d.coords) / 8.0);
+                let away = on_path.iter().map(|point| (point - middle).norm()).fold(f64::INFINITY, f64::min);
+                assert!(away < 2.5e-3, "{away} m beside the path");
+            }
+        }
+    }
+
     #[test]
     fn a_spiral_too_fine_for_the_picture_is_left_out_and_a_near_view_has_few_turns() {
         let description = PathDescription::Spiral { pitch: 0.55, start_turn: 2000.0 };

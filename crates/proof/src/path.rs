@@ -85,7 +85,14 @@ impl Curve {
 
     /// Creates a spiral of `a` metres per radian from `origin`, where its polar angle is `first` and the direction of
     /// travel `heading` radians from x. `to_left` is true if its centre is on the left.
-    pub fn spiral_from(origin: &Vector, heading: &Interval, is_inward: bool, to_left: bool, a: Interval, first: &Interval) -> Self {
+    pub fn spiral_from(
+        origin: &Vector,
+        heading: &Interval,
+        is_inward: bool,
+        to_left: bool,
+        a: Interval,
+        first: &Interval,
+    ) -> Self {
         let of = |frame| if is_inward { Self::Inward { a, frame } } else { Self::Outward { a, frame } };
         // About the origin an inward spiral turns right, an outward one left, with the tangent at theta + atan theta +
         // pi.

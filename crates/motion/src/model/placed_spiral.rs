@@ -177,7 +177,9 @@ mod tests {
         for direction in [Direction::Inward, Direction::Outward] {
             for (side, left) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
                 let spiral = PlacedSpiral::new(origin, ahead, side, Spiral::new(pitch, direction), first);
-                assert!((spiral.point(first) - origin).norm() < 1e-15 && (spiral.tangent(first) - ahead).norm() < 1e-15);
+                assert!(
+                    (spiral.point(first) - origin).norm() < 1e-15 && (spiral.tangent(first) - ahead).norm() < 1e-15
+                );
                 let spoke = origin - spiral.centre();
                 assert!((spoke.norm() - radius).abs() < 1e-14 && left * ahead.perp(&spoke) < 0.0);
                 let grows = if direction == Direction::Inward { -1.0 } else { 1.0 };

@@ -254,9 +254,9 @@ impl RawStep {
 
     fn line(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
         match self {
-            Self { length: Some(length), radius: None, turns: None, side: None, pitch: None, direction: None, .. } => {
-                Ok(RouteStep::Line { length: checked(source, "length", length, Accepted::LEG)? })
-            }
+            Self {
+                length: Some(length), radius: None, turns: None, side: None, pitch: None, direction: None, ..
+            } => Ok(RouteStep::Line { length: checked(source, "length", length, Accepted::LEG)? }),
             _ => Err(source.field_error(at, "a line has a length and nothing else")),
         }
     }
@@ -283,8 +283,10 @@ impl RawStep {
     }
 
     fn spiral(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
-        let (Self { pitch: Some(pitch), radius: Some(radius), side: Some(side), direction: Some(way), .. }, Some(extent)) =
-            (self, self.extent())
+        let (
+            Self { pitch: Some(pitch), radius: Some(radius), side: Some(side), direction: Some(way), .. },
+            Some(extent),
+        ) = (self, self.extent())
         else {
             return Err(source.field_error(
                 at,

@@ -262,14 +262,7 @@ impl RealPath {
     }
 
     /// Adds the spiral between two polar angles. Its tangent has the angle phase + sense (theta + atan(theta) + pi).
-    fn piece_of_spiral(
-        &mut self,
-        side: Side,
-        direction: Direction,
-        radius_per_radian: Real,
-        first: Real,
-        last: &Real,
-    ) {
+    fn piece_of_spiral(&mut self, side: Side, direction: Direction, radius_per_radian: Real, first: Real, last: &Real) {
         let counter_clockwise = (side == Side::Left) == (direction == Direction::Outward);
         let sense = Real::from(if counter_clockwise { 1.0 } else { -1.0 });
         let half = self.functions.turn() / Real::from(2.0);

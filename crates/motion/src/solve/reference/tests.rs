@@ -12,7 +12,9 @@ use super::*;
 use crate::model::Point;
 use crate::model::curve::Side;
 use crate::model::description::RouteStep;
+use crate::model::path::tests::any_spiral;
 use crate::model::path::{Param, Path};
+use crate::model::spiral::Direction;
 use crate::solve::newton::Newton;
 use crate::solve::{Chain, Velocities};
 
@@ -85,6 +87,36 @@ fn it_agrees_with_50_digits_on_the_turnaround() {
     for (time, position, speed) in errors {
         println!("t = {time} s: {position:e} m, {speed:e}");
         assert!(position < 1e-13 && speed < 1e-13, "{time} s: {position:e} m, {speed:e}");
+    }
+}
+
+/// The route of tests/truth/spiral_route.py: spirals inward and outward, to the left and to the right.
+fn spiral_route() -> PathDescription {
+    use Direction::{Inward, Outward};
+    use Side::{Left, Right};
+    let spiral = |side, direction, pitch, radius, turns| RouteStep::Spiral { side, direction, pitch, radius, turns };
+    let steps = vec![
+        RouteStep::Line { length: 15.0 },
+        spiral(Left, Inward, 1.7, 12.0, 4.0),
+        RouteStep::Arc { side: Right, radius: 2.6, turns: 0.45 },
+        spiral(Left, Outward, 1.3, 5.0, 1.5),
+        spiral(Right, Inward, 0.9, 4.5, 2.0),
+        RouteStep::Line { length: 6.0 },
+        spiral(Right, Outward, 2.1, 3.0, 1.25),
+        RouteStep::Line { length: 20.0 },
+    ];
+    PathDescription::Route { heading_turns: 0.0, steps }
+}
+
+#[test]
+fn it_agrees_with_50_digits_on_a_route_of_spirals() {
+    let rows = table(include_str!("../../../../../tests/truth/spiral_route.csv"));
+    let mut reference = Reference::new(team(25), &spiral_route(), 1.0).unwrap();
+    let errors = errors(&mut reference, &rows, 0.0);
+    assert_eq!(errors.len(), 10);
+    for (time, position, speed) in errors {
+        println!("t = {time} s: {position:e} m, {speed:e}");
+        assert!(position < 1e-14 && speed < 1e-14, "{time} s: {position:e} m, {speed:e}");
     }
 }
 
@@ -351,6 +383,7 @@ fn any_step() -> impl Strategy<Value = RouteStep> {
     prop_oneof![
         (0.01..12.0).prop_map(|length| RouteStep::Line { length }),
         (side, 0.7..8.0, 0.01..0.6).prop_map(|(side, radius, turns)| RouteStep::Arc { side, radius, turns }),
+        any_spiral(),
     ]
 }
 
