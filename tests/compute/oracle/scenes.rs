@@ -7,6 +7,7 @@ use toml::{Table, Value};
 use super::chain::Team;
 use super::geometry::{Path, RouteSegment, Vector};
 
+/// The kinds of random scenes; the last is tried in addition to the others.
 pub const FAMILIES: [&str; 7] =
     ["spiral", "turnaround", "route", "tight bends", "U-turn", "S-bend", "spirals in a route"];
 
@@ -110,12 +111,12 @@ pub fn arc(radius: f64, turns: f64, left: bool) -> String {
     format!("[[path.pieces]]\nkind = \"arc\"\nradius = {radius:?}\nside = \"{side}\"\nturns = {turns:?}\n")
 }
 
-/// Returns a spiral of a route that ends at least a tenth of its first radius from its centre.
-pub fn spiral(random: &mut Random) -> String {
-    let (pitch, inward) = (random.magnitude(0.2, 3.0), random.chance(0.6));
-    let radius = random.magnitude(0.3, 8.0);
-    let most = if inward { 0.9 * radius / pitch } else { 8.0 / pitch };
-    let turns = random.between(0.02, 1.0) * most.min(6.0);
+/// Returns a spiral of a route, as wide as some links: inward it goes up to nine tenths of the way to its centre.
+fn spiral(random: &mut Random, link: f64) -> String {
+    let (pitch, inward) = (link * random.magnitude(0.1, 2.0), random.chance(0.6));
+    let radius = link * random.magnitude(0.5, 8.0);
+    let most = if inward { 0.9 * radius } else { 4.0 * link };
+    let turns = random.between(0.02, 1.0) * (most / pitch).min(5.0);
     let direction = if inward { "in" } else { "out" };
     let side = if random.chance(0.5) { "left" } else { "right" };
     format!(
@@ -213,10 +214,10 @@ pub fn random_scene(family: usize, random: &mut Random) -> String {
                     share if share < 0.5 => {
                         arc(random.magnitude(0.3, 6.0), random.between(0.02, 0.8), random.chance(0.5))
                     }
-                    _ => spiral(random),
+                    _ => spiral(random, head.max(body)),
                 };
             }
-            text + &spiral(random) + &line(random.between(0.5, 10.0))
+            text + &spiral(random, head.max(body)) + &line(random.between(0.5, 10.0))
         }
         _ => {
             // Two arcs of 135 degrees: a link of 1 / (sqrt(2) - 1) radii just locks in them.

@@ -38,6 +38,9 @@ pub enum PathDescription {
     },
 }
 
+/// Pieces of a route up to which its ends are plain sums, as they were when no route had more.
+const FEW_PIECES: usize = 31;
+
 /// One segment of a route.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RouteStep {
@@ -100,7 +103,9 @@ impl PathDescription {
                 Path::turnaround(*pitch, *turn_radius, *arc_ratio, *lead_in, *lead_out)
             }
             Self::Route { heading_turns, steps } => {
-                let route = steps.iter().fold(Path::route(*heading_turns), |route, step| match *step {
+                let start = Path::route(*heading_turns);
+                let start = if steps.len() > FEW_PIECES { start.of_many_pieces() } else { start };
+                let route = steps.iter().fold(start, |route, step| match *step {
                     RouteStep::Line { length } => route.line(length),
                     RouteStep::Arc { side, radius, turns } => route.arc(side, radius, turns),
                     RouteStep::Spiral { side, direction, pitch, radius, turns } => {

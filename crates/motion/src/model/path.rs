@@ -194,7 +194,7 @@ impl Path {
         let zero = Coordinate::ZERO;
         let behind =
             Placed { segment, begin: f64::NEG_INFINITY, end: 0.0, anchor: zero, anchor_travelled: 0.0, last: zero };
-        Route { path: Self { segments: vec![behind] }, end: start, heading_turns }
+        Route { path: Self { segments: vec![behind] }, end: start, heading_turns, remainders: None }
     }
 
     fn push(&mut self, segment: Segment, anchor: Coordinate, last: Coordinate, length: f64) {
@@ -375,9 +375,24 @@ pub struct Route {
     path: Path,
     end: Point,
     heading_turns: f64,
+    remainders: Option<Remainders>,
+}
+
+/// The rounding errors of the end, the heading and the length of a route so far.
+#[derive(Debug, Clone, Copy, Default)]
+struct Remainders {
+    end: Vector,
+    heading_turns: f64,
+    length: f64,
 }
 
 impl Route {
+    /// Returns the route with sums of twice the digits from here on, for a route of many pieces: their rounding errors
+    /// would add up. Short routes have plain sums.
+    pub fn of_many_pieces(self) -> Self {
+        Self { remainders: Some(Remainders::default()), ..self }
+    }
+
     /// Adds a straight line of `length` metres.
     pub fn line(self, length: f64) -> Self {
         let line = Line { origin: self.end, direction: self.direction() };
@@ -409,14 +424,33 @@ impl Route {
     }
 
     fn direction(&self) -> Vector {
-        let (sine, cosine) = DoubleDouble::from_turns(self.heading_turns).sine_and_cosine();
+        let rest = self.remainders.map_or(0.0, |remainders| remainders.heading_turns);
+        let heading = DoubleDouble::from_turns(self.heading_turns);
+        let heading = if rest == 0.0 { heading } else { heading.plus(TAU * rest) };
+        let (sine, cosine) = heading.sine_and_cosine();
         Vector::new(cosine, sine)
     }
 
     fn continued(mut self, segment: Segment, first: Coordinate, last: Coordinate, length: f64, turned: f64) -> Self {
+        let before = self.path.length();
         self.path.push(segment, first, last, length);
-        self.end = segment.point(last);
-        self.heading_turns += turned;
+        let Some(rest) = &mut self.remainders else {
+            self.end = segment.point(last);
+            self.heading_turns += turned;
+            return self;
+        };
+        let add = |sum: &mut f64, rest: &mut f64, by: f64| {
+            DoubleDouble { high: *sum, low: *rest } = DoubleDouble { high: *sum, low: *rest }.plus(by);
+        };
+        let by = segment.displacement(first, last);
+        add(&mut self.end.x, &mut rest.end.x, by.x);
+        add(&mut self.end.y, &mut rest.end.y, by.y);
+        add(&mut self.heading_turns, &mut rest.heading_turns, turned);
+        let mut end = before;
+        add(&mut end, &mut rest.length, length);
+        if let Some(pushed) = self.path.segments.last_mut() {
+            pushed.end = end;
+        }
         self
     }
 

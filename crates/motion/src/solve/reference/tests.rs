@@ -120,6 +120,41 @@ fn it_agrees_with_50_digits_on_a_route_of_spirals() {
     }
 }
 
+/// Thousands of roundings do not add up: the last points of a long route keep the promise.
+#[test]
+fn a_route_of_4096_pieces_keeps_its_digits() {
+    // Lengths and turns of 52 bits from a linear congruence.
+    let mut state = 1u64;
+    let mut share = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let sides = [Side::Left, Side::Right];
+    let mut step = |k: usize| match k % 8 {
+        0 => RouteStep::Line { length: 1.0 + 9.0 * share() },
+        7 => {
+            let (pitch, radius) = (0.5 + share(), 4.0 + 3.0 * share());
+            let direction = if k % 16 == 7 { Direction::Inward } else { Direction::Outward };
+            RouteStep::Spiral { side: sides[k / 16 % 2], direction, pitch, radius, turns: 0.1 + 0.2 * share() }
+        }
+        _ => RouteStep::Arc { side: sides[k % 2], radius: 3.0 + 5.0 * share(), turns: 0.05 + 0.2 * share() },
+    };
+    let steps = (0..4096).map(&mut step).collect();
+    let description = PathDescription::Route { heading_turns: 0.3, steps };
+    let path = description.path().unwrap();
+    let mut exact = path::RealPath::new(&description).unwrap();
+    let mut worst = 0f64;
+    for share in 1..=64 {
+        let travelled = path.length() * f64::from(share) / 64.0;
+        let point = path.point(path.param_at(travelled));
+        let truth = exact.place_at(&Real::from(travelled)).1.point;
+        let error = truth.x.split().error_of(point.x).hypot(truth.y.split().error_of(point.y));
+        worst = worst.max(error / (8.0 * f64::EPSILON * (point.coords.norm() + travelled)));
+    }
+    println!("{} m, {worst} of the promise", path.length());
+    assert!(path.length() > 15_000.0 && worst < 1.0, "{worst} of the promise");
+}
+
 /// Returns a decimal without rounding to a double: at most 20 significant digits.
 fn decimal(text: &str) -> Real {
     let (mantissa, exponent) = text.split_once('e').unwrap_or((text, "0"));
