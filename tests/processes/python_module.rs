@@ -57,8 +57,8 @@ fn a_route_of_4096_pieces_is_one_message() {
     let arc = "[[path.pieces]]\nkind = \"arc\"\nradius = 5.0\nturns = 0.1\nside = ";
     let pieces = format!("{line}{arc}\"left\"\n{line}{arc}\"right\"\n").repeat(1024);
     let scene = format!(
-        "name = \"long\"\n[team]\nbenches = 9\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n\
-         [path]\nkind = \"pieces\"\n{pieces}[motion]\nhead_speed = 1.0\n"
+        "name = \"long\"\n[team]\nbenches = 1\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n\
+         [path]\nkind = \"pieces\"\n{pieces}[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n"
     );
     let file = scene_file("pieces_4096", &[]);
     std::fs::write(&file, &scene).unwrap();

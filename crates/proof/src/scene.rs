@@ -381,3 +381,27 @@ fn rough_angle(length: f64, first: f64) -> f64 {
     }
     theta
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The metres to the angle found are those asked for, with more digits than a double has, up to a centimetre from the
+    /// centre.
+    #[test]
+    fn the_angle_after_some_metres_of_a_spiral() {
+        let a = Interval::new(1.7) / elementary::turns(1.0);
+        let first = Interval::new(12.0) / a;
+        let to_centre = Curve::Inward { a, frame: None }.metres(&first, &Interval::new(0.0));
+        let inward = [1e-3, 40.0, 266.0].map(|metres| Interval::new(-metres));
+        let outward = [1e-3, 1.0, 1e5].map(Interval::new);
+        let near_the_centre = [Interval::new(0.01) - to_centre];
+        for metres in inward.into_iter().chain(outward).chain(near_the_centre) {
+            let last = last_angle(&a, &first, &metres).unwrap();
+            let found = Curve::Outward { a, frame: None }.metres(&first, &last);
+            assert!((found - metres).abs().is_below(&Interval::new(1e-19)), "{}", metres.rough());
+        }
+        assert!(last_angle(&a, &first, &-to_centre).is_err());
+        assert!(last_angle(&a, &first, &Interval::new(-300.0)).is_err());
+    }
+}
