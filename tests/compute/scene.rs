@@ -142,7 +142,8 @@ fn the_segments_of_a_stage_join() {
     }
 }
 
-/// Spirals of a route come with their turns or their length, with their bend in the stage message, and without a corner.
+/// Spirals of a route come with their turns or their length, with their bend in the stage message, and without a
+/// corner.
 #[test]
 fn the_spirals_of_a_route_join_and_say_where_they_lie() {
     let spiral = |direction: &str, side: &str, extent: &str| {

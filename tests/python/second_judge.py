@@ -151,8 +151,8 @@ class Spiral(Segment):
 
 
 class PlacedSpiral(Spiral):
-    """A spiral about any centre from a point in a direction, its centre on one side. Complex numbers in place of vectors:
-    along it, the tangent is the unit vector from the centre times (sense + i side theta) / sqrt(1 + theta^2)."""
+    """A spiral about any centre from a point in a direction, its centre on one side. Complex numbers in place of
+    vectors: along it, the tangent is the unit vector from the centre times (sense + i side theta) / sqrt(1 + theta^2)."""
 
     def __init__(self, a, inward, begin, end, point, direction, left):
         super().__init__(a, inward, begin, end)

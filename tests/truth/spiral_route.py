@@ -4,8 +4,8 @@
     pip install mpmath
     python3 tests/truth/spiral_route.py > tests/truth/spiral_route.csv
 
-Points are complex numbers. A piece is a function of the metres from its beginning; a follower is found by small steps back
-and bisection. All numbers of the route are the doubles that the program reads.
+Points are complex numbers. A piece is a function of the metres from its beginning; a follower is found by small steps
+back and bisection. All numbers of the route are the doubles that the program reads.
 """
 
 from mpmath import asinh, atan, exp, findroot, mp, mpc, mpf, pi, sqrt

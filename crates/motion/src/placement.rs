@@ -87,8 +87,8 @@ impl Placement {
         Self { turn: turned, origin }
     }
 
-    /// Returns the placement of the spiral about the origin that a spiral of an outline is: its beginning, its heading and
-    /// the side of its curvature say where it lies. `None` for other curves.
+    /// Returns the placement of the spiral about the origin that a spiral of an outline is: its beginning, its heading
+    /// and the side of its curvature say where it lies. `None` for other curves.
     pub fn of_spiral(outline: &SegmentOutline) -> Option<Self> {
         let OutlineKind::Spiral { direction, pitch, first, curvature, .. } = outline.kind else { return None };
         if curvature.is_nan() {

@@ -30,8 +30,8 @@ enum Curve {
         phase: f64,
         turn: f64,
     },
-    /// `outward` is -1 on r = a theta inward, 1 on the same spiral turned by half a turn, outward. The polar angle about
-    /// `centre` is `phase` + `turn` theta.
+    /// `outward` is -1 on r = a theta inward, 1 on the same spiral turned by half a turn, outward. The polar angle
+    /// about `centre` is `phase` + `turn` theta.
     Spiral {
         radius_per_radian: f64,
         outward: f64,
@@ -296,8 +296,8 @@ impl Path {
         self.push(curve, 0.0, angle);
     }
 
-    /// The centre is where the pole of the tangent's normal says: the tangent leans by atan(1 / theta) against the circle
-    /// about the centre, towards it or away from it.
+    /// The centre is where the pole of the tangent's normal says: the tangent leans by atan(1 / theta) against the
+    /// circle about the centre, towards it or away from it.
     fn push_spiral(&mut self, radius_per_radian: f64, radius: f64, outward: f64, angle: f64, left: bool) {
         let (point, tangent) = self.last_point_and_tangent();
         let side = if left { 1.0 } else { -1.0 };

@@ -113,8 +113,8 @@ pub enum OutlineKind {
         first: f64,
         /// Polar angle of its end on the unturned spiral, radians.
         last: f64,
-        /// Curvature at its beginning, 1/m, positive to the left, of a piece of a route, and of a spiral that a placement
-        /// moves, turns or mirrors; NaN of a spiral about the origin.
+        /// Curvature at its beginning, 1/m, positive to the left, of a piece of a route, and of a spiral that a
+        /// placement moves, turns or mirrors; NaN of a spiral about the origin.
         curvature: f64,
     },
 }
@@ -407,8 +407,8 @@ impl Route {
         self.continued(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
     }
 
-    /// Adds an Archimedean spiral of `pitch` metres per turn. It begins `radius` metres from its centre, which is on one
-    /// side, and leads `turns` turns around it.
+    /// Adds an Archimedean spiral of `pitch` metres per turn. It begins `radius` metres from its centre, which is on
+    /// one side, and leads `turns` turns around it.
     ///
     /// The tangent has the polar angle theta + atan(theta), but for a constant.
     pub fn spiral(self, side: Side, direction: Direction, pitch: f64, radius: f64, turns: f64) -> Self {

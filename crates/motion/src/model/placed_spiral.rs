@@ -1,5 +1,5 @@
-//! A spiral piece of a route: a [`Spiral`] that is mirrored, rotated and moved, so that one of its places becomes a given
-//! point with a given direction of travel.
+//! A spiral piece of a route: a [`Spiral`] that is mirrored, rotated and moved, so that one of its places becomes a
+//! given point with a given direction of travel.
 
 use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc, Side};
 use super::spiral::{Direction, Spiral};
@@ -7,8 +7,8 @@ use super::{Point, Vector};
 
 /// A spiral with its centre anywhere. Its coordinate is that of the spiral about the origin.
 ///
-/// Distances, angles and lengths are those of the spiral about the origin. Points are displacements from the place where
-/// the piece begins, so that their rounding does not grow with the distance of the centre.
+/// Distances, angles and lengths are those of the spiral about the origin. Points are displacements from the place
+/// where the piece begins, so that their rounding does not grow with the distance of the centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedSpiral {
     spiral: Spiral,
@@ -22,8 +22,8 @@ pub struct PlacedSpiral {
 }
 
 impl PlacedSpiral {
-    /// Creates the spiral whose place `first` is the point `origin`, with a unit direction of travel there and its centre
-    /// on one side.
+    /// Creates the spiral whose place `first` is the point `origin`, with a unit direction of travel there and its
+    /// centre on one side.
     pub fn new(origin: Point, direction: Vector, side: Side, spiral: Spiral, first: Coordinate) -> Self {
         let turns_left = spiral.turning() > 0.0;
         let mirror = if turns_left == (side == Side::Left) { 1.0 } else { -1.0 };
