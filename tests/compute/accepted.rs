@@ -75,11 +75,13 @@ fn tight_route(random: &mut Rng) -> String {
 
 /// Returns a scene of one of all families.
 fn scene(index: usize, random: &mut Rng) -> String {
-    if index.is_multiple_of(8) {
-        let family = random.usize(..scenes::FAMILIES.len());
-        return scenes::random_scene(family, &mut scenes::Random(random.u64(..)));
+    let last = scenes::FAMILIES.len() - 1;
+    match index % 8 {
+        0 => scenes::random_scene(random.usize(..last), &mut scenes::Random(random.u64(..))),
+        // Routes with spirals.
+        4 => scenes::random_scene(last, &mut scenes::Random(random.u64(..))),
+        _ => tight_route(random),
     }
-    tight_route(random)
 }
 
 /// Most lines of a certificate that are left out, one at a time.

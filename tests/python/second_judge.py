@@ -23,7 +23,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from flint import arb, ctx
+from flint import acb, arb, ctx
 
 ctx.prec = 192
 PI = arb.pi()
@@ -150,6 +150,32 @@ class Spiral(Segment):
         return super().back(c, metres * self.scale(c) / self.scale(c + metres / self.scale(c)))
 
 
+class PlacedSpiral(Spiral):
+    """A spiral about any centre from a point in a direction, its centre on one side. Complex numbers in place of
+    vectors: along it, the tangent is the unit vector from the centre times (sense + i side theta) / sqrt(1 + theta^2)."""
+
+    def __init__(self, a, inward, begin, end, point, direction, left):
+        super().__init__(a, inward, begin, end)
+        self.side = 1 if left else -1
+        self.outward = acb(*direction) / self.along(begin)
+        self.centre = acb(*point) - a * begin * self.outward
+
+    def along(self, c):
+        return acb(self.sense, self.side * c) / (1 + c * c).sqrt()
+
+    def spoke(self, c):
+        sin, cos = (self.side * self.sense * (c - self.begin)).sin_cos()
+        return self.outward * acb(cos, sin)
+
+    def point(self, c):
+        point = self.centre + self.a * c * self.spoke(c)
+        return point.real, point.imag
+
+    def tangent(self, c):
+        tangent = self.spoke(c) * self.along(c)
+        return tangent.real, tangent.imag
+
+
 class Scene:
     def __init__(self, text):
         file = tomllib.loads(text)
@@ -202,13 +228,25 @@ class Scene:
         for piece in path["pieces"]:
             if piece["kind"] == "line":
                 segment = Line(point, direction, arb(0), number(piece, "length"))
+            elif piece["kind"] == "spiral":
+                segment = self.piece_of_spiral(piece, number, point, direction)
             else:
                 radius = number(piece, "radius")
                 angle = 2 * PI * number(piece, "turns") if "turns" in piece else number(piece, "length") / radius
                 segment = Arc(point, direction, radius, piece["side"] == "left", angle)
             point, direction = segment.point(segment.end), segment.tangent(segment.end)
-            self.length += segment.metres(segment.end)
+            self.length += segment.metres(segment.end) - segment.metres(segment.begin)
             self.segments.append(segment)
+
+    def piece_of_spiral(self, piece, number, point, direction):
+        a, inward = number(piece, "pitch") / (2 * PI), piece["direction"] == "in"
+        begin = number(piece, "radius") / a
+        spiral = PlacedSpiral(a, inward, begin, None, point, direction, piece["side"] == "left")
+        if "turns" in piece:
+            spiral.end = begin + spiral.sense * 2 * PI * number(piece, "turns")
+        else:
+            spiral.end = self.inverse(spiral, spiral.metres(begin) + number(piece, "length"))
+        return spiral
 
     @staticmethod
     def inverse(curve, metres):

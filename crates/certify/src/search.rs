@@ -539,7 +539,7 @@ pub(super) fn path_end(exact: &ExactPath, path: &Path) -> GridPoint {
     let length = path.length();
     let end = place(path.param_at(length));
     let beyond = exact.moved(end, LEAST * (1.0 + length), false);
-    let inward = matches!(exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
-    let head = if inward { Place(beyond.0, 0.0, 0.0) } else { beyond };
+    // An inward spiral that is the whole path ends at its centre.
+    let head = if exact.segments.len() == 1 { Place(0, 0.0, 0.0) } else { beyond };
     GridPoint::at(head, length)
 }

@@ -44,17 +44,17 @@ export function spiralFrame({ kind, x, y, heading, curvature, theta_first, pitch
   return { x: x - c * px + s * side * py, y: y - s * px - c * side * py, c, s, side };
 }
 
-/** The place of the centre of a stage's spirals; the origin where it has none. */
-export function centreOf({ path }) {
+/** The place of the centre of the spiral on which a team comes in; the origin of a team that comes in on a line. */
+export function centreOf({ path, start_turn }) {
   const spiral = path.find(({ kind }) => kind.endsWith("_spiral"));
-  return spiral ? spiralFrame(spiral) : { x: 0, y: 0 };
+  return spiral && start_turn !== null ? spiralFrame(spiral) : { x: 0, y: 0 };
 }
 
 /**
  * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach` from its centre,
  * where the team stands.
  */
-export function pathOf({ path: segments }, reach) {
+export function pathOf({ path: segments, start_turn }, reach) {
   const path = new Path2D();
   for (const segment of segments) {
     const { kind, x, y, heading, length, curvature, theta_first, theta_last, pitch } = segment;
@@ -67,7 +67,8 @@ export function pathOf({ path: segments }, reach) {
       path.moveTo(x, y);
       path.arc(cx, cy, 1 / Math.abs(curvature), from, from + curvature * length, curvature < 0);
     } else if (kind === "inward_spiral") {
-      addSpiral(path, spiralFrame(segment), pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
+      const first = start_turn === null ? theta_first : Math.max(theta_first, (2 * Math.PI * reach) / pitch);
+      addSpiral(path, spiralFrame(segment), pitch, theta_last, first);
     } else {
       addSpiral(path, spiralFrame(segment), -pitch, theta_first, theta_last);
     }
