@@ -461,7 +461,7 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
 }
 
 /// Returns the direction `turns` turns counter-clockwise from x.
-fn of_turns(turns: Interval) -> Vector {
+pub(super) fn of_turns(turns: Interval) -> Vector {
     let (sine, cosine) = sin_cos_of(pi() * 2.0 * turns);
     [cosine, sine]
 }
