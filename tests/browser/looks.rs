@@ -1,7 +1,8 @@
 //! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show look.
 //!
-//! The tests are in `tests/python/stage_transport.py`, `stage_show.py` and `stage_seat.py`. No test asserts a speed.
+//! The tests are in `tests/python/stage_transport.py`, `stage_show.py`, `stage_seat.py` and `stage_dragons.py`. No test asserts a speed.
 
+use crate::harness::{can_run, python_modules};
 use crate::view::run_scenario;
 
 #[test]
@@ -42,4 +43,26 @@ fn seat_shows_the_dragon() {
 #[test]
 fn cameras_are_kept() {
     run_scenario("tests/python/stage_seat.py", "cameras_are_kept");
+}
+
+/// Runs a scenario of several dragons, whose distances shapely computes.
+fn of_several(scenario: &str) {
+    if can_run(python_modules(&["shapely"])) {
+        run_scenario("tests/python/stage_dragons.py", scenario);
+    }
+}
+
+#[test]
+fn one_page_of_two_dragons() {
+    of_several("one_page_of_two");
+}
+
+#[test]
+fn labels_of_two_dragons_point_at_their_boards() {
+    of_several("labels_of_two_point_at_their_boards");
+}
+
+#[test]
+fn each_dragon_has_its_light() {
+    of_several("each_has_its_light");
 }

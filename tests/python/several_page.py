@@ -106,7 +106,7 @@ def two_on_one_stage():
 
 # A square of each dragon's colour, over everything.
 SQUARES = """async () => {
-    const { identityOf } = await import("/palette.js"), all = Array.from({length: 10}, (_, place) => identityOf(place));
+    const { identitiesOf } = await import("/palette.js"), all = identitiesOf(Array.from({length: 16}, (_, place) => `d${place}`));
     for (const [place, { colour }] of all.entries()) {
         const square = document.body.appendChild(Object.assign(document.createElement("div"), { className: "square" }));
         square.style.cssText = `position: fixed; left: ${20 * place}px; top: 0; width: 20px; height: 20px; z-index: 9; background: ${colour}`;
@@ -122,7 +122,7 @@ def told_apart(page, handles):
     to_pixel = projection(page)
     pixel = 1 / numpy.hypot(*(to_pixel(1, 0) - to_pixel(0, 0)))
     dashes = page.evaluate(SQUARES)
-    assert len(set(dashes)) == 10, f"two of ten have the same dashes: {dashes}"
+    assert len(set(dashes)) == 16, f"two of 16 have the same dashes: {dashes}"
     for theme in ("light", "dark"):
         page.emulate_media(color_scheme=theme)
         time.sleep(0.5)
@@ -133,7 +133,7 @@ def told_apart(page, handles):
             box = page.locator("#stage").bounding_box()
             ground = pixels[int(box["y"]) + 3, int(box["x"]) + 3]
             light = luminance(pixels)
-            squares = [contrast(pixels[10, 20 * place + 10], ground) for place in range(10)]
+            squares = [contrast(pixels[10, 20 * place + 10], ground) for place in range(16)]
             assert min(squares) >= 3, f"{theme}, {deficiency}: lines with a contrast of {squares}"
             shares = {}
             # The outermost turn of the coil from outside, and the straight part of the procession from both sides.

@@ -32,6 +32,16 @@ def distances(points, handles, scale):
     return numpy.hypot(u, v)
 
 
+def points_of(label):
+    """Returns the points of a label that say which board it names: where its line ends, or every part of a box."""
+    if label["end"]:
+        return numpy.array([[label["end"]["x"], label["end"]["y"]]])
+    if label["isBadge"]:
+        return numpy.array([[label["x"], label["y"]]])
+    across, down = numpy.meshgrid(numpy.linspace(-1, 1, 21), numpy.linspace(-1, 1, 9))
+    return numpy.stack([label["x"] + across.ravel() * label["half"], label["y"] + down.ravel() * label["tall"]], axis=-1)
+
+
 def labels_of(page):
     """Returns each bench's label with the board that it points at: where its line ends, or the board nearest to every
     part of a box without a line."""
@@ -43,14 +53,7 @@ def labels_of(page):
     for label in labels:
         if label.get("bench") is None:
             continue
-        if label["end"]:
-            points = numpy.array([[label["end"]["x"], label["end"]["y"]]])
-        elif label["isBadge"]:
-            points = numpy.array([[label["x"], label["y"]]])
-        else:
-            across, down = numpy.meshgrid(numpy.linspace(-1, 1, 21), numpy.linspace(-1, 1, 9))
-            points = numpy.stack([label["x"] + across.ravel() * label["half"], label["y"] + down.ravel() * label["tall"]], axis=-1)
-        away = distances(points, handles, scale).min(axis=0)
+        away = distances(points_of(label), handles, scale).min(axis=0)
         # A line's end must lie on its board.
         found.append((label, int(away.argmin()), away.min() if label["end"] else 0, away[label["bench"]], away.min()))
     return found
@@ -86,14 +89,14 @@ def labels_point_at_their_boards():
         assert not complaints, complaints
 
 
-def steady(page):
-    """Returns the labels once the camera and the words stand still."""
+def steady(page, labels=None):
+    """Returns the labels, as `labels` finds them, once the camera and the words stand still."""
     deadline, before = time.monotonic() + 20, None
     while (now := page.evaluate(LABELS)) != before:
         assert time.monotonic() < deadline, "the words do not come to rest"
         before = now
         time.sleep(0.3)
-    return labels_of(page)
+    return (labels or labels_of)(page)
 
 
 def lines_are_drawn(page, found):

@@ -31,9 +31,11 @@ const WIDTH: f64 = 0.9e-9;
 /// Metres by which a new upper bound must be lower than the one before.
 const LOWER: f64 = 1e-3 * WIDTH;
 
-/// Factors of the step length after a step that is shown, and after a step that is not.
-const GROWTH: f64 = 1.25;
-const SHRINK: f64 = 0.5;
+/// Factors of the step length after a step that is shown, after one that is not, and after further ones that are not.
+/// Steps close to the longest cost more attempts, and make the certificate shorter.
+const GROWTH: f64 = 1.1;
+const SHRINK: f64 = 0.8;
+const SHRINK_FURTHER: f64 = 0.5;
 
 /// The shortest step, as a share of the path length in metres.
 const LEAST_STEP: f64 = 1e-14;
@@ -247,8 +249,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         let (path, event) = (motion.path(), &show_end.event);
         let slack = END_SLACK * (1.0 + path.length());
         self.end = match event.kind {
-            EventKind::Contact | EventKind::Obstacle => event.travelled,
-            EventKind::PathEnd => event.travelled - slack,
+            EventKind::Contact | EventKind::Obstacle | EventKind::PathEnd => (event.travelled - slack).max(0.0),
             EventKind::Stall | EventKind::Lock => event.travelled - slack.max(BEFORE_LOCK[0]),
         };
         let is_at_start = event.travelled == 0.0;
@@ -258,7 +259,7 @@ impl<'a, 'w> Descent<'a, 'w> {
             EventKind::Contact => self.touch(event, progress),
             // The end is taken as found. The steps go beyond it.
             EventKind::Obstacle => {
-                let (path, end) = (path.length(), self.end);
+                let (path, end) = (path.length(), event.travelled);
                 let target = self.beside(end, 1.0, |travelled| travelled.lo >= end && travelled.hi <= path);
                 target.and_then(|target| self.least(hint, &target, progress))
             }
@@ -439,6 +440,7 @@ impl<'a, 'w> Descent<'a, 'w> {
     fn go_to(&mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> Option<f64> {
         let least = LEAST_STEP * (1.0 + self.chain.path.length());
         let longest = self.chain.team.shortest_link();
+        let mut shrink = SHRINK;
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
             let length = self.step.min(remaining);
@@ -449,7 +451,9 @@ impl<'a, 'w> Descent<'a, 'w> {
                 Ok(()) => {
                     self.at = to;
                     self.step = (self.step * GROWTH).min(longest);
-                    progress((self.at.travelled / self.end).clamp(0.0, 1.0));
+                    shrink = SHRINK;
+                    let steps = self.steps as f64 / self.most_steps as f64;
+                    progress((self.at.travelled / self.end).max(steps).clamp(0.0, 1.0));
                     false
                 }
                 Err(Refused { nearer: Some(Nearer::Boards(nearer)), .. }) => {
@@ -461,7 +465,7 @@ impl<'a, 'w> Descent<'a, 'w> {
                     false
                 }
                 Err(Refused { obstacle, .. }) if length > least => {
-                    self.step = SHRINK * length;
+                    self.step = std::mem::replace(&mut shrink, SHRINK_FURTHER) * length;
                     if self.links == Links::Front && obstacle == Obstacle::Stall(1) {
                         self.links = Links::All;
                     }

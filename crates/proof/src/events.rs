@@ -22,8 +22,17 @@ pub(super) struct Events {
     pub finish: Option<Finish>,
     /// Two benches, and metres that they are no further apart at a place of the motion.
     pub near: Option<([usize; 2], Interval)>,
-    /// Obstacles, each with a bench and metres that its clearance is no more than at a place of the motion.
-    pub near_obstacles: Vec<(usize, usize, Interval)>,
+    /// Boards near obstacles.
+    pub near_obstacles: Vec<NearObstacle>,
+}
+
+/// A bench whose clearance from an obstacle is no more than some metres at a place of the motion.
+pub(super) struct NearObstacle {
+    pub obstacle: usize,
+    pub bench: usize,
+    pub most: Interval,
+    /// Metres of the head from the start to that place or one before it.
+    pub travelled: Interval,
 }
 
 /// The end of a motion.
@@ -196,7 +205,7 @@ impl Events {
         (spans, at): (&[Span], &[Place]),
         most: f64,
     ) -> Result<(), String> {
-        if self.near_obstacles.iter().any(|(other, ..)| *other == number) {
+        if self.near_obstacles.iter().any(|other| other.obstacle == number) {
             return Err(format!("a second line `near_obstacle` of obstacle {number}"));
         }
         let obstacle = scene.obstacles.get(number).ok_or_else(|| format!("the scene has no obstacle {number}"))?;
@@ -208,7 +217,8 @@ impl Events {
         if !obstacle.at_most(&step.board(bench, &scene.team)).is_at_most(&most) {
             return Err(format!("bench {bench} may be further from obstacle {number} than it says (Lemma 11)"));
         }
-        self.near_obstacles.push((number, bench, most));
+        let travelled = scene.path.travelled(head.0);
+        self.near_obstacles.push(NearObstacle { obstacle: number, bench, most, travelled });
         Ok(())
     }
 

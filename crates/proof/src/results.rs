@@ -149,14 +149,18 @@ pub(super) fn check_obstacle_clearance(
     if !is_reached {
         return Err("the end of the stretch does not follow".to_owned());
     }
-    let near = events.near_obstacles.iter().find(|(number, ..)| *number == obstacle);
-    match (hi, bench, near) {
-        (None, None, _) => Ok(()),
-        (Some(hi), Some(bench), Some((_, near, most))) if bench == *near && most.is_at_most(&Interval::new(hi)) => {
-            Ok(())
+    let near = events.near_obstacles.iter().find(|near| near.obstacle == obstacle);
+    let is_before = |travelled: &Interval| {
+        time_until.is_none_or(|time| travelled.is_at_most(&(Interval::new(time) * scene.head_speed)))
+    };
+    let follows = match (hi, bench, near) {
+        (None, None, _) => true,
+        (Some(hi), Some(bench), Some(near)) => {
+            bench == near.bench && near.most.is_at_most(&Interval::new(hi)) && is_before(&near.travelled)
         }
-        _ => Err("the clearance hi, or its bench, does not follow".to_owned()),
-    }
+        _ => false,
+    };
+    if follows { Ok(()) } else { Err("the clearance hi, or its bench, does not follow".to_owned()) }
 }
 
 fn known(scene: &Scene, steps: &Steps, events: &Events, (event, obstacle): (EventKind, usize)) -> Known {

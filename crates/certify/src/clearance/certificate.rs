@@ -38,10 +38,12 @@ impl Descent<'_, '_> {
     }
 
     /// Writes that a board is near an obstacle, at a place that the steps have come to. Returns the upper bound.
-    fn write_near_obstacle(&mut self, obstacle: usize) -> Option<f64> {
+    fn write_near_obstacle(&mut self, obstacle: usize, head_speed: f64) -> Option<f64> {
         let Beside { upper, shown, .. } = self.beside[obstacle];
         let (chain, (UpperBeside { head, travelled, bench, .. }, (_, end))) = (&self.chain, (upper?, shown?));
-        if !chain.exact.in_order(head[0], end) {
+        let until = Interval::point(self.time_of(Some(end), head_speed)) * head_speed;
+        let is_before = chain.exact.travelled(head[0]).hi <= until.lo.max(0.0);
+        if !chain.exact.in_order(head[0], end) || !(is_before || self.is_whole(obstacle)) {
             return None;
         }
         let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
@@ -58,14 +60,19 @@ impl Descent<'_, '_> {
 
     /// Returns the result for an obstacle.
     fn result_beside(&self, obstacle: usize, hi: Option<f64>, head_speed: f64) -> CertifiedObstacleClearance {
-        let Beside { upper, shown, is_lost } = self.beside[obstacle];
+        let Beside { upper, shown, .. } = self.beside[obstacle];
         let bench = upper.filter(|_| hi.is_some()).map(|upper| upper.bench);
-        let is_whole = matches!(self.finish, Some(Finish::PathEnd)) && shown.is_some() && !is_lost;
-        let (until, time_until) = match is_whole {
+        let (until, time_until) = match self.is_whole(obstacle) {
             true => (Until::PathEnd, None),
             false => (Until::Time, Some(self.time_of(shown.map(|(_, end)| end), head_speed))),
         };
         CertifiedObstacleClearance { obstacle, lo: shown.map(|(least, _)| least), hi, until, time_until, bench }
+    }
+
+    /// Returns true if the clearance of an obstacle is shown from the start to the path's end.
+    fn is_whole(&self, obstacle: usize) -> bool {
+        let Beside { shown, is_lost, .. } = self.beside[obstacle];
+        matches!(self.finish, Some(Finish::PathEnd)) && shown.is_some() && !is_lost
     }
 
     /// Returns a time by which the head has come to a place; 0 without a place.
@@ -101,7 +108,8 @@ impl Descent<'_, '_> {
         let near = self.upper.filter(|_| !matches!(self.finish, Some(Finish::Contact(_))));
         let hi = near.and_then(|upper| self.write_near(upper));
         let benches = near.filter(|_| hi.is_some()).map(|upper| upper.benches);
-        let beside: Vec<_> = (0..self.beside.len()).map(|obstacle| self.write_near_obstacle(obstacle)).collect();
+        let beside: Vec<_> =
+            (0..self.beside.len()).map(|obstacle| self.write_near_obstacle(obstacle, head_speed)).collect();
         let mut result = CertifiedClearance {
             lo: self.shown.map(|(least, _)| least),
             hi,

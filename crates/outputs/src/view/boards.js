@@ -27,12 +27,25 @@ export function benchAt(stage, places, x, y, most) {
   return found;
 }
 
+/** The number of a dragon's boards. */
+const countOf = ({ places }) => places.length / STRIDE - 1;
+
+/** Returns the dragon of a bench among several, by its number through all handles; undefined for none of their benches. */
+export const ownerOf = (dragons, number) =>
+  dragons.find((dragon) => number >= dragon.first && number < dragon.first + countOf(dragon));
+
+/** Returns the board of a bench by its number through all handles. */
+function boardOf(dragons, number) {
+  const { stage, places, first } = ownerOf(dragons, number);
+  return rectangle(stage, places, number - first);
+}
+
 /**
  * Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap; with these
- * points as `ends`, and their distance `away`, m.
+ * points as `ends`, and their distance `away`, m. The boards are of any dragons, numbered through all handles.
  */
-export function nearest(stage, places, ...pair) {
-  const [a, b] = pair.map((bench) => rectangle(stage, places, bench));
+export function nearest(dragons, ...pair) {
+  const [a, b] = pair.map((number) => boardOf(dragons, number));
   let best = Infinity, place = null;
   for (const [one, other] of [[a, b], [b, a]]) {
     for (const [along, across] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
@@ -64,25 +77,30 @@ function gap(a, b) {
 
 /**
  * Calls `found` with each two boards that share no handle and whose gap is at most `most` metres, and with that gap. Boards
- * are compared with those of the same and the adjacent squares of a grid.
+ * are compared with those of the same and the adjacent squares of a grid. They are numbered through all handles: the last
+ * handle of a dragon has no bench, so boards of two dragons differ by more than one.
  */
-function eachWithin(stage, places, most, found) {
-  const count = places.length / STRIDE - 1, side = Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width) + Math.max(0, most);
-  const squares = new Map(), boards = [];
-  for (let bench = 0; bench < count; bench++) {
-    const board = rectangle(stage, places, bench), column = Math.floor(board.x / side), row = Math.floor(board.y / side);
-    for (let right = -1; right <= 1; right++) {
-      for (let up = -1; up <= 1; up++) {
-        for (const other of squares.get(`${column + right},${row + up}`) ?? []) {
-          if (bench - other < 2) continue;
-          const apart = gap(boards[other], board);
-          if (apart <= most) found([other, bench], apart);
+function eachWithin(dragons, most, found) {
+  const longest = Math.max(...dragons.map(({ stage }) => Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width)));
+  const side = longest + Math.max(0, most), squares = new Map(), boards = new Map();
+  for (const dragon of dragons) {
+    const { stage, places, first } = dragon, count = countOf(dragon);
+    for (let bench = 0; bench < count; bench++) {
+      const board = rectangle(stage, places, bench), number = first + bench;
+      const column = Math.floor(board.x / side), row = Math.floor(board.y / side);
+      for (let right = -1; right <= 1; right++) {
+        for (let up = -1; up <= 1; up++) {
+          for (const other of squares.get(`${column + right},${row + up}`) ?? []) {
+            if (number - other < 2) continue;
+            const apart = gap(boards.get(other), board);
+            if (apart <= most) found([other, number], apart);
+          }
         }
       }
+      boards.set(number, board);
+      const key = `${column},${row}`, here = squares.get(key);
+      here ? here.push(number) : squares.set(key, [number]);
     }
-    boards.push(board);
-    const key = `${column},${row}`, here = squares.get(key);
-    here ? here.push(bench) : squares.set(key, [bench]);
   }
 }
 
@@ -90,19 +108,19 @@ function eachWithin(stage, places, most, found) {
  * Returns the two boards that share no handle and overlap most, and their overlap in metres; null if no two boards are
  * nearer than `tolerance` metres, the rounding of their places.
  */
-export function overlapping(stage, places, tolerance) {
+export function overlapping(dragons, tolerance) {
   let deepest = null;
-  eachWithin(stage, places, tolerance, (pair, apart) => {
+  eachWithin(dragons, tolerance, (pair, apart) => {
     if (!deepest || -apart > deepest.depth) deepest = { pair, depth: -apart };
   });
-  return deepest && { ...deepest, place: nearest(stage, places, ...deepest.pair) };
+  return deepest && { ...deepest, place: nearest(dragons, ...deepest.pair) };
 }
 
 /** Returns the nearest two boards that share no handle, and their place; null if none are within `most` metres. */
-export function nearestPair(stage, places, most) {
+export function nearestPair(dragons, most) {
   let best = null;
-  eachWithin(stage, places, most, (pair) => {
-    const place = nearest(stage, places, ...pair);
+  eachWithin(dragons, most, (pair) => {
+    const place = nearest(dragons, ...pair);
     if (place.away < (best?.place.away ?? Infinity)) best = { pair, place };
   });
   return best;

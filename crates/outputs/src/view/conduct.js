@@ -1,7 +1,7 @@
-// The transport bar: sends commands if the server allows this page to. In: the streams' messages and frames. Out: commands over the same WebSockets. One of several dragons may be selected; a hold and its
-// release always go to all of them.
+// The transport bar: sends commands if the server allows this page to. In: the streams' messages and frames. Out: commands
+// over the same WebSockets. One of several publishers may be selected; a hold and its release always go to all of them.
 
-import { answerTo, say, translate } from "./words.js";
+import { answerTo, benchesIn, say, translate } from "./words.js";
 
 /** The numbers of the states of playback. */
 const PLAYING = 0, HELD = 2, ENDED = 3;
@@ -56,6 +56,18 @@ const token = takeToken();
 /** Returns true if a certificate of exactly this scene proves the announced time of an event. */
 const isProved = (stage, { event, time }) => Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved" && outcome.time_lo <= time && time <= outcome.time_hi));
 
+/** An event on the time line; of several dragons, with its benches. */
+function eventWords(stage, { event, time, bench_a, bench_b }) {
+  const numbers = stage.dragons.length > 1 ? [bench_a, bench_b].filter((number) => number !== null) : [];
+  const kind = numbers.length ? `${say(event)} (${benchesIn(stage, numbers)})` : say(event);
+  return say("eventMark", { kind, time: time.toFixed(3), proved: isProved(stage, { event, time }) ? say("markProved") : "" });
+}
+
+/** A cue on the time line. */
+function cueWords({ name, time, pauses }) {
+  return say("cueMark", { name, time: time.toFixed(3), waits: pauses ? say("waitsThere") : "" });
+}
+
 /** Returns true if the button pauses: any show plays, or all are at their end, where loops wait to begin again. */
 function canPause(streams) {
   const all = streams.map(({ playback }) => playback.newest.playback);
@@ -68,13 +80,14 @@ const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && sta
 /**
  * `keysConduct`: true if keys conduct; in the show look only on request. `keySwitch` says whether they do outside the bar.
  */
-export function conduct(dragons, keysConduct, keySwitch) {
+export function conduct(publishers, keysConduct, keySwitch) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
   bar.innerHTML = BAR;
   translate(bar);
   const part = (name) => document.getElementById(`conduct-${name}`);
   const line = part("seek"), rates = part("rate");
-  const streams = dragons.map(({ stream }) => stream), several = dragons.length > 1, nameOf = (stream) => dragons[streams.indexOf(stream)].name;
+  const streams = publishers.map(({ stream }) => stream), several = publishers.length > 1;
+  const nameOf = (stream) => publishers[streams.indexOf(stream)].name;
   const greeted = new Map(), allowed = new Map();
   /** The refusals of the last commands, by the command's number: a sentence for each stream. */
   const refusals = new Map();
@@ -156,8 +169,8 @@ export function conduct(dragons, keysConduct, keySwitch) {
     const marksOf = (stream) => {
       const { stage } = stream, by = (text) => (all.length > 1 ? own(stream, text) : text);
       return [
-        ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(({ event, time }) => ({ kind: event, text: by(say("eventMark", { kind: say(event), time: time.toFixed(3), proved: isProved(stage, { event, time }) ? say("markProved") : "" })), time })),
-        ...stage.cues.map(({ name, time, pauses }) => ({ kind: "cue", text: by(say("cueMark", { name, time: time.toFixed(3), waits: pauses ? say("waitsThere") : "" })), time })),
+        ...stage.events.filter(({ time }) => time <= stage.freeze_time).map((event) => ({ kind: event.event, text: by(eventWords(stage, event)), time: event.time })),
+        ...stage.cues.map((cue) => ({ kind: "cue", text: by(cueWords(cue)), time: cue.time })),
       ];
     };
     const marks = all.flatMap(marksOf);
@@ -251,7 +264,7 @@ export function conduct(dragons, keysConduct, keySwitch) {
   for (const stream of streams) stream.onmessage = receive(stream);
 
   if (several) {
-    part("whom").replaceChildren(new Option(say("all"), ""), ...dragons.map(({ name }, place) => new Option(name, place)));
+    part("whom").replaceChildren(new Option(say("all"), ""), ...publishers.map(({ name }, place) => new Option(name, place)));
     part("whom").onchange = ({ target }) => {
       chosen = target.value === "" ? null : streams[target.value];
       [sought, wanted, landed] = [null, null, null];

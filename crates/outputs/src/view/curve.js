@@ -1,7 +1,7 @@
 // The clearance over the whole show as a curve, with its least place and the present time. In: the facts of a stream. Out: an
 // element for the page; words for those who do not see it.
 
-import { benchesOf, say } from "./words.js";
+import { benchesIn, say } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 /** The size of the drawing, which is stretched; the clearances at its lower and upper edge, m. The scale is logarithmic. */
@@ -23,9 +23,9 @@ export class Curve {
     element.replaceChildren(svg, this.now, this.least, this.text);
   }
 
-  /** Shows the facts of a stream, or nothing without any; `end` is the time at the right edge, s. */
-  show(facts, end, time) {
-    const curve = facts?.clearance ?? null;
+  /** Shows the facts of a stream, or nothing without any, up to the end of the show of a stage. */
+  show(facts, stage, time) {
+    const end = stage?.freeze_time, curve = facts?.clearance ?? null;
     this.element.hidden = !curve;
     if (!curve) return;
     this.now.style.setProperty("--share", time / end);
@@ -35,7 +35,8 @@ export class Curve {
     const last = ((WIDE * curve.points.at(-1)[0]) / end).toFixed(2);
     this.line.setAttribute("d", `M0 ${HIGH}L${points.join("L")}L${last} ${HIGH}Z`);
     const { time: at, clearance, bench_a, bench_b } = curve.least;
-    const words = say("leastClearance", { metres: Math.max(0, clearance).toFixed(3), time: at.toFixed(1), benches: benchesOf([bench_a, bench_b]) });
+    const values = { metres: Math.max(0, clearance).toFixed(3), time: at.toFixed(1), benches: benchesIn(stage, [bench_a, bench_b]) };
+    const words = say("leastClearance", values);
     this.least.style.setProperty("--share", at / end);
     this.least.style.setProperty("--height", heightOf(clearance) / HIGH);
     this.text.textContent = words;

@@ -3,13 +3,15 @@
 //! In: the text of a scene, and the function that computes. Out: the facts, by the hash of the text. The command has the
 //! function, so that this crate needs no solver; the reader of each publisher requests the facts of its scene.
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
+use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use serde::Serialize;
 
 use super::SceneHash;
+
+/// The scenes whose facts are kept: those requested last, far more than run at once.
+const KEPT: usize = 64;
 
 /// Facts about a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -45,31 +47,35 @@ pub struct LeastOfShow {
 /// Computes the facts of the scene with this text; `None` for a text that is no scene.
 pub type Compute = fn(&str) -> Option<SceneFacts>;
 
-/// The facts about the scenes that publishers have shown.
+/// The facts about the scenes that publishers have shown last.
 #[derive(Debug)]
 pub struct Facts {
     compute: Compute,
-    /// `None` until the facts of a scene are computed.
-    of: RwLock<HashMap<SceneHash, Option<Arc<SceneFacts>>>>,
+    /// The latest request first. `None` until the facts of a scene are computed.
+    kept: RwLock<VecDeque<(SceneHash, Option<Arc<SceneFacts>>)>>,
 }
 
 impl Facts {
     /// Creates an empty store with the function that computes.
     pub fn new(compute: Compute) -> Self {
-        Self { compute, of: RwLock::default() }
+        Self { compute, kept: RwLock::default() }
     }
 
     /// Begins to compute the facts of a scene on a separate thread, unless that has begun before.
     pub(super) fn request(self: &Arc<Self>, scene: SceneHash, text: &str) {
-        if let Entry::Vacant(new) = self.of.write().unwrap_or_else(PoisonError::into_inner).entry(scene) {
-            new.insert(None);
-        } else {
-            return;
+        {
+            let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
+            if kept.iter().any(|(known, _)| *known == scene) {
+                return;
+            }
+            kept.truncate(KEPT - 1);
+            kept.push_front((scene, None));
         }
         let (facts, text) = (Arc::clone(self), text.to_owned());
         let computing = std::thread::Builder::new().name("scene facts".to_owned()).spawn(move || {
             let computed = (facts.compute)(&text).map(Arc::new);
-            facts.of.write().unwrap_or_else(PoisonError::into_inner).insert(scene, computed);
+            let mut kept = facts.kept.write().unwrap_or_else(PoisonError::into_inner);
+            kept.iter_mut().filter(|(known, _)| *known == scene).for_each(|(_, of)| of.clone_from(&computed));
         });
         if let Err(error) = computing {
             log::warn!("the page shows no clearance over the show: no thread can be started: {error}");
@@ -78,6 +84,26 @@ impl Facts {
 
     /// Returns the facts about the scene with this hash, once they are computed.
     pub(super) fn of(&self, scene: &SceneHash) -> Option<Arc<SceneFacts>> {
-        self.of.read().unwrap_or_else(PoisonError::into_inner).get(scene).cloned().flatten()
+        let kept = self.kept.read().unwrap_or_else(PoisonError::into_inner);
+        kept.iter().find(|(known, _)| known == scene).and_then(|(_, facts)| facts.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn facts_of_the_latest_scenes_are_kept() {
+        let facts = Arc::new(Facts::new(|_| Some(SceneFacts { loop_stand: Some(1.0), clearance: None })));
+        let hash = |number: u8| SceneHash::from([number; 32]);
+        for number in 0..=KEPT as u8 {
+            facts.request(hash(number), "scene");
+            while facts.of(&hash(number)).is_none() {
+                std::thread::yield_now();
+            }
+        }
+        assert_eq!(facts.kept.read().unwrap().len(), KEPT);
+        assert!(facts.of(&hash(0)).is_none() && facts.of(&hash(1)).is_some());
     }
 }

@@ -7,6 +7,7 @@
 
 import { headPicture, tailPicture } from "./dragon_head.js";
 import { STRIDE } from "./hermite.js";
+import { OfLight } from "./lantern_light.js";
 import { behindHead, boardsOf, viewOf } from "./lantern_view.js";
 import { CLOTHES, POOL_RADIUS, barrel, blank, box, dancer, halo, hash, paving, pool, turned } from "./sprites.js";
 
@@ -42,11 +43,13 @@ export class Lanterns {
   constructor({ transparent, moon, day }) {
     this.transparent = transparent;
     this.ambient = day ? DAY : moon ? MOON.map((one) => one / 2) : null;
-    this.pools = [pool(255, 117, 41), pool(255, 143, 61)];
-    this.red = halo("255,176,96", "255,84,30");
+    this.kits = new OfLight((light) => ({
+      ...light, pools: light.pools.map((one) => pool(...one)), halo: halo(light.core.join(), light.glow.join()), barrel: barrel(light.barrel),
+    }));
+    this.fire = this.kits.of(null);
     this.gold = halo("255,226,150", "255,160,60");
     this.white = halo("255,252,240", "255,214,150");
-    [this.barrel, this.box, this.people] = [barrel(), box(), CLOTHES.map((one) => dancer(...one))];
+    [this.box, this.people] = [box(), CLOTHES.map((one) => dancer(...one))];
     [this.head, this.tail, this.slabs] = [headPicture(), tailPicture(), paving()];
     this.air = blank(1, 1);
     [this.light, this.floor, this.ground] = Array.from({ length: 3 }, () => blank(1, 1, { alpha: false }));
@@ -59,7 +62,7 @@ export class Lanterns {
 
   /** Draws the dragons, each with `stage`, `places` and `show`. */
   draw(context, camera, dragons) {
-    const view = viewOf(context.canvas, camera), teams = dragons.map((dragon) => boardsOf(view, dragon));
+    const view = viewOf(context.canvas, camera), teams = dragons.map((dragon) => ({ ...boardsOf(view, dragon), kit: this.kits.of(dragon.identity) }));
     const isOther = this.lighted !== view.key, isNew = isOther || this.picture % GROUND_EVERY === 0;
     const isAir = isOther || this.picture % (view.pixels >= FINE ? AIR_EVERY : GROUND_EVERY) === 0;
     this.lighted = view.key;
@@ -144,22 +147,22 @@ export class Lanterns {
     context.fillStyle = this.ambient ? `rgb(${this.ambient.join(" ")})` : "#000";
     context.fillRect(0, 0, canvas.width, canvas.height);
     this.blend(context, "screen", () => {
-      for (const { boards, show, exposure, dragon, pearl, head } of teams) {
+      for (const { boards, show, exposure, dragon, pearl, head, kit } of teams) {
         if (!view.fine) {
-          this.thread(context, view, GROUND, dragon, 2.4, 1.6, `rgba(255,104,36,${0.2 * exposure})`);
-          this.thread(context, view, GROUND, dragon, 1.1, 1.2, `rgba(255,117,41,${0.36 * exposure})`);
+          this.thread(context, view, GROUND, dragon, 2.4, 1.6, `rgba(${kit.spill},${0.2 * exposure})`);
+          this.thread(context, view, GROUND, dragon, 1.1, 1.2, `rgba(${kit.lit},${0.36 * exposure})`);
         } else {
           const radius = Math.max(POOL_RADIUS * metre, 3);
-          for (const { bench, x, y, lit, burn } of boards) this.spot(context, this.pools[bench % 3 ? 0 : 1], x / GROUND, y / GROUND, radius, exposure * lit * (bench ? 1 : 1.3) * (1 + 1.4 * burn));
+          for (const { bench, x, y, lit, burn } of boards) this.spot(context, kit.pools[bench % 3 ? 0 : 1], x / GROUND, y / GROUND, radius, exposure * lit * (bench ? 1 : 1.3) * (1 + 1.4 * burn));
         }
         for (const one of show.trail) {
           const [x, y] = view.place(one.x, one.y), left = Math.max(0, 1 - (show.time - one.time) / 4);
-          this.spot(context, this.pools[0], x / GROUND, y / GROUND, 2.2 * metre, 0.3 * left ** 1.5 * show.lit(boards.count - 1, boards.count));
+          this.spot(context, kit.pools[0], x / GROUND, y / GROUND, 2.2 * metre, 0.3 * left ** 1.5 * show.lit(boards.count - 1, boards.count));
         }
         if (!head) continue;
-        this.spot(context, this.pools[1], pearl.x / GROUND, pearl.y / GROUND, 2.6 * metre, 0.75 * head.lit);
-        this.spot(context, this.pools[0], (head.x + 1.1 * view.pixels * head.c) / GROUND, (head.y + 1.1 * view.pixels * head.s) / GROUND, 3 * metre, 0.6 * head.lit);
-        if (show.burst) this.spot(context, this.pools[1], ...view.place(show.burst.place.x, show.burst.place.y).map((one) => one / GROUND), 4.5 * metre, (1 - show.burst.part) ** 2);
+        this.spot(context, this.fire.pools[1], pearl.x / GROUND, pearl.y / GROUND, 2.6 * metre, 0.75 * head.lit);
+        this.spot(context, kit.pools[0], (head.x + 1.1 * view.pixels * head.c) / GROUND, (head.y + 1.1 * view.pixels * head.s) / GROUND, 3 * metre, 0.6 * head.lit);
+        if (show.burst) this.spot(context, this.fire.pools[1], ...view.place(show.burst.place.x, show.burst.place.y).map((one) => one / GROUND), 4.5 * metre, (1 - show.burst.part) ** 2);
       }
     });
     if (view.pixels < 12) return;
@@ -187,21 +190,21 @@ export class Lanterns {
     const [canvas, context] = this.air, metre = view.pixels / AIR, usual = Math.max(0.62 * metre, 1.8);
     context.clearRect(0, 0, canvas.width, canvas.height);
     this.blend(context, "lighter", () => {
-      for (const { boards, show, dragon, head, pearl } of teams) {
+      for (const { boards, show, dragon, head, pearl, kit } of teams) {
         const { flames } = show;
         if (!view.fine) {
-          this.thread(context, view, AIR, dragon, 0.9, 1.8, "rgba(255,84,30,.09)");
-          this.thread(context, view, AIR, dragon, 0.4, 1, "rgba(255,150,70,.13)");
+          this.thread(context, view, AIR, dragon, 0.9, 1.8, `rgba(${kit.glow},.09)`);
+          this.thread(context, view, AIR, dragon, 0.4, 1, `rgba(${kit.thread},.13)`);
         } else {
           for (const { bench, x, y, dx, dy, lit, burn } of boards) {
             if (!lit) continue;
             const flicker = 1 + 0.1 * Math.sin(4.1 * flames + 2.4 * bench) * Math.sin(1.7 * flames + bench), radius = usual * (1 + 1.2 * burn);
-            (bench ? ON_BODY : ON_HEAD).forEach((at, k) => this.spot(context, burn > 0.05 ? this.white : k === 1 ? this.gold : this.red, (x + at * dx) / AIR, (y + at * dy) / AIR, radius, 0.62 * flicker * lit * (1 + burn)));
+            (bench ? ON_BODY : ON_HEAD).forEach((at, k) => this.spot(context, burn > 0.05 ? this.white : k === 1 ? this.gold : kit.halo, (x + at * dx) / AIR, (y + at * dy) / AIR, radius, 0.62 * flicker * lit * (1 + burn)));
           }
         }
         if (!head) continue;
         this.spot(context, this.gold, pearl.x / AIR, pearl.y / AIR, Math.max(1.1 * metre, 5), 0.9 * head.lit);
-        this.spot(context, this.red, (head.x + 1.15 * view.pixels * head.c) / AIR, (head.y + 1.15 * view.pixels * head.s) / AIR, 1.5 * metre, 0.55 * head.lit);
+        this.spot(context, kit.halo, (head.x + 1.15 * view.pixels * head.c) / AIR, (head.y + 1.15 * view.pixels * head.s) / AIR, 1.5 * metre, 0.55 * head.lit);
         if (show.burst) this.burst(context, view, show.burst);
       }
     });
@@ -226,9 +229,9 @@ export class Lanterns {
   }
 
   /** The true rectangles: a lit edge, lacquer, a worn middle. */
-  boards(context, view, { boards, dragon }) {
+  boards(context, view, { boards, dragon, kit }) {
     const wide = dragon.stage.width * view.pixels, edge = Math.max(0.02 * view.pixels, 0.9);
-    const coats = wide > 7 ? [["#7a3518", wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
+    const coats = wide > 7 ? [[kit.edge, wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
     if (wide > 16) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
     context.globalAlpha = Math.min(1, dragon.show.life * 1.5);
     for (const [strokeStyle, lineWidth, inset] of coats) {
@@ -259,10 +262,10 @@ export class Lanterns {
     context.globalAlpha = 1;
   }
 
-  lamps(context, view, { boards, dragon }) {
+  lamps(context, view, { boards, dragon, kit }) {
     if (!view.fine) {
       const half = Math.max(0.13 * view.pixels, 1.2);
-      context.fillStyle = "#ffd890";
+      context.fillStyle = kit.dot;
       for (const { x, y, lit, burn } of boards) {
         context.globalAlpha = lit;
         const size = half * (1 + burn);
@@ -272,7 +275,7 @@ export class Lanterns {
       return;
     }
     const radius = Math.max(0.5 * Math.min(0.3, dragon.stage.width) * view.pixels, 2.2);
-    const [round] = this.sprites("barrel", radius, (size) => turned(this.barrel, size, 1, 1)), boxes = this.sprites("box", radius, (size) => turned(this.box, size, 16, Math.PI / 2));
+    const [round] = this.sprites(`barrel ${kit.number}`, radius, (size) => turned(kit.barrel, size, 1, 1)), boxes = this.sprites("box", radius, (size) => turned(this.box, size, 16, Math.PI / 2));
     for (const { bench, x, y, c, s, dx, dy, lit, burn } of boards) {
       if (!lit) continue;
       (bench ? ON_BODY : ON_HEAD).forEach((at, k) => {
@@ -322,7 +325,7 @@ export class Lanterns {
   }
 
   /** Sparks of the head: each is a function of the show time, and begins where the head was, which is on the body. */
-  sparks(context, view, { show, dragon, speed }) {
+  sparks(context, view, { show, dragon, speed, kit }) {
     const { places } = dragon, { time } = show;
     if (!(show.embers > 0) || show.life < 1) return;
     for (let spark = Math.floor(time * SPARKS); spark > (time - SPARK_LIFE) * SPARKS; spark--) {
@@ -333,7 +336,7 @@ export class Lanterns {
       const [px, py] = view.place(x, y), size = Math.max((0.014 + 0.022 * hash(spark + 3)) * view.pixels * (0.5 + 0.5 * left), 1);
       const alpha = Math.max(0, left * show.embers * (0.6 + 0.4 * Math.sin(17 * time + spark)));
       if (size > 2) {
-        this.spot(context, left > 0.55 ? this.white : left > 0.3 ? this.gold : this.red, px, py, 2 * size, alpha);
+        this.spot(context, left > 0.55 ? this.white : left > 0.3 ? this.gold : kit.halo, px, py, 2 * size, alpha);
         continue;
       }
       context.globalAlpha = alpha;

@@ -1,6 +1,6 @@
 // The marks on the picture: the next event and its place, the nearest boards now, and the overlap after a contact.
 
-import { nearest, nearestPair, overlapping } from "./boards.js";
+import { nearest, nearestPair, overlapping, ownerOf } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 
 /** The greatest error of a gap by the rounding of places to 32 bits, metres for each metre from the centre. */
@@ -11,8 +11,8 @@ const SMALL = 500;
 /** The clearance up to which the nearest two boards of a show that stands are searched, m: beyond it nothing is near. */
 const FAR = 5;
 
-/** The benches among these numbers: those of obstacles follow the handles. */
-const benchesOf = (stage, ...numbers) => numbers.filter((number) => number !== null && number !== undefined && number < stage.benches);
+/** The benches among these numbers, which count through all handles: those of obstacles follow the handles. */
+const benchesAmong = (dragons, ...numbers) => numbers.filter((number) => number != null && ownerOf(dragons, number));
 
 /** The deepest overlap of a stream of pictures, searched only if the publisher reports one. */
 export class Overlap {
@@ -21,12 +21,12 @@ export class Overlap {
     this.at = -Infinity;
   }
 
-  look(stage, places, newest, reach, now) {
+  look(dragons, newest, reach, now) {
     const tolerance = ROUNDING * Math.max(1, reach);
     if (!(newest.clearance <= tolerance)) return (this.found = null);
-    if (stage.benches > SMALL && now - this.at < SEARCH_INTERVAL) return this.found;
+    if (newest.handles.length / STRIDE > SMALL && now - this.at < SEARCH_INTERVAL) return this.found;
     this.at = now;
-    return (this.found = overlapping(stage, places, tolerance));
+    return (this.found = overlapping(dragons, tolerance));
   }
 }
 
@@ -37,27 +37,28 @@ export class Nearest {
     this.key = null;
   }
 
-  look(stage, places, newest) {
+  look(dragons, newest) {
     const key = [newest.run, newest.sequence, newest.time].join();
     if (!(newest.clearance > 0 && newest.clearance < FAR)) return null;
-    if (this.key !== key) [this.key, this.found] = [key, nearestPair(stage, places, newest.clearance + 1e-3)];
+    if (this.key !== key) [this.key, this.found] = [key, nearestPair(dragons, newest.clearance + 1e-3)];
     return this.found;
   }
 }
 
 /**
- * The marks of a state: each with the benches it concerns (`pair`), a place, a colour of the palette, whether the place
- * is a ghost (in the future), whether the outlines are dashed, and a `line` between the two. The caller, which knows the
- * language, sets `text` and `names`. `near` are the nearest two boards of a show that stands, or null.
+ * The marks of a state: each with the benches it concerns (`pair`, numbers through all handles), a place, a colour of the
+ * palette, whether the place is a ghost (in the future), whether the outlines are dashed, and a `line` between the two. The
+ * caller, which knows the language, sets `text` and `names`. `near` are the nearest two boards of a show that stands, or
+ * null.
  */
-export function marksOf({ state, alert, stage, places, overlap, near }) {
+export function marksOf({ state, alert, dragons, overlap, near }) {
   const still = near && !overlap ? [{ kind: "nearest", pair: [], place: near.place, line: near.place.ends, ink: "ink" }] : [];
   if (state.severity === "ok" || !alert) return still;
   if (!state.happened) {
-    const event = benchesOf(stage, alert.event_bench_a, alert.event_bench_b), now = benchesOf(stage, alert.bench_a, alert.bench_b);
+    const event = benchesAmong(dragons, alert.event_bench_a, alert.event_bench_b), now = benchesAmong(dragons, alert.bench_a, alert.bench_b);
     const marks = [];
-    if (now.length === 2 && Math.max(...now) < places.length / STRIDE - 1) {
-      const place = nearest(stage, places, ...now);
+    if (now.length === 2) {
+      const place = nearest(dragons, ...now);
       marks.push({ kind: "now", pair: now, place, line: place.away > 0 ? place.ends : null, ink: "warning", dashes: [7, 5] });
     }
     if (alert.event_x !== null) marks.push({ kind: "coming", pair: event, place: { x: alert.event_x, y: alert.event_y }, ink: "danger", ghost: true });
@@ -67,11 +68,12 @@ export function marksOf({ state, alert, stage, places, overlap, near }) {
   if (overlap) marks.push({ kind: "overlap", pair: overlap.pair, place: overlap.place, ink: "danger" });
   if (state.name === "obstacle") {
     // The point of the board that met the obstacle, as it was then.
-    if (alert.event_x !== null) marks.push({ kind: "link", pair: benchesOf(stage, alert.event_bench_a), place: { x: alert.event_x, y: alert.event_y }, ink: "danger" });
+    if (alert.event_x !== null) marks.push({ kind: "link", pair: benchesAmong(dragons, alert.event_bench_a), place: { x: alert.event_x, y: alert.event_y }, ink: "danger" });
   } else if (state.name !== "contact" && alert.event_bench_a !== null) {
     // A link that stalls or locks is marked at the present place of its rear handle.
-    const rear = STRIDE * (alert.event_bench_a + 1);
-    if (rear < places.length) marks.push({ kind: "link", pair: [alert.event_bench_a], place: { x: places[rear], y: places[rear + 1] }, ink: "danger" });
+    const owner = ownerOf(dragons, alert.event_bench_a), rear = STRIDE * (alert.event_bench_a + 1 - (owner?.first ?? 0));
+    const place = owner && { x: owner.places[rear], y: owner.places[rear + 1] };
+    if (place) marks.push({ kind: "link", pair: [alert.event_bench_a], place, ink: "danger" });
   }
   return marks;
 }

@@ -17,24 +17,44 @@ const FINEST = 0.001;
 const AT_REST = 0.5;
 
 /**
- * The identities of several dragons, besides their names: dashes (pixels of ink and of gap in turn), and a colour that
- * is visible on a light and on a dark ground. Without colour vision two dragons differ in their dashes.
+ * The identities of several dragons, besides their names: dashes (pixels of ink and of gap in turn), a colour that is
+ * visible on a light and on a dark ground, and the light of its lanterns. Without colour vision two dragons differ in their
+ * dashes.
  */
 const IDENTITIES = [
-  { colour: "#1f6fb5", dashes: [] },
-  { colour: "#c4560a", dashes: [12, 8] },
-  { colour: "#0b8560", dashes: [3, 5] },
-  { colour: "#a8478c", dashes: [22, 5, 4, 5] },
-  { colour: "#8a6a00", dashes: [28, 14] },
-  { colour: "#6c58d0", dashes: [8, 3] },
-  { colour: "#1b8296", dashes: [4, 14] },
-  { colour: "#c9525c", dashes: [14, 4, 3, 4, 3, 4] },
-  { colour: "#5f7a1e", dashes: [40, 6] },
-  { colour: "#757980", dashes: [6, 22] },
-];
+  { colour: "#1f6fb5", dashes: [], light: [84, 150, 255] },
+  { colour: "#c4560a", dashes: [12, 8], light: [255, 120, 40] },
+  { colour: "#0b8560", dashes: [3, 5], light: [50, 225, 140] },
+  { colour: "#a8478c", dashes: [22, 5, 4, 5], light: [255, 90, 190] },
+  { colour: "#8a6a00", dashes: [28, 14], light: [255, 178, 50] },
+  { colour: "#6c58d0", dashes: [8, 3], light: [150, 110, 255] },
+  { colour: "#1b8296", dashes: [4, 14], light: [50, 215, 240] },
+  { colour: "#c9525c", dashes: [14, 4, 3, 4, 3, 4], light: [255, 56, 36] },
+  { colour: "#5f7a1e", dashes: [40, 6], light: [175, 230, 60] },
+  { colour: "#757980", dashes: [6, 22], light: [225, 232, 255] },
+  { colour: "#1f6fb5", dashes: [16, 16], light: [40, 100, 255] },
+  { colour: "#c4560a", dashes: [2, 10], light: [255, 150, 90] },
+  { colour: "#0b8560", dashes: [30, 4, 2, 4], light: [130, 255, 190] },
+  { colour: "#a8478c", dashes: [8, 8, 2, 8], light: [255, 150, 215] },
+  { colour: "#8a6a00", dashes: [4, 4, 12, 4], light: [255, 214, 120] },
+  { colour: "#6c58d0", dashes: [20, 10, 6, 10], light: [190, 160, 255] },
+].map((one, number) => ({ ...one, number }));
 
-/** The identity of the dragon at a place in the list, from 0. */
-export const identityOf = (place) => IDENTITIES[place % IDENTITIES.length];
+/** The places of identities whose colours are words. */
+const NAMED = {
+  blue: 0, orange: 1, jade: 2, green: 2, pink: 3, gold: 4, yellow: 4, violet: 5, purple: 5, teal: 6, red: 7, lime: 8, silver: 9, white: 9,
+};
+
+/**
+ * Returns the identities of dragons with these names: a name that is a colour has that colour, the others have the first that
+ * are free.
+ */
+export function identitiesOf(names) {
+  const own = names.map((name, k) => (names.indexOf(name) === k && Object.hasOwn(NAMED, name) ? NAMED[name] : null));
+  const first = own.map((place, k) => (own.indexOf(place) === k ? place : null)), free = IDENTITIES.filter((_, place) => !first.includes(place));
+  let next = 0;
+  return first.map((place) => (place === null ? free[next++ % free.length] : IDENTITIES[place]));
+}
 
 const colour = (style, name) => style.getPropertyValue(name).trim();
 const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));

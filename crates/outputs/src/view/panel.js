@@ -21,9 +21,9 @@ const spokenOf = new Map();
  * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (the reason why nothing comes,
  * or null), `silent` (seconds without a frame, or null), `stale` (true if the whole picture is stale), `of` (the dragon
  * of the situation, or null for a single dragon), `seconds` until the event `ahead` (NaN without a countdown), `stands`
- * (true if the show stands still), `benches`, `obstacles`, and `now` (the present state in words).
+ * (true if the show stands still), `stage`, and `now` (the present state in words).
  */
-export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, benches, obstacles, now }) {
+export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, stage, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
   const changed = dataset.level !== state.name;
   if (changed) Object.assign(dataset, { level: state.name, severity: state.severity, happened: state.happened });
@@ -31,7 +31,7 @@ export function showSituation({ state, alert, trouble, silent, stale, of, second
   // The motion of a picture that no frame confirms, or of a show that stands, is not stated.
   element("state").hidden = Boolean(trouble) || silent !== null || (calm && stands);
   put("state", `${SIGNS[state.severity]} ${capital(say(state.name))}`);
-  const sentence = trouble ? "" : sentenceOf(state, alert, benches, obstacles);
+  const sentence = trouble ? "" : sentenceOf(state, alert, stage);
   put("alert", of && sentence ? `${of}: ${sentence}` : sentence);
   put("now", capital(now));
   element("now").hidden = !now;
@@ -149,8 +149,8 @@ function showScale({ ticks, width, unseen }) {
   element("scale").replaceChildren(...spans);
 }
 
-/** The number, place and speed of the bench that is chosen. */
-export function showBench(chosen, handles) {
+/** The number, place and speed of the bench that is chosen; `dragon` is the name of one of several, or empty. */
+export function showBench(chosen, handles, dragon) {
   const count = handles.length / STRIDE - 1;
   element("pick").max = count;
   const there = chosen >= 0 && chosen < count, k = STRIDE * chosen;
@@ -160,6 +160,7 @@ export function showBench(chosen, handles) {
   const values = {
     number: chosen + 1,
     count,
+    of: dragon && say("ofThem", { dragon }),
     name: chosen === 0 ? say("theHead") : chosen === count - 1 ? say("theTail") : "",
     x: handles[k].toFixed(3),
     y: handles[k + 1].toFixed(3),

@@ -75,8 +75,6 @@ struct Reader<'a> {
     status: Option<LoopStatus>,
     /// Cues that have come so far.
     cues: u64,
-    /// True for a show of several dragons, until it has gone.
-    has_several: bool,
     /// The run and the scene whose facts are not computed yet.
     unknown: Option<(u64, SceneHash)>,
 }
@@ -93,26 +91,12 @@ impl<'a> Reader<'a> {
             unproved: None,
             status: None,
             cues: 0,
-            has_several: false,
             unknown: None,
         }
     }
 
     /// Applies an event. Returns true if the picture changed.
     fn handle(&mut self, event: FeedEvent<'_>) -> bool {
-        match event {
-            FeedEvent::Gone => self.has_several = false,
-            _ if self.has_several => return false,
-            FeedEvent::Stage { stage, .. } if stage.dragons.len() > 1 => {
-                self.has_several = true;
-                let (name, dragons) = (&self.publisher, stage.dragons.len());
-                let sentence = format!("\"{name}\" has {dragons} dragons, which the page does not draw");
-                log::warn!("{sentence}");
-                self.picture = Picture::waiting(Some(&sentence));
-                return true;
-            }
-            _ => {}
-        }
         match event {
             FeedEvent::Stage { stage, segments } => {
                 self.stage = Some(StageMessage { stage: *stage, segments: segments.to_vec() });

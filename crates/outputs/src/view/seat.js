@@ -6,6 +6,7 @@
 
 import { drawFigure, headFigure, tailFigure } from "./dragon_figure.js";
 import { STRIDE, speedOf } from "./hermite.js";
+import { OfLight } from "./lantern_light.js";
 import { behindHead } from "./lantern_view.js";
 import { Cuts, ball, reflection } from "./seat_sprites.js";
 import { BOARD, SeatView, seatOf } from "./seat_view.js";
@@ -47,9 +48,11 @@ export class Seat {
     const [turns = 0, distance = null, height = HEIGHT] = given;
     this.home = { turns, distance, height };
     this.cuts = new Cuts();
-    this.pools = [pool(255, 117, 41), pool(255, 143, 61)];
-    [this.red, this.gold, this.white] = [halo("255,150,70", "255,70,24"), halo("255,214,130", "255,140,44"), halo("255,250,232", "255,206,130")];
-    this.wet = [reflection([255, 110, 40]), reflection([255, 176, 76])];
+    this.kits = new OfLight((light) => ({
+      ...light, pools: light.pools.map((one) => pool(...one)), halo: halo(...light.halo.map(String)), wet: reflection(light.wet),
+    }));
+    this.fire = this.kits.of(null);
+    [this.gold, this.white, this.wet] = [halo("255,214,130", "255,140,44"), halo("255,250,232", "255,206,130"), reflection([255, 176, 76])];
     this.balls = {
       skin: ball("#ffb066", "#ea4a1c", "#b3160f"), gold: ball("#fffbe0", "#ffc040", "#b0620e"), white: ball("#ffffff", "#fff4cf", "#d8a050"),
       dark: ball("#5a1a10", "#260606", "#0a0202"), flame: ball("#fff0a0", "#ff7a1a", "#a02a06"),
@@ -114,7 +117,7 @@ export class Seat {
     const view = (this.view = new SeatView(context.canvas, this.taken, this.stage)), isNew = this.build(view);
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.imageSmoothingQuality = "low";
-    const teams = dragons.map((dragon) => teamOf(view, dragon)), isBloom = isNew || this.picture % BLOOM_EVERY === 0;
+    const teams = dragons.map((dragon) => teamOf(view, dragon, this.kits.of(dragon.identity))), isBloom = isNew || this.picture % BLOOM_EVERY === 0;
     if (isNew || this.picture % FLOOR_EVERY === 0) this.layFloor(view, teams);
     if (isBloom) this.layBloom(view, teams);
     this.picture++;
@@ -144,7 +147,7 @@ export class Seat {
       if (canvas.width !== wide || canvas.height !== high) Object.assign(canvas, { width: wide, height: high });
     }
     this.floor = floorOf(view, this.slabs);
-    this.night = nightOf(view, this.cuts.lantern(96, false).canvas, this.red);
+    this.night = nightOf(view, this.cuts.lantern(96, this.fire).canvas, this.fire.halo);
     this.front = frontRow(view);
     return true;
   }
@@ -176,31 +179,31 @@ export class Seat {
     context.drawImage(this.night, 0, 0);
     // The dragon's light on the mist before the houses.
     context.globalCompositeOperation = "screen";
-    for (const { middle, reach, life } of teams) {
+    for (const { middle, reach, life, kit } of teams) {
       if (!middle) continue;
       const radius = 1.5 * reach * middle.k;
-      this.spot(context, this.red, middle.x, this.night.height, radius, 0.42 * radius, 0.3 * life);
+      this.spot(context, kit.halo, middle.x, this.night.height, radius, 0.42 * radius, 0.3 * life);
     }
     context.globalAlpha = 1;
     context.globalCompositeOperation = "source-over";
   }
 
   /** The light of a team on the floor: its spill, a pool for each bench, the lanterns' reflections. */
-  layLight(light, view, { things, middle, reach, life }) {
+  layLight(light, view, { things, middle, reach, life, kit }) {
     if (middle) {
       const radius = (2.3 * reach * middle.k) / PART;
-      this.spot(light, this.pools[0], middle.x / PART, middle.y / PART, radius, radius * view.flat(middle) * 1.15, 0.34 * life);
+      this.spot(light, kit.pools[0], middle.x / PART, middle.y / PART, radius, radius * view.flat(middle) * 1.15, 0.34 * life);
     }
     const at = {};
     for (const { foot, bench, x, y, c, s, half, lit, burn, dancer } of things) {
       if (dancer || !lit) continue;
       const radius = (2.6 * foot.k) / PART;
       if (radius < 0.7 || foot.x < -4 * radius || foot.x > view.width + 4 * radius) continue;
-      this.spot(light, this.pools[bench % 3 ? 0 : 1], foot.x / PART, foot.y / PART, radius, radius * view.flat(foot), (bench ? 0.4 : 0.6) * lit * (1 + burn));
+      this.spot(light, kit.pools[bench % 3 ? 0 : 1], foot.x / PART, foot.y / PART, radius, radius * view.flat(foot), (bench ? 0.4 : 0.6) * lit * (1 + burn));
       if (foot.k < WET_FROM) continue;
       (bench ? ON_BODY : ON_HEAD).forEach((share, k) => {
         if (!view.to(x + share * half * c, y + share * half * s, -1.5, at)) return;
-        this.spot(light, this.wet[k === 1 ? 1 : 0], at.x / PART, (at.y + 0.23 * at.k) / PART, (0.17 * at.k) / PART, (0.95 * at.k) / PART, 0.26 * lit);
+        this.spot(light, k === 1 ? this.wet : kit.wet, at.x / PART, (at.y + 0.23 * at.k) / PART, (0.17 * at.k) / PART, (0.95 * at.k) / PART, 0.26 * lit);
       });
     }
   }
@@ -218,17 +221,17 @@ export class Seat {
       const radius = (metres * at.k) / PART;
       this.spot(context, picture, at.x / PART, at.y / PART, radius, radius, alpha);
     };
-    for (const { things, show } of teams) {
+    for (const { things, show, kit } of teams) {
       for (const { dancer, bench, x, y, c, s, half, lit, burn } of things) {
         if (dancer || !lit) continue;
         const flicker = 1 + 0.1 * Math.sin(4.1 * show.flames + 2.4 * bench) * Math.sin(1.7 * show.flames + bench), alpha = 0.3 * thin * flicker * lit * (1 + 2.5 * burn);
         (bench ? ON_BODY : ON_HEAD).forEach((share, k) => {
-          shine(burn > 0.05 ? this.white : k === 1 ? this.gold : this.red, x + share * half * c, y + share * half * s, BOARD + 0.3, 0.55 + 0.7 * burn, alpha);
+          shine(burn > 0.05 ? this.white : k === 1 ? this.gold : kit.halo, x + share * half * c, y + share * half * s, BOARD + 0.3, 0.55 + 0.7 * burn, alpha);
         });
         if (bench) continue;
         const ahead = (metres) => [x + (half + metres) * c, y + (half + metres) * s];
         shine(this.white, ...ahead(PEARL), PEARL_HEIGHT, 1.3, 0.95 * lit);
-        for (const [metres, reach] of [[-1.1, 1.3], [-0.7, 0.9], [-0.2, 0.7]]) shine(this.red, ...ahead(metres), 2.15, reach, 0.25 * lit);
+        for (const [metres, reach] of [[-1.1, 1.3], [-0.7, 0.9], [-0.2, 0.7]]) shine(kit.halo, ...ahead(metres), 2.15, reach, 0.25 * lit);
         if (show.burst) shine(this.white, show.burst.place.x, show.burst.place.y, BOARD, 2 + 6 * show.burst.part, (1 - show.burst.part) ** 2);
       }
     }
@@ -264,12 +267,12 @@ export class Seat {
   }
 
   /** A board: its top, the side that is seen, and a gilded edge. */
-  board(context, view, { x, y, c, s, half, w }) {
+  board(context, view, { x, y, c, s, half, w, kit }) {
     const corner = (along, across, z) => view.to(x + along * c - across * s, y + along * s + across * c, z);
     const near = c * view.rightX + s * view.rightY > 0 ? -w : w, top = [[half, w], [-half, w], [-half, -w], [half, -w]].map(([along, across]) => corner(along, across, BOARD));
     const edge = [half, -half].map((along) => corner(along, near, BOARD)), under = [-half, half].map((along) => corner(along, near, BOARD - THICK));
     if (![...top, ...edge, ...under].every(Boolean)) return;
-    for (const [points, colour] of [[top, "#8a3014"], [[...edge, ...under], "#c2501c"]]) {
+    for (const [points, colour] of [[top, kit.top], [[...edge, ...under], kit.side]]) {
       context.fillStyle = colour;
       context.beginPath();
       for (const point of points) context.lineTo(point.x, point.y);
@@ -282,15 +285,15 @@ export class Seat {
   }
 
   /** The lanterns of a board, from the farthest on; unlit ones are dark. */
-  lanterns(context, view, { bench, x, y, c, s, half, lit, burn }, isAway) {
+  lanterns(context, view, { bench, x, y, c, s, half, lit, burn, kit }, isAway) {
     const places = bench ? ON_BODY : ON_HEAD, at = {};
     for (let k = 0; k < places.length; k++) {
       const which = isAway ? places.length - 1 - k : k, share = places[which] * half, isGold = which === 1;
       if (!view.to(x + share * c, y + share * s, BOARD, at)) continue;
       context.globalAlpha = 0.12 + 0.88 * lit;
-      if (at.k > LANTERNS_FROM) this.stand(context, this.cuts.lantern(at.k, isGold), at);
+      if (at.k > LANTERNS_FROM) this.stand(context, this.cuts.lantern(at.k, isGold ? null : kit), at);
       else {
-        context.fillStyle = isGold ? "#ffd070" : "#ff6a30";
+        context.fillStyle = isGold ? "#ffd070" : kit.paper[1];
         context.fillRect(at.x - 0.12 * at.k, at.y - 0.46 * at.k, Math.max(1, 0.25 * at.k), Math.max(1, 0.38 * at.k));
       }
       if (burn > 0.05) this.spot(context, this.white, at.x, at.y - 0.3 * at.k, 0.34 * at.k, 0.36 * at.k, burn * lit);
@@ -306,7 +309,7 @@ export class Seat {
   }
 
   /** Sparks that rise from the head: each is a function of the show time, and begins where the head was. */
-  sparks(context, view, { show, places, speed }) {
+  sparks(context, view, { show, places, speed, kit }) {
     if (!(show.embers > 0) || show.life < 1) return;
     const at = {};
     context.globalCompositeOperation = "lighter";
@@ -315,7 +318,7 @@ export class Seat {
       const turn = 2 * Math.PI * hash(spark + 1), drift = (0.1 + 0.4 * hash(spark + 2)) * age, up = (0.7 + 0.9 * hash(spark + 4)) * age;
       if (!view.to(x + Math.cos(turn) * drift + 0.25 * Math.sin(2.2 * age + turn), y + Math.sin(turn) * drift, 2.4 + up, at)) continue;
       const radius = 1.6 * Math.max(1, (0.02 + 0.025 * hash(spark + 3)) * at.k) * (0.4 + 0.6 * left), alpha = left * show.embers * (0.55 + 0.45 * Math.sin(15 * show.time + spark));
-      this.spot(context, left > 0.6 ? this.white : left > 0.3 ? this.gold : this.red, at.x, at.y, radius, radius, alpha);
+      this.spot(context, left > 0.6 ? this.white : left > 0.3 ? this.gold : kit.halo, at.x, at.y, radius, radius, alpha);
     }
     context.globalAlpha = 1;
     context.globalCompositeOperation = "source-over";
@@ -323,7 +326,7 @@ export class Seat {
 }
 
 /** A dragon's benches and dancers that are in the picture, its middle and its reach, for a view. */
-function teamOf(view, { stage, places, show }) {
+function teamOf(view, { stage, places, show }, kit) {
   const count = places.length / STRIDE - 1, things = [], speed = speedOf(places, 0);
   let [sumX, sumY] = [0, 0];
   for (let k = 0; k <= count; k++) {
@@ -337,12 +340,12 @@ function teamOf(view, { stage, places, show }) {
     const middle = [x - dx / 2, y - dy / 2], below = view.to(...middle, 0);
     if (!below || !isSeen(view, below, 4)) continue;
     const half = (k ? stage.body_length : stage.head_length) / 2;
-    things.push({ dancer: false, depth: below.depth, foot: below, bench: k, last: count - 1, x: middle[0], y: middle[1], c, s, half, w: stage.width / 2, show, lit, burn: show.burning.get(k) ?? 0 });
+    things.push({ dancer: false, depth: below.depth, foot: below, bench: k, last: count - 1, x: middle[0], y: middle[1], c, s, half, w: stage.width / 2, show, lit, burn: show.burning.get(k) ?? 0, kit });
   }
   const [x, y] = [sumX / (count + 1), sumY / (count + 1)];
   let reach = 1;
   for (let at = 0; at < places.length; at += STRIDE) reach = Math.max(reach, Math.hypot(places[at] - x, places[at + 1] - y));
-  return { things, middle: view.to(x, y, 0), reach, show, places, life: show.life, speed: Number.isFinite(speed) ? speed : 0 };
+  return { things, middle: view.to(x, y, 0), reach, show, places, kit, life: show.life, speed: Number.isFinite(speed) ? speed : 0 };
 }
 
 /** Returns true if a part of the circle of `metres` around a place is in the picture. */

@@ -45,14 +45,17 @@ function line(context, width, colour, ...points) {
 
 const BARREL = [[-0.085, 0.1], [-0.19, 0.17, -0.19, 0.43, -0.085, 0.5], [0.085, 0.5], [0.19, 0.43, 0.19, 0.17, 0.085, 0.1]];
 const HEXAGON = [[-0.105, 0.1], [-0.152, 0.31], [-0.105, 0.5], [0.105, 0.5], [0.152, 0.31], [0.105, 0.1]];
-const RED = [[0, "#fffbe4"], [0.2, "#ffdc8c"], [0.5, "#ff6a2a"], [0.82, "#d9200f"], [1, "#8a0c0a"]];
+/** The places of the colours of paper, from the flame outwards. */
+const PAPER = [0.2, 0.5, 0.82, 1];
 const GOLD = [[0, "#fffdf0"], [0.3, "#fff2c0"], [0.66, "#ffc650"], [1, "#c96d10"]];
 
-function lantern(context, isGold) {
+/** A gold lantern, or one of paper in these colours. */
+function lantern(context, colours) {
+  const isGold = !colours;
   context.fillStyle = "#2a0a06";
   context.fillRect(-0.035, 0, 0.07, 0.1);
   const paper = isGold ? HEXAGON : BARREL;
-  shape(context, paper, stops(context.createRadialGradient(0, 0.25, 0.01, 0, 0.3, 0.235), isGold ? GOLD : RED));
+  shape(context, paper, stops(context.createRadialGradient(0, 0.25, 0.01, 0, 0.3, 0.235), isGold ? GOLD : [[0, "#fffbe4"], ...PAPER.map((at, k) => [at, colours[k]])]));
   context.save();
   context.clip();
   isGold ? flower(context) : ribs(context);
@@ -175,8 +178,9 @@ export class Cuts {
     return made;
   }
 
-  lantern(scale, isGold) {
-    return this.take(isGold ? 999 : 998, scale, LANTERN, (context) => lantern(context, isGold));
+  /** A gold lantern for null, or one of paper in the colours of a light (see lantern_light.js). */
+  lantern(scale, light) {
+    return this.take(light ? 901 + light.number : 999, scale, LANTERN, (context) => lantern(context, light?.paper));
   }
 
   /** A dancer in one of three clothes, who faces `yaw` turns from the seat, at `phase`, a share of two steps. */

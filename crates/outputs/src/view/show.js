@@ -46,9 +46,10 @@ export class Show {
 
   /**
    * Begins the next picture, at the show time `time`. `stands`: the show stands still; `jumped`: another epoch;
-   * `coming`: the benches of the next event and the seconds until then; `happened`: the place of a past event, or null.
+   * `coming`: the benches of the next event and the seconds until then; `happened`: it is past; `flash`: its place then, if
+   * this dragon's flash shows it, or null.
    */
-  update({ time, places, stands, jumped, coming, happened }) {
+  update({ time, places, stands, jumped, coming, happened, flash }) {
     const { now } = this, tail = places.length - STRIDE;
     if (!stands) this.stoodAt = now;
     this.embers = this.still ? 0 : Math.max(0, 1 - (now - this.stoodAt) / EMBERS);
@@ -58,8 +59,8 @@ export class Show {
     this.time = time;
     const burn = happened ? 1 : smooth((BURNING - coming.seconds) / BURNING);
     this.burning = new Map(burn > 0 ? coming.benches.map((bench) => [bench, burn]) : []);
-    if (happened && !this.flash) this.flash = { at: now, place: happened };
-    if (!happened) this.flash = null;
+    if (flash && !this.flash) this.flash = { at: now, place: flash };
+    if (!flash) this.flash = null;
   }
 
   /** Returns how much the lanterns of a bench are lit, from 0 to 1: the tail's die first. */

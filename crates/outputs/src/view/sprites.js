@@ -52,14 +52,14 @@ export function halo(core, skirt) {
   return canvas;
 }
 
-/** A red barrel of paper with twelve ribs. The canvas is 0.3 m wide. */
-export function barrel() {
+/** A barrel of paper with twelve ribs, in colours from the flame outwards. The canvas is 0.3 m wide. */
+export function barrel([flame, paper, shade, rim]) {
   const size = 96, half = size / 2, radius = 0.9 * half, [canvas, context] = blank(size, size);
   const disc = (share) => {
     context.beginPath();
     context.arc(half, half, share * radius, 0, 7);
   };
-  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, radius), [0, "#fffdf0"], [0.16, "#fff0b0"], [0.42, "#ff6a2e"], [0.8, "#d81f14"], [1, "#5e0a08"]);
+  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, radius), [0, "#fffdf0"], [0.16, flame], [0.42, paper], [0.8, shade], [1, rim]);
   disc(1);
   context.fill();
   context.strokeStyle = "rgba(60,0,0,.28)";
@@ -71,7 +71,7 @@ export function barrel() {
     context.lineTo(half + c, half + s);
   }
   context.stroke();
-  for (const [share, colour, width] of [[0.34, "rgba(90,10,0,.55)", size / 30], [0.96, "#5e0a08", size / 28]]) {
+  for (const [share, colour, width] of [[0.34, "rgba(90,10,0,.55)", size / 30], [0.96, rim, size / 28]]) {
     disc(share);
     Object.assign(context, { strokeStyle: colour, lineWidth: width });
     context.stroke();

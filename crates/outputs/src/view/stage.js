@@ -7,7 +7,6 @@ import { benchAt } from "./boards.js";
 import { Camera } from "./camera.js";
 import { Cameras } from "./cameras.js";
 import { Curve } from "./curve.js";
-import { Dragon } from "./dragon.js";
 import { Labels } from "./labels.js";
 import { Lanterns } from "./lanterns.js";
 import { lock } from "./lock.js";
@@ -17,14 +16,15 @@ import { KeySwitch } from "./key_switch.js";
 import { Measure } from "./measure.js";
 import { Pace } from "./pace.js";
 import { attach } from "./pointer_input.js";
-import { identityOf, paletteOf } from "./palette.js";
+import { identitiesOf, paletteOf } from "./palette.js";
 import { element, put, showBench, showChase, showFigures, showNames, showProofs, showSituation, showTransport } from "./panel.js";
-import { publishers } from "./publishers.js";
+import { Publisher } from "./publisher.js";
+import { publishers as names } from "./publishers.js";
 import { Resolution } from "./resolution.js";
 import { Roster } from "./roster.js";
 import { Seat } from "./seat.js";
 import { Sound } from "./sound.js";
-import { capital, nameOf, say, setLanguage, translate } from "./words.js";
+import { capital, say, setLanguage, translate } from "./words.js";
 
 /** The interval at which figures are updated, ms: short enough, and readable. */
 const FIGURES_INTERVAL = 100;
@@ -46,8 +46,8 @@ const seat = words.seat ? new Seat(words.seat === true ? [] : words.seat) : null
 const lanterns = seat ?? (words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null);
 /** The eye that hands move. */
 const eye = seat ?? camera;
-const several = publishers.length > 1, dragons = publishers.map((name) => new Dragon(name, { several, show: words.show, still: stillness.matches }));
-root.toggleAttribute("data-several", several);
+const isOneOfMany = names.length > 1, look = { several: isOneOfMany, show: words.show, still: stillness.matches };
+const publishers = names.map((name) => new Publisher(name, look));
 const keySwitch = new KeySwitch(words.keys || words.desk || words.hands, element("keys-on"));
 const curve = new Curve(element("curve"));
 const measure = new Measure((said) => {
@@ -55,10 +55,13 @@ const measure = new Measure((said) => {
   element("measured").hidden = !said;
   element("measure").setAttribute("aria-pressed", measure.on);
 });
-const roster = several ? new Roster(dragons, select) : null;
+const roster = new Roster(select);
+/** The dragons of all publishers, and whether there are several. */
+let dragons = [], several = false;
+meet();
 /**
  * `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon of the figures, null for that of
- * the header.
+ * the publisher of the header.
  */
 let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0, drawnAt = -Infinity;
 
@@ -68,8 +71,19 @@ let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = nul
  * it; `latency` and `ways` in ms since the frame was sent. With several dragons it is of the first, and `dragons`
  * has the same of each.
  */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: dragons[0].latency, ways: dragons[0].stream.ways, played: sound.played, toPixel: (...place) => eye.toPixel(...place), dragons: [] };
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: publishers[0].latency, ways: publishers[0].stream.ways, played: sound.played, toPixel: (...place) => eye.toPixel(...place), dragons: [] };
 window.picture = picture;
+
+/** Lists the dragons that the publishers have now. Each of several has an identity. */
+function meet() {
+  const now = publishers.flatMap((one) => one.dragons), key = now.map(({ name }) => name).join(" ");
+  if (now.length === dragons.length && now.every((one, k) => one === dragons[k]) && key === meet.key) return;
+  [dragons, several, meet.key] = [now, now.length > 1, key];
+  const identities = several ? identitiesOf(now.map(({ name }) => name)) : [null];
+  now.forEach((dragon, k) => (dragon.identity = identities[k]));
+  root.toggleAttribute("data-several", several);
+  roster.list(several ? dragons : []);
+}
 
 function fitCanvas() {
   const { width, height } = canvas.getBoundingClientRect();
@@ -82,16 +96,16 @@ function fitCanvas() {
   last = null;
 }
 
-/** The dragon of the header. */
-let header = dragons[0];
+/** The publisher of the header. */
+let header = publishers[0];
 /**
- * The most urgent dragon that is present: by the gravest past event, then by the soonest coming event. Of two nearly
- * equal countdowns the dragon of the header stays there, since the header is read aloud.
+ * The most urgent publisher that is present: by the gravest past event, then by the soonest coming event. Of two nearly
+ * equal countdowns that of the header stays there, since the header is read aloud.
  */
 function foremost() {
   const rank = ({ sight, isThere }) => (sight.stale ? (isThere ? -1 : -2) : { ok: 0, warning: 1, error: 2 }[sight.state.severity] ?? 0);
   const soon = ({ sight }) => (sight.seconds > -1 ? sight.seconds : Infinity);
-  const best = dragons.reduce((best, one) => (rank(one) > rank(best) || (rank(one) === rank(best) && soon(one) < soon(best)) ? one : best));
+  const best = publishers.reduce((best, one) => (rank(one) > rank(best) || (rank(one) === rank(best) && soon(one) < soon(best)) ? one : best));
   if (rank(best) > rank(header) || soon(best) + HEADER_LEAD < soon(header)) header = best;
   return header;
 }
@@ -102,8 +116,11 @@ function pass() {
   fitCanvas();
   const now = performance.now(), passed = now - passedAt;
   passedAt = now;
-  const isOther = dragons.map((dragon) => dragon.look(now)).some(Boolean), there = dragons.filter((dragon) => dragon.isThere);
-  picture.received = dragons.reduce((sum, { stream }) => sum + stream.received, 0);
+  const isOther = publishers.map((one) => one.update(now)).some(Boolean);
+  meet();
+  if (!dragons.includes(whose)) choose(-1, dragons[0]);
+  const there = dragons.filter((dragon) => dragon.isThere);
+  picture.received = publishers.reduce((sum, { stream }) => sum + stream.received, 0);
   if (isOther) camera.forget();
   if (!there.length) {
     showText(now);
@@ -112,9 +129,9 @@ function pass() {
   camera.update(there, passed, there.includes(whose) ? whose : there[0], Math.max(...there.map(({ newest }) => newest.scale)));
   camera.reach = Math.max(...there.map(({ path }) => path.reach));
   showText(now);
-  const soonest = dragons.map(({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
+  const soonest = publishers.map(({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
   sound.count(soonest.length ? Math.min(...soonest) : NaN);
-  if (dragons.some(({ struck }) => struck)) sound.strike();
+  if (publishers.some(({ struck }) => struck)) sound.strike();
   paint(there);
   report();
 }
@@ -129,14 +146,14 @@ function paint(there) {
   [last, drawnAt] = [look, passedAt];
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
-    const { stage, places, colours, path, marks, sight } = dragon, own = dragon === whose ? chosen : -1;
-    return { stage, places, colours, path: path.lines, obstacles: path.obstacles, marks, chosen: own, chosenName: dragon.own(nameOf(own)), endNames: dragon.endNames(), stale: sight.stale && !allStale, identity: several ? identityOf(dragons.indexOf(dragon)) : null };
+    const { stage, places, colours, path, obstacles, marks, sight, identity } = dragon, own = dragon === whose ? chosen : -1;
+    const named = { chosen: own, chosenName: dragon.benchName(own), endNames: dragon.endNames() };
+    return { stage, places, colours, path: path.lines, obstacles, marks, ...named, stale: sight.stale && !allStale, identity };
   });
   const written = draw(context, camera, palette, { ground, dragons: scene, labels, measure, hasFocus });
   picture.drawn++;
   Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels: written });
-  // A dragon that has stopped is drawn again while another one moves: this is no latency of its frames.
-  for (const dragon of there) if (!several || !dragon.sight.stale) dragon.drawn();
+  drawnOf(isOneOfMany);
 }
 
 /** Draws the show look. */
@@ -148,7 +165,12 @@ function light(there) {
   lanterns.draw(context, camera, there);
   pace?.drawn(passedAt);
   picture.drawn++;
-  for (const dragon of there) if (!dragon.sight.stale) dragon.drawn();
+  drawnOf(true);
+}
+
+/** A publisher that has stopped is drawn again while another one moves: this is no latency of its frames. */
+function drawnOf(isLiveOnly) {
+  for (const one of publishers) if (one.isThere && !(isLiveOnly && one.sight.stale)) one.drawn();
 }
 
 /** The picture stays; the data for tests of a publisher that is gone does not. */
@@ -174,29 +196,30 @@ function drawNothing() {
 let figuresAt = 0, countedAt = 0;
 function showText(now) {
   const first = foremost(), { sight } = first;
-  const of = several ? first.name : null;
-  showSituation({ ...sight, stale: dragons.every((one) => one.sight.stale), of });
+  const of = isOneOfMany ? first.name : null;
+  showSituation({ ...sight, stale: publishers.every((one) => one.sight.stale), of });
   showTransport(first.transport, { now, of, keys: !element("conduct").hidden });
-  roster?.show(first, selected);
+  roster.show(first, selected);
   showChase(first.stream.chase, now, of);
-  const notices = dragons.map((one) => one.notice()).filter(Boolean);
+  const notices = publishers.map((one) => one.notice()).filter(Boolean);
   // The style sheet shows them in the show look only on request.
   if (words.show && !notices.length && sight.trouble) notices.push(capital(say(sight.trouble)));
   element("notice").hidden = !notices.length || "nolabels" in words;
   put("notice", notices.join("\n"));
   showSeat();
-  const shown = selected ?? first, { newest, stage, colours, stream } = shown;
-  curve.show(shown.isThere ? stream.facts : null, stage?.freeze_time, newest?.time);
+  const dragon = selected ?? first.dragons[0], shown = dragon.publisher, { newest, stage, stream } = shown;
+  curve.show(shown.isThere ? stream.facts : null, stage, newest?.time);
   // The scene of a picture that stays may no longer be played.
   showProofs(shown.isThere && !shown.sight.trouble ? stage : null);
   // The rest changes too often to be readable at every pass.
   if (!shown.isThere || now - figuresAt < FIGURES_INTERVAL) return;
   figuresAt = now;
-  showNames(stage, several ? publishers : null, first.transport.kind === "playing" ? "" : first.transport.sign);
+  showNames(stage, isOneOfMany ? names : null, first.transport.kind === "playing" ? "" : first.transport.sign);
+  const { colours, frame } = dragon;
   showFigures({ clearance: newest.clearance, colours, time: stream.playback.time(now), scale: newest.scale });
-  showBench(whose === shown ? chosen : -1, newest.handles);
+  showBench(whose === dragon ? chosen : -1, frame.handles, dragon.part);
   if (now - countedAt < 1000) return;
-  for (const dragon of dragons) dragon.count(now - countedAt);
+  for (const one of publishers) one.count(now - countedAt);
   countedAt = now;
   // The send time of another machine's frames is unknown.
   const { rate, latency } = shown, late = stream.clock === null ? [] : latency.slice(-60).sort((a, b) => a - b);
@@ -206,7 +229,7 @@ function showText(now) {
 
 /** A line of the seat: the picture's heights are not to scale; and why it stands on a slow computer. */
 function showSeat() {
-  element("seat-note").hidden = !seat || "nolabels" in words || dragons.every(({ sight }) => sight.stale);
+  element("seat-note").hidden = !seat || "nolabels" in words || publishers.every(({ sight }) => sight.stale);
   if (!seat) return;
   put("seat-note", [say("notToScale"), pace.isStill ? say("still", { seconds: pace.seconds, rate: pace.rate.toFixed(1) }) : ""].filter(Boolean).join(" "));
 }
@@ -317,7 +340,8 @@ if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => nu
 if (!words.show || words.hands) new Cameras(eye, seat ? "seat" : "stage", element("camera-note"), isWanted);
 element("pick").oninput = ({ target }) => {
   chosen = target.value === "" ? -1 : Math.floor(target.value) - 1;
-  if (several && chosen >= 0) [whose, selected] = [selected ?? foremost(), selected ?? foremost()];
+  const own = selected ?? foremost().dragons[0];
+  if (several && chosen >= 0) [whose, selected] = [own, own];
   showFollow();
 };
 Object.entries({ follow, whole, theme: toggleTheme, full: fill, sound: toggleSound, help, measure: keys.m, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
@@ -336,5 +360,5 @@ if (words.follow) camera.follow(words.follow === true ? 0 : words.follow[0] - 1)
 if (words.unknown.length) put("address", say("address", { words: words.unknown.join(", ") }));
 element("address").hidden = !words.unknown.length;
 showFollow();
-conduct(dragons, !words.show || words.desk, keySwitch);
+conduct(publishers, !words.show || words.desk, keySwitch);
 pass();

@@ -197,8 +197,6 @@ export class Stream {
 
   handle(message) {
     this.onmessage?.(message);
-    // The sizes and the path of the first dragon are those of the stage.
-    if (message.type === "stage") Object.assign(message, { ...message.dragons[0], name: message.name });
     if (message.type === "waiting") this.lose(message.reason ?? "publisher");
     message.at = performance.now();
     if (this.messages[message.type]) this.messages[message.type].newest = message;

@@ -92,7 +92,12 @@ const WORDS = {
   headBench: ["HEAD (bench 1)", "龙头（第 1 节）"],
   numbers: ["benches {a} and {b}", "第 {a} 与第 {b} 节板凳"],
   number: ["bench {a}", "第 {a} 节板凳"],
-  detail: ["Bench {number} of {count}{name}: front handle at ({x}, {y}) m, {speed}, heading {degrees}°", "第 {number} 节板凳（共 {count} 节{name}）：前把手位于 ({x}, {y}) m，{speed}，航向 {degrees}°"],
+  ofDragon: ["{words} of {dragon}", "{dragon}的{words}"],
+  ofThem: [" of {dragon}", "，{dragon}"],
+  both: ["{a} and {b}", "{a}与{b}"],
+  theObstacle: ["the {name}", "障碍物“{name}”"],
+  stands: ["stands", "静止"],
+  detail: ["Bench {number} of {count}{of}{name}: front handle at ({x}, {y}) m, {speed}, heading {degrees}°", "第 {number} 节板凳（共 {count} 节{of}{name}）：前把手位于 ({x}, {y}) m，{speed}，航向 {degrees}°"],
   theHead: [", the head", "，龙头"],
   theTail: [", the tail", "，龙尾"],
   perSecond: ["{speed} m/s", "{speed} m/s"],
@@ -237,7 +242,8 @@ export function answerTo({ code, command, playback, sentence }) {
   return say(code, { command: command === "rate" ? say("rateInForce") : say(command), playback: say(playback) });
 }
 
-export const capital = (words) => words && words[0].toUpperCase() + words.slice(1);
+/** Returns English words with a capital letter; others as they are. */
+export const capital = (words) => (words && language === 0 ? words[0].toUpperCase() + words.slice(1) : words);
 
 /** Returns seconds in a form readable from afar: a number and its unit. */
 export function remaining(seconds) {
@@ -254,7 +260,7 @@ export function minutes(seconds) {
 }
 
 /** One or two benches (from 0) by their numbers from 1. */
-export function benchesOf(pair) {
+function benchesOf(pair) {
   const [a, b] = pair.map((bench) => bench + 1);
   return b === undefined ? say("number", { a }) : say("numbers", { a, b });
 }
@@ -298,17 +304,37 @@ export function chaseOf({ source, state, timecode, tracker, error, distance, sen
 /** A bench's name on the picture. */
 export const nameOf = (bench) => (bench === 0 ? say("headBench") : say("one", { number: bench + 1 }));
 
+/**
+ * Returns the name of a bench, by its number through all handles of a stage, or of an obstacle, whose numbers follow the
+ * handles. `naming` names a bench by its number within its dragon, from 0.
+ */
+export function benchIn({ dragons, obstacles }, number, naming = nameOf) {
+  const owner = dragons.find(({ first_handle, benches }) => number >= first_handle && number <= first_handle + benches);
+  const { first_handle, benches } = dragons.at(-1), after = number - first_handle - benches - 1;
+  if (!owner) return say("theObstacle", { name: obstacles[after]?.name ?? after + 1 });
+  const name = naming(number - owner.first_handle, owner.benches);
+  return dragons.length === 1 ? name : say("ofDragon", { words: name, dragon: owner.name });
+}
+
+/** Returns one or two benches or obstacles, by their numbers as in `benchIn`. */
+export function benchesIn(stage, pair) {
+  const { dragons: [first], dragons: { length } } = stage;
+  if (length === 1 && pair.every((number) => number < first.benches)) return benchesOf(pair);
+  const [a, b] = pair.map((number) => benchIn(stage, number, (bench) => benchesOf([bench])));
+  return b === undefined ? a : say("both", { a, b });
+}
+
 /** Returns the sentence of an alert or a state; empty for an alert that the frames have not reached, or have left. */
-export function sentenceOf(state, alert, count, obstacles = []) {
+export function sentenceOf(state, alert, stage) {
   if (language === 0 || !alert && !state.sentence) {
     if (state.sentence) return `${capital(state.sentence)}.`;
     return state.severity === "ok" || alert?.level !== state.name ? "" : `${capital(alert.sentence)}.`;
   }
   if (state.sentence) return "龙头已到达路径终点。";
   if (state.severity === "ok" || alert.level !== state.name) return "";
-  // The numbers of obstacles follow the handles.
-  const name = (bench) => bench > count ? `障碍物“${obstacles[bench - count - 1]?.name ?? bench - count}”` : `第 ${bench + 1} 节板凳${bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : ""}`;
-  const both = (...pair) => pair.filter((bench) => bench !== null).map(name).join("与");
+  const ends = (bench, count) => (bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : "");
+  const name = (number) => benchIn(stage, number, (bench, count) => `第 ${bench + 1} 节板凳${ends(bench, count)}`);
+  const both = (...pair) => pair.filter((number) => number !== null).map(name).join("与");
   const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)},\u00a0${alert.event_y.toFixed(3)})\u00a0m`;
   if (state.happened) {
     const at = `t\u00a0=\u00a0${alert.event_time?.toFixed(6)}\u00a0s`;
