@@ -1,7 +1,6 @@
 //! `[stage]`: first touches and least clearances against shapely, and a sentence for each wrong table.
 
 use std::io::Write;
-use std::path::Path;
 use std::process::{Command, Output};
 
 use tempfile::NamedTempFile;
@@ -98,15 +97,27 @@ fn a_wrong_stage_is_refused_in_one_sentence() {
 }
 
 #[test]
-fn what_no_proof_knows_is_refused() {
+fn the_least_clearance_of_an_obstacle_is_proved_and_verified() {
     let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    let text = std::fs::read_to_string(&scene).unwrap().replace("start_turn = 16", "start_turn = 5");
+    let text = text.replace("benches = 223", "benches = 5");
+    std::fs::write(&scene, text).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("certificate");
     let file = file.to_str().unwrap();
-    for arguments in [vec!["check", "--prove"], vec!["check", "--prove", "--certify", file]] {
-        assert!(refusal(&scene, &arguments).contains("no proof knows yet"), "{arguments:?}");
-    }
-    assert!(!Path::new(file).exists());
+    let printed = run(&scene, &["check", "--prove", "--certify", file, "--json"]);
+    assert!(printed.status.success(), "{printed:?}");
+    let lines = String::from_utf8(printed.stdout).unwrap();
+    let line: serde_json::Value = serde_json::from_str(lines.lines().nth(1).unwrap()).unwrap();
+    let number = |field: &str| line[field].as_f64().unwrap();
+    let (lo, hi) = (number("least_clearance_lo"), number("least_clearance_hi"));
+    assert!(line["obstacle"] == "lamp" && line["least_clearance_status"] == "proved", "{lines}");
+    assert!(hi - lo <= 1e-9 && lo <= number("least_clearance") && number("least_clearance") <= hi + 1e-12, "{lines}");
+    let mut verify = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let verified = verify.args(["verify", file]).output().unwrap();
+    assert!(verified.status.success(), "{verified:?}");
+    let text = String::from_utf8(verified.stdout).unwrap();
+    assert!(text.contains("least clearance of obstacle 1"), "{text}");
 }
 
 #[test]
@@ -124,12 +135,16 @@ fn the_first_touch_of_an_obstacle_is_proved_and_verified() {
     assert!(text.contains("obstacle"), "{text}");
 }
 
+/// A plan is about boards alone: obstacles do not change it.
 #[test]
-fn plans_refuse_obstacles_in_one_sentence() {
-    let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
-    for arguments in [["plan", "pitch", "--reach-radius=4.5"], ["plan", "speed", "--max-handle-speed=2"]] {
-        assert!(refusal(&scene, &arguments).contains("`plan` knows no obstacles"), "{arguments:?}");
-    }
+fn plans_are_those_without_obstacles() {
+    let staged = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    let mut plain = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let arguments = ["plan", "pitch", "--reach-radius=4.5", "--json"];
+    let plain = plain.args(arguments).output().unwrap();
+    let planned = run(&staged, &arguments);
+    assert!(planned.status.success() && planned.stdout == plain.stdout, "{planned:?} {plain:?}");
+    assert!(run(&staged, &["plan", "speed", "--max-handle-speed=2"]).status.success());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
-use bench_dragon::certify::{CertificateLine, certify, certify_least_clearance};
+use bench_dragon::certify::{CertificateLine, ClearanceHints, certify, certify_least_clearance};
 use bench_dragon::proof::{Proved, Status, Until, verify};
 use bench_dragon::show::scene::Scene;
 use fastrand::Rng;
@@ -135,9 +135,11 @@ fn clearance_certified(text: &str) -> Option<Until> {
     let freeze = timeline.freeze(scene.stops_at_contact());
     let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ())?.least;
     let mut enclosed = None;
+    let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
     let proved = accepted(text, |write| {
+        let most = MOST_STEPS / 4;
         enclosed =
-            certify_least_clearance(&scene.motion, freeze, &hint, text, MOST_STEPS / 4, write, &mut |_| ()).unwrap();
+            certify_least_clearance(&scene.motion, freeze, hints, text, most, write, &mut |_| ()).unwrap().boards;
     });
     let claim = proved.least_clearance.unwrap();
     if let (Some(lo), Some(hi), Some(enclosed)) = (claim.lo, claim.hi, enclosed) {
@@ -278,7 +280,10 @@ fn changed_certificates_of_other_questions_are_refused() {
     let freeze = timeline.freeze(scene.stops_at_contact());
     let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ()).unwrap().least;
     let clearance = written(|write| {
-        certify_least_clearance(&scene.motion, freeze, &hint, &route, MOST_STEPS, write, &mut |_| ()).unwrap().unwrap();
+        let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
+        let motion = &scene.motion;
+        let found = certify_least_clearance(motion, freeze, hints, &route, MOST_STEPS, write, &mut |_| ()).unwrap();
+        found.boards.unwrap();
     });
     let speed = written(|write| {
         certify_greatest_speed(&scene, &timeline, 2.0, &route, 50_000, write, &mut |_| ()).unwrap().unwrap();

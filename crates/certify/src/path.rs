@@ -551,7 +551,7 @@ fn placed(frame: Option<Frame>, point: Vector) -> Vector {
 }
 
 /// Returns the direction `turns` turns counter-clockwise from x.
-fn of_turns(turns: Interval) -> Vector {
+pub(super) fn of_turns(turns: Interval) -> Vector {
     let (sine, cosine) = sin_cos_of(pi() * 2.0 * turns);
     [cosine, sine]
 }

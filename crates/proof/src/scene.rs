@@ -2,17 +2,27 @@
 //! are ignored.
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::elementary;
-use super::ground::{Obstacle, PlacementText, StageText};
+use super::ground::{Mapping, Obstacle, PlacementText, StageText};
 use super::interval::{Interval, Vector};
 use super::path::{Curve, Path, PathEnd, Segment};
 
 /// Limit of benches, and of pieces of a path.
 const MOST: usize = 1_000_000;
 
-/// The scene of a certificate.
+/// The greatest number of dragons.
+const MOST_DRAGONS: usize = 16;
+
+/// One dragon of the scene of a certificate.
 pub(super) struct Scene {
+    /// The name; empty in a scene of one dragon.
+    pub name: String,
+    /// Seconds of the show during which it stands at its start.
+    pub delay: Interval,
+    /// The place of the path on the stage.
+    pub frame: Mapping,
     pub team: Team,
     pub path: Path,
     /// Metres per second.
@@ -50,6 +60,28 @@ struct Text {
     motion: MotionText,
     placement: Option<PlacementText>,
     stage: Option<StageText>,
+}
+
+/// The dragons of a scene of several.
+#[derive(Deserialize)]
+struct SeveralText {
+    #[serde(default)]
+    dragons: Vec<DragonText>,
+    team: Option<IgnoredAny>,
+    stage: Option<StageText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DragonText {
+    name: String,
+    #[serde(default)]
+    delay: f64,
+    team: TeamText,
+    path: PathText,
+    #[serde(default)]
+    placement: PlacementText,
+    motion: MotionText,
 }
 
 #[derive(Deserialize)]
@@ -114,6 +146,11 @@ enum Side {
     Right,
 }
 
+/// Reads a text.
+fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+    toml::from_str(text).map_err(|error: toml::de::Error| error.message().trim().replace('\n', ", "))
+}
+
 fn positive(field: &str, number: f64) -> Result<Interval, String> {
     if number.is_finite() && number > 0.0 {
         Ok(Interval::new(number))
@@ -136,7 +173,27 @@ impl Scene {
     /// # Errors
     /// A sentence for a text that is not a scene.
     pub fn read(text: &str) -> Result<Self, String> {
-        let text: Text = toml::from_str(text).map_err(|error| error.message().trim().replace('\n', ", "))?;
+        let Text { team, path, motion, placement, stage } = parsed(text)?;
+        let placement = placement.unwrap_or_default();
+        Self::of(DragonText { name: String::new(), delay: 0.0, team, path, placement, motion }, stage.as_ref())
+    }
+
+    /// Reads the dragons of a scene of several; an empty list if it is a scene of one.
+    ///
+    /// # Errors
+    /// A sentence for a text that is not a scene.
+    pub fn read_several(text: &str) -> Result<Vec<Self>, String> {
+        let SeveralText { dragons, team, stage } = parsed(text)?;
+        if dragons.len() > MOST_DRAGONS || !dragons.is_empty() && team.is_some() {
+            return Err("expected [team], or from 1 to 16 [[dragons]]".to_owned());
+        }
+        dragons.into_iter().map(|dragon| Self::of(dragon, stage.as_ref())).collect()
+    }
+
+    fn of(text: DragonText, stage: Option<&StageText>) -> Result<Self, String> {
+        if !(text.delay.is_finite() && text.delay >= 0.0) {
+            return Err(format!("a delay is {:?}, expected a number that is not negative", text.delay));
+        }
         let team = text.team.read()?;
         let path = match &text.path {
             PathText::Spiral { pitch, start_turn } => spiral(*pitch, *start_turn)?,
@@ -148,15 +205,28 @@ impl Scene {
         }
         let head_speed = positive("motion.head_speed", text.motion.head_speed)?;
         let start = if let PathText::Pieces { start, .. } = &text.path { *start } else { [0.0; 2] };
-        let obstacles = match &text.stage {
-            Some(stage) => stage.read(&text.placement.unwrap_or_default(), start)?,
-            None => Vec::new(),
-        };
-        Ok(Self { team, path, head_speed, obstacles })
+        let frame = Mapping::new(&text.placement, start)?;
+        let obstacles = stage.map_or_else(|| Ok(Vec::new()), |stage| stage.read(&frame))?;
+        let (name, delay) = (text.name, Interval::new(text.delay));
+        Ok(Self { name, delay, frame, team, path, head_speed, obstacles })
     }
-}
 
-impl Scene {
+    /// Returns the seconds of the show at which the head has travelled some metres: before the path's start 0, and at
+    /// it from 0 until it begins to move.
+    pub fn time(&self, travelled: &Interval) -> Interval {
+        let zero = Interval::new(0.0);
+        let seconds = (travelled / self.head_speed).max(&zero);
+        if !self.delay.is_positive() {
+            seconds
+        } else if travelled.is_positive() {
+            seconds + self.delay
+        } else if travelled.is_at_most(&zero) {
+            zero
+        } else {
+            zero.hull(&(seconds + self.delay))
+        }
+    }
+
     /// Returns the same team in units of `unit` metres, on the inward spiral r = theta.
     pub fn in_units(&self, unit: &Interval) -> Self {
         let Team { benches, width, hole_inset, head_link, body_link } = &self.team;
@@ -178,7 +248,15 @@ impl Scene {
         let zero = Interval::new(0.0);
         let inward = Segment { curve: Curve::Inward { a, frame: None }, begin: None, end: Some(zero) };
         let path = Path::new(vec![inward], zero, PathEnd::Coordinate(zero), zero);
-        Self { team, path, head_speed: self.head_speed, obstacles: Vec::new() }
+        Self {
+            name: String::new(),
+            delay: zero,
+            frame: Mapping::unmoved(),
+            team,
+            path,
+            head_speed: self.head_speed,
+            obstacles: Vec::new(),
+        }
     }
 }
 
