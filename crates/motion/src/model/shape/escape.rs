@@ -16,6 +16,7 @@ use crate::model::board::Board;
 const ROUNDING: f64 = 1e-12;
 
 /// The places at which the rectangle meets a side.
+#[derive(Debug, Clone, Copy, Default)]
 struct Hexagon {
     middle: Vector,
     reach: Vector,
@@ -96,27 +97,20 @@ impl Shape {
     /// Returns the distance from the origin to the nearest free translation.
     fn nearest_free(&self, board: &Board) -> f64 {
         let rectangle = Rectangle::of(board);
-        let mut sides = [(f64::INFINITY, 0); 6 * MOST_CORNERS];
+        let mut hexagons = [Hexagon::default(); MOST_CORNERS];
         let mut count = 0;
-        for (from, to) in self.sides().take(MOST_CORNERS) {
+        for ((from, to), hexagon) in self.sides().zip(&mut hexagons) {
+            *hexagon = Hexagon::new(&rectangle, in_frame(board, from), in_frame(board, to));
+            count += 1;
+        }
+        let mut best = f64::INFINITY;
+        for (number, (from, to)) in self.sides().take(count).enumerate() {
             let corners = hexagon_corners(&rectangle, in_frame(board, from), in_frame(board, to));
             for k in 0..6 {
-                sides[count] = (nearest_of_segment(Vector::zeros(), corners[k], corners[(k + 1) % 6]).norm(), count);
-                count += 1;
-            }
-        }
-        // The nearest sides first: most often the first of them has a free place.
-        let sides = &mut sides[..count];
-        sides.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
-        let mut best = f64::INFINITY;
-        for &(nearest, side) in sides.iter() {
-            if nearest >= best {
-                break;
-            }
-            let (number, k) = (side / 6, side % 6);
-            if let Some((from, to)) = self.sides().nth(number) {
-                let corners = hexagon_corners(&rectangle, in_frame(board, from), in_frame(board, to));
-                best = best.min(self.nearest_free_of(board, number, corners[k], corners[(k + 1) % 6]));
+                let (begin, end) = (corners[k], corners[(k + 1) % 6]);
+                if nearest_of_segment(Vector::zeros(), begin, end).norm() < best {
+                    best = best.min(self.nearest_free_of(board, (&hexagons[..count], number), begin, end));
+                }
             }
         }
         best
@@ -124,17 +118,16 @@ impl Shape {
 
     /// Returns the distance from the origin to the nearest free translation on one side of the hexagon with this
     /// number; infinite if none is free.
-    fn nearest_free_of(&self, board: &Board, own: usize, begin: Vector, end: Vector) -> f64 {
+    fn nearest_free_of(&self, board: &Board, (hexagons, own): (&[Hexagon], usize), begin: Vector, end: Vector) -> f64 {
         let rectangle = Rectangle::of(board);
         let depth = ROUNDING * (rectangle.half.norm() + begin.norm().max(end.norm()));
         let mut covered = [(0.0, 0.0); MOST_CORNERS];
         let mut count = 0;
-        for (number, (from, to)) in self.sides().enumerate() {
-            if number == own || count == MOST_CORNERS {
-                continue;
-            }
-            let hexagon = Hexagon::new(&rectangle, in_frame(board, from), in_frame(board, to));
+        for (_, hexagon) in hexagons.iter().enumerate().filter(|(number, _)| *number != own) {
             if let Some(part) = hexagon.covers(begin, end, depth) {
+                if part == (0.0, 1.0) {
+                    return f64::INFINITY;
+                }
                 covered[count] = part;
                 count += 1;
             }
