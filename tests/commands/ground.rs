@@ -7,19 +7,58 @@ use tempfile::NamedTempFile;
 
 use crate::harness::{can_run, long, python, python_modules, text};
 
+/// The scenes with a touch known to 40 digits: the time, s, and the bench.
+const TOUCHES: [(&str, &str, u32); 3] = [
+    ("coil", "383.16936201406592842594063728981510500011", 0),
+    ("route", "20.55331021895302001625255500593221360919", 1),
+    ("turn", "132.62813817338586211167436691457905548334", 0),
+];
+
+fn scene_of_touch(name: &str) -> String {
+    format!("tests/scenes/touch_{name}.toml")
+}
+
+/// Judges scenes by the brute force of `tests/python/ground.py`.
+fn judge(arguments: &[&str]) {
+    let mut peer = python();
+    peer.args(["tests/python/ground.py", env!("CARGO_BIN_EXE_bench-dragon")]);
+    let output = peer.args(arguments).output().unwrap();
+    let printed = text(&output.stdout);
+    assert!(output.status.success(), "{arguments:?}: {printed}{}", text(&output.stderr));
+    println!("{arguments:?}: {printed}");
+}
+
 #[test]
-fn obstacles_are_met_where_shapely_meets_them() {
-    if !can_run(python_modules(&["shapely"])) {
+fn obstacles_are_met_where_a_brute_force_meets_them() {
+    if !can_run(python_modules(&["numpy", "shapely"])) {
         return;
     }
-    let count = if long() { "400" } else { "12" };
-    for arguments in [vec!["config/square.toml"], vec!["--random", "1", count]] {
-        let mut peer = python();
-        peer.args(["tests/python/ground.py", env!("CARGO_BIN_EXE_bench-dragon")]);
-        let output = peer.args(&arguments).output().unwrap();
-        let printed = text(&output.stdout);
-        assert!(output.status.success(), "{arguments:?}: {printed}{}", text(&output.stderr));
-        assert!(printed.contains("least"), "{printed}");
+    judge(&["config/square.toml"]);
+    for (name, ..) in TOUCHES {
+        judge(&[&scene_of_touch(name)]);
+    }
+    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
+    // Ten scenes of each family.
+    judge(&["--random", "1", if long() { "1800" } else { ["90", "27"][usize::from(is_short)] }]);
+}
+
+#[test]
+fn three_touches_are_those_of_forty_digits() {
+    for (name, digits, bench) in TOUCHES {
+        let file = scene_of_touch(name);
+        let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        let output = program.args(["--scene", &file, "--json", "events"]).output().unwrap();
+        let events = text(&output.stdout);
+        let event = events.lines().find(|line| line.contains("\"obstacle\"")).unwrap();
+        let event: serde_json::Value = serde_json::from_str(event).unwrap();
+        let exact: f64 = digits.parse().unwrap();
+        let time = event["time"].as_f64().unwrap();
+        assert!((time - exact).abs() < 2e-15 * (1.0 + exact) + 1e-13 && event["bench_a"] == bench, "{name}: {event}");
+        if !can_run(python_modules(&["flint"])) {
+            continue;
+        }
+        let peer = python().args(["tests/python/ground_digits.py", &file, &format!("{exact}")]).output().unwrap();
+        assert_eq!(text(&peer.stdout).trim_end(), format!("{digits} bench {bench}"), "{}", text(&peer.stderr));
     }
 }
 
@@ -162,6 +201,28 @@ fn a_team_that_starts_within_a_keep_out_meets_it_at_once_with_a_warning() {
     assert!(events.contains("is at the lamp from the start"), "{events}");
     // Here the show stops, so that the boards never touch in it.
     assert!(text(&output.stdout).contains("The least clearance of the lamp beyond its keep-out of 1 m is -"));
+}
+
+#[test]
+fn a_team_that_starts_on_an_obstacle_or_outside_the_boundary_meets_it_at_once_with_a_warning() {
+    let cases = [
+        ("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [8.0, 2.0], radius = 2.5 }", "is at the lamp"),
+        ("[[stage.obstacles]]\nname = \"lamp\"\nline = [[0.0, 0.0], [9.0, 0.5]]", "is at the lamp"),
+        ("[[stage.obstacles]]\nname = \"lamp\"\npolygon = [[0.0, 0.0], [30.0, 0.0], [0.0, 30.0]]", "is at the lamp"),
+        ("boundary = { polygon = [[40.0, 0.0], [41.0, 0.0], [40.0, 1.0]] }", "is at the boundary"),
+    ];
+    for (stage, expected) in cases {
+        let scene = scene(stage);
+        let events = text(&run(&scene, &["events"]).stdout);
+        assert!(events.starts_with(" obstacle  t = 0 s: bench ") && events.contains(expected), "{stage}: {events}");
+        let line = run(&scene, &["events", "--json"]).stdout;
+        let line: serde_json::Value = serde_json::from_str(text(&line).lines().next().unwrap()).unwrap();
+        assert!(line["event"] == "obstacle" && line["time"] == 0.0 && line["bench_b"] == 224, "{stage}: {line}");
+        let checked = run(&scene, &["check"]);
+        let warned = text(&checked.stderr);
+        assert!(checked.status.success(), "{stage}: {warned}");
+        assert!(warned.contains("within the keep-out of an obstacle at the start"), "{stage}: {warned}");
+    }
 }
 
 #[test]

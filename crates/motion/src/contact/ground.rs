@@ -4,8 +4,9 @@
 //! distance d from the shape is at most x >= 0 at some time of a step, take the nearest points P of the board and Q of
 //! the shape then, or a common point. At both ends of the step P is at least as far from Q as the distances d_start and
 //! d_end, and P goes along a path no longer than C. So d_start + d_end <= 2 x + C. Where the clearance sought is an
-//! overlap, d < 0, the displacements that are additive take C's place. This is a proof for a convex shape; out of a
-//! corner of another shape the least translation may jump.
+//! overlap, d < 0, the displacements that are additive take C's place. This holds for a convex shape. Out of a pocket of
+//! another shape the least translation may jump. There a board that is C longer and wider to each side takes the board's
+//! place: in the whole step the board is within it, so its least translation frees the board at any time of the step.
 //!
 //! **Along a straight line** a board only moves by a vector D, and its distance from a side of a shape is a convex
 //! function of the way. Its slopes at both ends of the step bound it from below: along a wall nothing is lost. **Along a
@@ -337,6 +338,11 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
             let (first, last) = (obstacle.clearance(before), obstacle.clearance(after));
             if first.min(last) <= limit {
                 return true;
+            }
+            if limit + obstacle.keep_out < 0.0 && !obstacle.shape.is_convex() {
+                tested += 1;
+                let moved = step.on_stage(self.chain, bench, Weights::for_limit(limit + obstacle.keep_out));
+                return obstacle.clearance(&before.grown(moved)) <= limit;
             }
             first + last <= most && !self.is_far_on_one_curve(step, ends, (bench, j), limit)
         });

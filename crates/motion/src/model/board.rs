@@ -40,6 +40,11 @@ impl Board {
         }
     }
 
+    /// Returns the board with `metres` more to each side: it holds the board wherever its points move by no more.
+    pub fn grown(&self, metres: f64) -> Self {
+        Self { half_length: self.half_length + metres, half_width: self.half_width + metres, ..*self }
+    }
+
     /// Returns the unit direction across the board, a quarter turn counter-clockwise from its axis.
     pub fn across(&self) -> Vector {
         Vector::new(-self.axis.y, self.axis.x)

@@ -40,6 +40,8 @@ pub struct Shape {
     points: Vec<Point>,
     /// Metres; 0 unless the shape is a circle.
     radius: f64,
+    /// Of a convex shape: 1 if its corners stand counter-clockwise, -1 if clockwise, 0 of a circle or a segment.
+    convex: Option<f64>,
     /// A circle about the outline.
     bounding_centre: Point,
     bounding_radius: f64,
@@ -55,7 +57,7 @@ impl Shape {
     /// Creates a circle; its radius, metres, must be positive.
     pub fn circle(centre: Point, radius: f64) -> Self {
         let (kind, points) = (ShapeKind::Circle, vec![centre]);
-        Self { kind, points, radius, bounding_centre: centre, bounding_radius: radius }
+        Self { kind, points, radius, convex: Some(0.0), bounding_centre: centre, bounding_radius: radius }
     }
 
     /// Creates a polygon from at least three corners; its sides must not meet except at their corners.
@@ -80,12 +82,22 @@ impl Shape {
         let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
         let bounding_centre = Point::from(0.5 * (low + high));
         let bounding_radius = points.iter().map(|point| (point - bounding_centre).norm()).fold(0.0, f64::max);
-        Self { kind, points, radius: 0.0, bounding_centre, bounding_radius }
+        let convex = match kind {
+            ShapeKind::Polygon => sense(&points),
+            ShapeKind::Line => (points.len() == 2).then_some(0.0),
+            ShapeKind::Circle | ShapeKind::Boundary => None,
+        };
+        Self { kind, points, radius: 0.0, convex, bounding_centre, bounding_radius }
     }
 
     /// Returns the kind.
     pub fn kind(&self) -> ShapeKind {
         self.kind
+    }
+
+    /// Returns true if the shape is convex: then the depth of an overlap changes no faster than the board moves.
+    pub fn is_convex(&self) -> bool {
+        self.convex.is_some()
     }
 
     /// Returns the corners; of a circle, its centre.
@@ -203,6 +215,17 @@ impl Shape {
         // Every constructor gives a shape at least one side.
         nearest.map_or((board.centre, board.centre), |(_, on_board, on_side)| (on_board, on_side))
     }
+}
+
+/// Returns the sense in which the corners of a simple polygon stand, 1 if it is counter-clockwise, -1 if clockwise;
+/// `None` unless the polygon is convex.
+fn sense(corners: &[Point]) -> Option<f64> {
+    let count = corners.len();
+    let turn = |k: usize| {
+        let [before, at, after] = [0, 1, 2].map(|by| corners[(k + by) % count]);
+        (at - before).perp(&(after - at))
+    };
+    [1.0, -1.0].into_iter().find(|sense| (0..count).all(|k| sense * turn(k) >= 0.0))
 }
 
 /// Returns a point in the frame of a board.

@@ -16,6 +16,7 @@ use crate::model::board::Board;
 const ROUNDING: f64 = 1e-12;
 
 /// The places at which the rectangle meets a side.
+#[derive(Debug, Clone, Copy, Default)]
 struct Hexagon {
     middle: Vector,
     reach: Vector,
@@ -62,18 +63,53 @@ impl Hexagon {
 }
 
 impl Shape {
-    /// Returns the length of the least translation that frees a board, metres; infinite if there is none.
+    /// Returns the length of the least translation that frees a board, metres; infinite if there is none. The board and
+    /// the shape overlap.
     pub(super) fn least_escape(&self, board: &Board) -> f64 {
-        let rectangle = Rectangle::of(board);
-        let mut best = f64::INFINITY;
-        for (number, (from, to)) in self.sides().enumerate() {
+        match self.convex {
+            Some(sense) => self.convex_escape(board, sense),
+            None => self.nearest_free(board),
+        }
+    }
+
+    /// Returns the least escape from a convex shape: it is across one of the sides of the shape or of the board
+    /// (separating axis theorem).
+    fn convex_escape(&self, board: &Board, sense: f64) -> f64 {
+        let half = Rectangle::of(board).half;
+        let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
+        let mut least = f64::INFINITY;
+        for (from, to) in self.sides() {
             let (from, to) = (in_frame(board, from), in_frame(board, to));
-            let corners = hexagon_corners(&rectangle, from, to);
+            for corner in [from, to] {
+                (low, high) = (low.zip_map(&corner, f64::min), high.zip_map(&corner, f64::max));
+            }
+            let along = to - from;
+            let reach = half.x * along.y.abs() + half.y * along.x.abs();
+            // Positive if the side leads round the board's middle counter-clockwise.
+            let offset = from.perp(&along);
+            let escape = if sense == 0.0 { reach - offset.abs() } else { reach + sense * offset };
+            least = least.min(escape / along.norm());
+        }
+        let beside = (half - low).zip_map(&(half + high), f64::min);
+        least.min(beside.x).min(beside.y)
+    }
+
+    /// Returns the distance from the origin to the nearest free translation.
+    fn nearest_free(&self, board: &Board) -> f64 {
+        let rectangle = Rectangle::of(board);
+        let mut hexagons = [Hexagon::default(); MOST_CORNERS];
+        let mut count = 0;
+        for ((from, to), hexagon) in self.sides().zip(&mut hexagons) {
+            *hexagon = Hexagon::new(&rectangle, in_frame(board, from), in_frame(board, to));
+            count += 1;
+        }
+        let mut best = f64::INFINITY;
+        for (number, (from, to)) in self.sides().take(count).enumerate() {
+            let corners = hexagon_corners(&rectangle, in_frame(board, from), in_frame(board, to));
             for k in 0..6 {
                 let (begin, end) = (corners[k], corners[(k + 1) % 6]);
-                let nearest = nearest_of_segment(Vector::zeros(), begin, end).norm();
-                if nearest < best {
-                    best = best.min(self.nearest_free(board, number, begin, end));
+                if nearest_of_segment(Vector::zeros(), begin, end).norm() < best {
+                    best = best.min(self.nearest_free_of(board, (&hexagons[..count], number), begin, end));
                 }
             }
         }
@@ -82,17 +118,16 @@ impl Shape {
 
     /// Returns the distance from the origin to the nearest free translation on one side of the hexagon with this
     /// number; infinite if none is free.
-    fn nearest_free(&self, board: &Board, own: usize, begin: Vector, end: Vector) -> f64 {
+    fn nearest_free_of(&self, board: &Board, (hexagons, own): (&[Hexagon], usize), begin: Vector, end: Vector) -> f64 {
         let rectangle = Rectangle::of(board);
         let depth = ROUNDING * (rectangle.half.norm() + begin.norm().max(end.norm()));
-        let mut covered = [(f64::INFINITY, f64::INFINITY); MOST_CORNERS];
+        let mut covered = [(0.0, 0.0); MOST_CORNERS];
         let mut count = 0;
-        for (number, (from, to)) in self.sides().enumerate() {
-            if number == own || count == MOST_CORNERS {
-                continue;
-            }
-            let hexagon = Hexagon::new(&rectangle, in_frame(board, from), in_frame(board, to));
+        for (_, hexagon) in hexagons.iter().enumerate().filter(|(number, _)| *number != own) {
             if let Some(part) = hexagon.covers(begin, end, depth) {
+                if part == (0.0, 1.0) {
+                    return f64::INFINITY;
+                }
                 covered[count] = part;
                 count += 1;
             }

@@ -165,3 +165,15 @@ fn distances_by_hand() {
     let pocket = [(0.5, 0.15), (0.9, 0.15), (0.9, -0.15), (0.5, -0.15)].map(|(x, y)| Point::new(x, y)).to_vec();
     close(&Shape::line(pocket), -0.35);
 }
+
+#[test]
+fn convex_shapes_are_known() {
+    let points = |corners: &[(f64, f64)]| corners.iter().map(|(x, y)| Point::new(*x, *y)).collect::<Vec<_>>();
+    let square = points(&[(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 2.0), (0.0, 2.0)]);
+    let dented = points(&[(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 1.0), (0.0, 2.0)]);
+    let clockwise: Vec<Point> = square.iter().rev().copied().collect();
+    assert!(Shape::polygon(square.clone()).is_convex() && Shape::polygon(clockwise).is_convex());
+    assert!(Shape::circle(square[0], 1.0).is_convex() && Shape::line(square[..2].to_vec()).is_convex());
+    assert!(!Shape::polygon(dented).is_convex() && !Shape::line(square[..3].to_vec()).is_convex());
+    assert!(!Shape::boundary(square).is_convex());
+}
