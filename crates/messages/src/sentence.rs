@@ -78,13 +78,9 @@ pub fn bench_name(bench: u32, benches: u32) -> String {
 /// assert_eq!(name_in(&stage, 9), "the well");
 /// ```
 pub fn name_in(stage: &Stage, number: u32) -> String {
-    let of = |first: u32, benches: u32| number.checked_sub(first).filter(|bench| *bench < benches);
-    for dragon in stage.dragons.iter() {
-        if let Some(bench) = of(dragon.first_handle, dragon.benches) {
-            let name = bench_name(bench, dragon.benches);
-            let dragon = dragon.name.as_str();
-            return if dragon.is_empty() { name } else { format!("{name} of {dragon}") };
-        }
+    if let Some((dragon, bench)) = stage.owner(number) {
+        let (name, dragon) = (bench_name(bench, dragon.benches), dragon.name.as_str());
+        return if dragon.is_empty() { name } else { format!("{name} of {dragon}") };
     }
     // Before the stage has come, only the head is known by its number.
     let Some(obstacle) = obstacle_number(stage, number) else { return bench_name(number, NO_BENCH) };
@@ -97,8 +93,12 @@ pub fn name_in(stage: &Stage, number: u32) -> String {
 /// Returns the name of the obstacle that an alert is about: that of its event, or else the nearest one; `None` if it is
 /// about boards alone.
 pub fn obstacle_in<'a>(stage: &'a Stage, alert: &CollisionAlert) -> Option<&'a str> {
-    let of = |number: u32| stage.obstacles.get(obstacle_number(stage, number)? as usize);
-    of(alert.event_bench_b).or_else(|| of(alert.bench_b)).map(|obstacle| obstacle.name.as_str())
+    obstacle_name(stage, alert.event_bench_b).or_else(|| obstacle_name(stage, alert.bench_b))
+}
+
+/// Returns the name of the obstacle of a number that follows the handles; `None` for a bench.
+pub fn obstacle_name(stage: &Stage, number: u32) -> Option<&str> {
+    Some(stage.obstacles.get(obstacle_number(stage, number)? as usize)?.name.as_str())
 }
 
 /// Returns the number of an obstacle, from 0, of a number that follows the handles.
