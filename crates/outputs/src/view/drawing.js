@@ -77,7 +77,8 @@ export function pathOf({ path: segments }, reach) {
 
 /** The obstacles of a stage, each with its shape in metres, its keep-out, its name and a place on its outline. */
 export function obstaclesOf({ obstacles }) {
-  return obstacles.filter(({ outline }) => outline.length).map(({ name, kind, keep_out, outline }) => {
+  const drawn = obstacles.filter(({ outline }) => outline.length);
+  return drawn.map(({ name, kind, keep_out, outline }) => {
     const shape = new Path2D(), { x, y, heading, curvature } = outline[0], last = outline.at(-1);
     if (kind === "circle") shape.arc(x - Math.sin(heading) / curvature, y + Math.cos(heading) / curvature, 1 / curvature, 0, 2 * Math.PI);
     else {
@@ -85,23 +86,55 @@ export function obstaclesOf({ obstacles }) {
       if (kind === "line") shape.lineTo(last.x + last.length * Math.cos(last.heading), last.y + last.length * Math.sin(last.heading));
       else shape.closePath();
     }
-    return { shape, name, keepOut: keep_out, isFull: kind === "circle" || kind === "polygon", isBoundary: kind === "boundary", x, y };
+    return { shape, rim: rimOf(kind, outline, keep_out), name, keepOut: keep_out, isFull: kind === "circle" || kind === "polygon", isBoundary: kind === "boundary", x, y };
   });
 }
 
-/** The obstacles on the ground: the keep-out as a pale band about the outline. */
-function paintObstacles(context, palette, pixel, obstacles) {
+/** The dashes around a keep-out, pixels. */
+const KEEP_OUT_DASHES = [7, 5];
+
+/** The outline of a keep-out: those of its sides one over the other, of which the band covers the inner parts. */
+function rimOf(kind, outline, keepOut) {
+  const rim = new Path2D(), quarter = Math.PI / 2;
+  for (const { x, y, heading, length, curvature } of outline) {
+    const c = Math.cos(heading), s = Math.sin(heading);
+    if (kind === "circle") {
+      rim.arc(x - s / curvature, y + c / curvature, 1 / curvature + keepOut, 0, 2 * Math.PI);
+      continue;
+    }
+    const [endX, endY] = [x + length * c, y + length * s];
+    rim.moveTo(x + keepOut * s, y - keepOut * c);
+    rim.arc(endX, endY, keepOut, heading - quarter, heading + quarter);
+    rim.arc(x, y, keepOut, heading + quarter, heading + 3 * quarter);
+    rim.closePath();
+  }
+  return rim;
+}
+
+/** The obstacles on the ground: each keep-out is a pale band about the outline, with dashes around all of them. */
+function paintObstacles(context, palette, pixel, obstacles, transparent) {
+  const kept = obstacles.filter(({ keepOut }) => keepOut > 0);
   context.lineJoin = context.lineCap = "round";
+  Object.assign(context, { strokeStyle: palette.ink, lineWidth: 2 * pixel, globalAlpha: 0.6 });
+  context.setLineDash(KEEP_OUT_DASHES.map((dash) => dash * pixel));
+  for (const { rim } of kept) context.stroke(rim);
   context.setLineDash([]);
-  for (const { shape, keepOut, isFull } of obstacles) {
-    context.strokeStyle = context.fillStyle = palette.faint;
-    context.globalAlpha = 0.25;
-    context.lineWidth = 2 * keepOut;
-    if (keepOut > 0) context.stroke(shape);
-    context.globalAlpha = 1;
+  const bands = (colour, alpha) => {
+    Object.assign(context, { strokeStyle: colour, globalAlpha: alpha });
+    for (const { shape, keepOut } of kept) {
+      context.lineWidth = 2 * keepOut;
+      context.stroke(shape);
+    }
+  };
+  if (transparent) context.globalCompositeOperation = "destination-out";
+  bands(palette.ground, 1);
+  context.globalCompositeOperation = "source-over";
+  bands(palette.faint, 0.25);
+  context.globalAlpha = 1;
+  context.fillStyle = palette.faint;
+  Object.assign(context, { strokeStyle: palette.ink, lineWidth: 1.5 * pixel });
+  for (const { shape, isFull } of obstacles) {
     if (isFull) context.fill(shape);
-    context.strokeStyle = palette.ink;
-    context.lineWidth = 1.5 * pixel;
     context.stroke(shape);
   }
   context.lineJoin = "miter";
@@ -193,7 +226,7 @@ export class Ground {
     context.fillStyle = palette.ground;
     if (!this.transparent) context.fillRect(0, 0, width, height);
     metres();
-    for (const { obstacles } of this.paths) paintObstacles(context, palette, pixel, obstacles);
+    for (const { obstacles } of this.paths) paintObstacles(context, palette, pixel, obstacles, this.transparent);
     context.lineWidth = 1.2 * pixel;
     context.strokeStyle = palette.faint;
     for (const { lines, dashes } of this.paths) {
