@@ -15,6 +15,7 @@ pub mod control;
 pub mod draw;
 pub mod events;
 mod lines;
+mod log_lines;
 pub mod metrics;
 mod new_file;
 pub mod plan;

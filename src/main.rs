@@ -51,7 +51,7 @@ pub enum Command {
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
     Trade(commands::trade::TradeArguments),
-    /// Plan a choreography: the least pitch, the greatest speed
+    /// Plan a choreography: the least pitch, the least turn radius, the greatest speed
     Plan(commands::plan::PlanArguments),
     /// Soak-test: publish for hours to real subscriber processes and give a verdict
     Soak(commands::soak::SoakArguments),

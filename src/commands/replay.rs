@@ -1,6 +1,6 @@
 //! `replay`: plays a recording like a live publisher.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
@@ -29,7 +29,7 @@ const MOST_CUES: usize = 1000;
 /// Arguments of `replay`.
 #[derive(Debug, clap::Args)]
 pub struct ReplayArguments {
-    /// The recording (MCAP) to play, or the directory in which `ros2 bag record` wrote one
+    /// The recording (MCAP) to play, or the directory that `ros2 bag record` wrote
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Send the frames evenly at this rate, in place of at their recorded times
@@ -73,10 +73,9 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     scene.ros2.iter_mut().for_each(|settings| settings.control = false);
     arguments.use_sim_time.apply(scene.ros2.as_mut())?;
     service_name(common.name(), "poses")?;
-    let file = recording_in(&arguments.file)?;
-    let shown = file.display().to_string();
+    let shown = arguments.file.display().to_string();
     let refused = |error: ReadError| CommandError::BadInput(format!("{shown}: {error}"));
-    let prepared = Prepared::open(&file, options).map_err(refused)?;
+    let prepared = Prepared::open(&arguments.file, options).map_err(refused)?;
     let rate = Accepted::RATE.check("the rate of the replay", prepared.rate()).map_err(|sentence| {
         CommandError::BadInput(format!("{shown}: {sentence}: choose another --rate or --time-scale"))
     })?;
@@ -146,34 +145,6 @@ impl ReplayArguments {
             return Err(CommandError::BadInput(format!("--start is {}, expected simulated seconds", number(start))));
         }
         Ok(ReplayOptions { pace, start: self.start, looping: self.looping })
-    }
-}
-
-/// Returns the recording of a bag's directory; any other path as it is.
-///
-/// # Errors
-/// Bad input: the directory has no recording, or several.
-fn recording_in(path: &Path) -> Result<PathBuf, CommandError> {
-    if !path.is_dir() {
-        return Ok(path.to_owned());
-    }
-    let shown = path.display();
-    let refused = |found: &str| {
-        CommandError::BadInput(format!(
-            "{shown}: {found}, expected a directory with one recording (.mcap), or a recording"
-        ))
-    };
-    let entries = std::fs::read_dir(path).map_err(|error| refused(&error.to_string()))?;
-    let files = entries.flatten().map(|entry| entry.path());
-    let mut files: Vec<_> = files.filter(|file| file.extension().is_some_and(|ending| ending == "mcap")).collect();
-    files.sort_unstable();
-    match files.pop() {
-        None => Err(refused("no file of this directory ends in .mcap")),
-        Some(file) if files.is_empty() => Ok(file),
-        Some(last) => {
-            let (first, last, count) = (files[0].display(), last.display(), files.len() + 1);
-            Err(refused(&format!("this directory has {count} recordings, {first} to {last}")))
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The process that publishes a show on ROS 2 for `run` and `replay`: `send ros2`, started, restarted and ended here.
 //!
-//! The loop's process loads no DDS. A thread starts the process, restarts a process that ended, and ends it with the
-//! show.
+//! The loop's process loads no DDS. A thread starts the process, restarts a process that ended, sends it the lines of this
+//! program's log, and ends it with the show.
 
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader};
@@ -18,6 +18,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 
+use super::log_lines::LogSender;
 use super::{CommandError, Common};
 
 /// The interval of tests that the process runs.
@@ -83,6 +84,7 @@ impl Ros2Request {
         arguments.extend(settings.control.then(|| "--control".into()));
         arguments.push(format!("--use-sim-time={}", settings.stamps == StampClock::Sim).into());
         arguments.extend(["--end-with-parent".into(), std::process::id().to_string().into()]);
+        arguments.push("--log-on-stdin".into());
         Ok(Self { description, arguments })
     }
 }
@@ -205,18 +207,20 @@ impl Supervisor {
     fn run_once(&self) -> io::Result<(ExitStatus, Option<TransportCounters>)> {
         let mut command = Command::new(std::env::current_exe()?);
         // In a process group of its own: Ctrl-C on the terminal ends the show, which then ends this process.
-        command.args(&self.arguments).stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
+        command.args(&self.arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
         let mut child = command.spawn()?;
         let (output, connected) = (child.stdout.take(), Arc::clone(&self.connected));
         let reader = std::thread::spawn(move || read_lines(output, &connected));
-        let status = self.wait(&mut child)?;
+        let log = child.stdin.take().map(LogSender::new).transpose()?;
+        let status = self.wait(&mut child, log)?;
         Ok((status, reader.join().ok().flatten()))
     }
 
     /// Waits until the process ends, by itself or after the end of the show.
-    fn wait(&self, child: &mut Child) -> io::Result<ExitStatus> {
+    fn wait(&self, child: &mut Child, mut log: Option<LogSender>) -> io::Result<ExitStatus> {
         let mut killed_at = None;
         loop {
+            log.iter_mut().for_each(LogSender::send);
             if let Some(status) = child.try_wait()? {
                 return Ok(status);
             }

@@ -92,6 +92,9 @@ struct Ros2Arguments {
     control: bool,
     #[command(flatten)]
     use_sim_time: UseSimTime,
+    /// Publish the log lines of the process that started this one, from standard input
+    #[arg(long, hide = true)]
+    log_on_stdin: bool,
     #[command(flatten)]
     parent: Parent,
 }

@@ -5,7 +5,9 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::Path;
 use std::process::{Command, Output};
 
-use crate::harness::{Process, can_run, root, text};
+use nix::sys::signal::Signal;
+
+use crate::harness::{Process, can_run, root, text, wait_until};
 
 const SCENE: &str = "tests/scenes/missed_contact.toml";
 
@@ -115,4 +117,28 @@ fn a_full_disk_leaves_the_earlier_file() {
     });
     mount(&["umount", "--lazy", disk]);
     checked.unwrap();
+}
+
+/// A command that is ended leaves neither a part of its file nor a file beside it.
+#[test]
+fn an_ended_command_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("proof.jsonl");
+    std::fs::write(&file, "earlier").unwrap();
+    for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGKILL] {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        // Its proof would take minutes.
+        program.args(["--scene", "tests/scenes/x5.toml", "events", "--certify"]).arg(&file);
+        let child = Process::start(&mut program);
+        // The bytes that it has written, by the system's account.
+        let written = || {
+            let counts = std::fs::read_to_string(format!("/proc/{}/io", child.id())).unwrap();
+            counts.lines().find_map(|line| line.strip_prefix("wchar: ")?.parse::<u64>().ok()).unwrap()
+        };
+        wait_until("a part of a certificate", || written() > 100_000);
+        child.signal(signal);
+        assert!(!child.output_within(60).status.success(), "{signal}");
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "earlier", "{signal}");
+        assert_eq!(names(folder.path()), ["proof.jsonl"], "{signal}");
+    }
 }

@@ -312,3 +312,28 @@ fn changed_certificates_of_other_questions_are_refused() {
         }
     }
 }
+
+/// A handle's speed beyond the path's end is none of the scene: the last segment goes on as its curve does.
+#[test]
+fn a_speed_beyond_the_end_of_the_path_is_refused() {
+    let text = "[team]\nbenches = 3\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\
+                [motion]\nhead_speed = 1.0\n[path]\nkind = \"pieces\"\npieces = [\
+                { kind = \"arc\", radius = 1.5, side = \"left\", turns = 0.3 }, { kind = \"line\", length = 2.0 }]\n";
+    let scene = Scene::parse(text, "route", "route").unwrap();
+    let timeline = scene.motion.timeline(&mut |_| ());
+    let lines = written(|write| {
+        certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, write, &mut |_| ()).unwrap().unwrap();
+    });
+    let lines = String::from_utf8(lines).unwrap();
+    verify(lines.as_bytes(), &mut |_| ()).unwrap();
+    let shorter = lines.replace("length = 2.0", "length = 0.01");
+    assert_ne!(shorter, lines);
+    let until: serde_json::Value = serde_json::from_str(lines.lines().last().unwrap()).unwrap();
+    let shorter = shorter.replace(&format!("\"time_until\":{}", until["time_until"]), "\"time_until\":2.0");
+    let refused = verify(shorter.as_bytes(), &mut |_| ()).unwrap_err().to_string();
+    assert!(refused.contains("beyond the end of the path"), "{refused}");
+    // Nor is one after the time up to which the claim holds.
+    let sooner = lines.replace(&format!("\"time_until\":{}", until["time_until"]), "\"time_until\":3.0");
+    let refused = verify(sooner.as_bytes(), &mut |_| ()).unwrap_err().to_string();
+    assert!(refused.contains("ratio_lo of this handle does not follow"), "{refused}");
+}

@@ -2,17 +2,20 @@
 
     second_judge.py [--places N] [--seed S] CERTIFICATE...
 
-Of a certificate of `events --certify` it checks each event at both ends of its enclosure; at N random times of the
-stretches that are said to be clear, or to move forward, all boards and links; in N random steps that the spans contain
-the handles. If there is a file CERTIFICATE.clearance with the output of `check --prove --json`, it checks the least
-clearance at those times too. Path and chain are built as docs/proofs.md defines them: a follower is the first point
-backward along the path at the distance of the link, enclosed in numbers of 192 bits.
+Of a certificate of events it checks each event at both ends of its enclosure, first touches of obstacles among them; at
+N random times of the stretches that are said to be clear, or to move forward, all boards, links and obstacles. Of one
+of the least clearance it checks all boards at N random times and at N times near the least, and the two nearest; of one of
+the greatest speed the speeds of all handles at N random times, and the fastest; of one of the least pitch N random
+pitches that are said to end with an overlap or a lock, and N places of the head with the pitch that is free. In N
+random steps of each it checks that the spans contain the handles. Path and chain are built as docs/proofs.md defines them: a
+follower is the first point backward along the path at the distance of the link, enclosed in numbers of 192 bits.
 
 Prints a JSON object for each file: `refused` and `undecided`, a sentence or null, and the numbers of what was checked,
 with the random places that were undecided.
 """
 
 import argparse
+import copy
 import json
 import math
 import random
@@ -24,9 +27,14 @@ from flint import arb, ctx
 
 ctx.prec = 192
 PI = arb.pi()
-# Lines of a certificate that are not checked here, by name: any other unknown line is refused.
-NOT_JUDGED = frozenset()
 EVENTS = ("contact", "stall", "lock", "path_end")
+# Lines of the certificates of each question, beside the first: any other line is refused.
+LINES = {
+    "events": ("step", "result", "reached", *EVENTS),
+    "least_clearance": ("step", "near", "contact", "path_end", "least_clearance"),
+    "greatest_speed": ("speeds", "fast", "greatest_speed"),
+    "least_pitch": ("reach", "overlap", "head_locks", "far", "step", "least_pitch"),
+}
 # The most points of the path that are looked at for one follower.
 MOST_POINTS = 3000
 
@@ -152,9 +160,15 @@ class Scene:
         head, body = number(team, "head_length") - 2 * self.inset, number(team, "body_length") - 2 * self.inset
         self.links = [head] + [body] * (self.benches - 1)
         self.speed = number(motion, "head_speed")
-        self.stops_at_contact = motion.get("on_contact", "stop") == "stop"
+        self.obstacles = obstacles(file)
         # Sets the segments, the head's place at the start, and the metres from there to the path's end.
         getattr(self, path["kind"])(path, number)
+
+    def on_spiral(self, pitch):
+        """Returns the team on the inward spiral of a pitch, with no end but the centre."""
+        other = copy.copy(self)
+        other.segments, other.start = [Spiral(pitch / (2 * PI), True, None, arb(0))], None
+        return other
 
     def spiral(self, path, number):
         spiral = Spiral(number(path, "pitch") / (2 * PI), True, None, arb(0))
@@ -226,6 +240,16 @@ class Scene:
                 raise Undecided("a place beside a junction")
             left -= length
         raise Refused("the place is beyond the path")
+
+    def travelled(self, place):
+        """Returns the metres of path from the start to a place."""
+        so_far, begin = arb(0), self.start[1]
+        for number in range(place[0]):
+            curve = self.segments[number]
+            so_far += curve.metres(curve.end) - curve.metres(begin)
+            begin = self.segments[number + 1].begin
+        curve = self.segments[place[0]]
+        return so_far + curve.metres(place[1]) - curve.metres(begin)
 
     def point(self, place):
         return self.segments[place[0]].point(place[1])
@@ -402,10 +426,118 @@ def pairs(boards, distance=0.0):
                 yield i, j
 
 
+class Obstacle:
+    """A shape in the path's coordinates: its points, its sides, and the distance that boards keep."""
+
+    def __init__(self, kind, points, distance):
+        self.kind, self.points, self.distance = kind, points, distance
+        closed = kind in ("polygon", "boundary")
+        self.sides = [] if kind == "circle" else list(zip(points, points[1:] + points[:1] if closed else points[1:]))
+
+    def is_inside(self, point):
+        """Returns true if a point is inside the polygon: its crossings with a ray along x, counted."""
+        inside = False
+        for one, other in self.sides:
+            heights = (one[1] - point[1], other[1] - point[1])
+            require_decided(all(height > 0 or height < 0 for height in heights))
+            if (heights[0] > 0) != (heights[1] > 0):
+                left = cross(sub(other, one), sub(point, one)) * (1 if heights[1] > 0 else -1)
+                require_decided(left > 0 or left < 0)
+                inside ^= bool(left > 0)
+        return inside
+
+    def is_avoided(self, board):
+        """Returns true if a board is certainly further away than the distance, and on the right side."""
+        if self.kind == "circle":
+            return is_far(board, [self.points[0]], self.distance)
+        if not all(is_far(board, list(side), self.distance) for side in self.sides):
+            return False
+        return self.kind == "line" or self.is_inside(board[0]) == (self.kind == "boundary")
+
+    def is_reached(self, board):
+        """Returns true if a board is certainly no further away than the distance, or on the wrong side."""
+        for shape in [[self.points[0]]] if self.kind == "circle" else map(list, self.sides):
+            if distance_of_corners(board, shape) <= self.distance or is_crossed(board, shape):
+                return True
+        if self.kind in ("polygon", "boundary"):
+            return any(self.is_inside(corner) == (self.kind == "polygon") for corner in board)
+        return is_inside(self.points[0], board)
+
+
+def obstacles(file):
+    """Returns the obstacles of a scene, the boundary last."""
+    stage, placement = file.get("stage", {}), file.get("placement", {})
+    origin = [arb(float(c)) for c in placement.get("origin", [0.0, 0.0])]
+    turn = -2 * PI * arb(float(placement.get("rotation_turns", 0.0)))
+    mirror = -1 if placement.get("mirror", False) else 1
+
+    def own(point):
+        x, y = (arb(float(point[k])) - origin[k] for k in (0, 1))
+        return x * turn.cos() - y * turn.sin(), (x * turn.sin() + y * turn.cos()) * mirror
+
+    found = []
+    for shape in stage.get("obstacles", []):
+        keep_out = arb(float(shape.get("keep_out", 0.0)))
+        if "circle" in shape:
+            circle = shape["circle"]
+            found.append(Obstacle("circle", [own(circle["center"])], keep_out + arb(float(circle["radius"]))))
+        else:
+            kind = "polygon" if "polygon" in shape else "line"
+            found.append(Obstacle(kind, [own(point) for point in shape[kind]], keep_out))
+    if "boundary" in stage:
+        keep_out = arb(float(stage["boundary"].get("keep_out", 0.0)))
+        found.append(Obstacle("boundary", [own(point) for point in stage["boundary"]["polygon"]], keep_out))
+    return found
+
+
+def require_decided(condition):
+    if not condition:
+        raise Undecided("the side of a point")
+
+
+def distance_to(point, one, other):
+    """Returns the distance of a point from a side, enclosed."""
+    side, to = sub(other, one), sub(point, one)
+    square = dot(side, side)
+    share = (dot(to, side) / square).max(arb(0)).min(arb(1)) if square > 0 else arb(0)
+    rest = tuple(to[k] - share * side[k] for k in (0, 1))
+    return dot(rest, rest).nonnegative_part().sqrt()
+
+
+def distance_of_corners(board, shape):
+    """Returns the least distance of the corners of each from the sides of the other: a point, or a side."""
+    sides = list(zip(board, board[1:] + board[:1]))
+    distances = [distance_to(point, *side) for point in shape for side in sides]
+    return least(distances + [distance_to(corner, shape[0], shape[-1]) for corner in board])
+
+
+def is_far(board, shape, distance):
+    """Returns true if a point or a side is certainly further from a board than a distance."""
+    normals = [sub(board[1], board[0]), sub(board[2], board[1])]
+    if len(shape) == 2:
+        side = sub(shape[1], shape[0])
+        normals.append((side[1], -side[0]))
+    for normal in normals:
+        ours, theirs = ([dot(normal, point) for point in points] for points in (board, shape))
+        if all(a < b for a in ours for b in theirs) or all(a > b for a in ours for b in theirs):
+            return bool(distance_of_corners(board, shape) > distance)
+    return False
+
+
+def is_crossed(board, shape):
+    """Returns true if a side certainly crosses a side of a board."""
+    if len(shape) == 1:
+        return False
+    sides = zip(board, board[1:] + board[:1])
+    apart = lambda a, b, p, q: cross(sub(b, a), sub(p, a)) * cross(sub(b, a), sub(q, a)) < 0
+    return any(apart(*shape, one, other) and apart(one, other, *shape) for one, other in sides)
+
+
 class Judge:
     def __init__(self, scene, seed):
         self.scene, self.random = scene, random.Random(seed)
-        self.counts = {"places": 0, "undecided": 0, "spans": 0, "events": 0, "pairs": 0, "clearances": 0}
+        names = ("places", "undecided", "spans", "events", "pairs", "clearances", "speeds", "pitches", "obstacles")
+        self.counts = dict.fromkeys(names, 0)
 
     def check_apart(self, time, boards):
         for i, j in pairs(boards):
@@ -494,25 +626,119 @@ class Judge:
         is_there = end > result["time_lo"] and end < result["time_hi"] or end.overlaps(arb(result["time_lo"]))
         require(is_there, f"the path ends at {float(end.mid())} s")
 
-    def least_clearance(self, claim, until, number):
+    def obstacle(self, result):
+        lo, hi, bench = result["time_lo"], result["time_hi"], result["bench_a"]
+        require(bench < self.scene.benches, f"there is no bench {bench}")
+        shape = self.scene.obstacles[result["obstacle"]]
+        if lo > 0:
+            self.check_avoided(lo, self.scene.boards(self.at(lo)), result["obstacle"])
+        board = self.scene.boards(self.scene.chain(self.scene.place(hi), bench + 2))[bench]
+        require(shape.is_reached(board), f"bench {bench} is not at obstacle {result['obstacle']} at t = {hi} s")
+
+    def check_avoided(self, time, boards, obstacle):
+        for bench, board in enumerate(boards):
+            self.counts["obstacles"] += 1
+            avoided = self.scene.obstacles[obstacle].is_avoided(board)
+            require(avoided, f"bench {bench} is not clear of obstacle {obstacle} at t = {time} s")
+
+    def least_clearance(self, claim, near, until, number):
         """Checks that no two boards are nearer than claimed, and that two are as near."""
-        lo, hi, time = (claim[key] for key in ("least_clearance_lo", "least_clearance_hi", "time"))
-        near = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
-        for at in near + [self.random.uniform(0, until) for _ in range(number)]:
-            boards = self.scene.boards(self.at(at))
+        scene, lo = self.scene, claim["lo"]
+        time = float((scene.travelled(read_place(near["at"][0])) / scene.speed).mid()) if near else until
+        around = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+        for at in around + [self.random.uniform(0, until) for _ in range(number)] if lo is not None else []:
+            try:
+                boards = scene.boards(self.at(at))
+            except Undecided:
+                self.counts["undecided"] += 1
+                continue
+            self.counts["places"] += 1
             for i, j in pairs(boards, max(lo, 0.0)):
                 self.counts["pairs"] += 1
-                require(clearance(boards[i], boards[j]) >= lo, f"benches {i} and {j} are nearer than {lo} m at t = {at} s")
-        # The time is that of the ordinary search, rounded to a double.
-        boards = self.scene.boards(self.at(time))
-        nearest = clearance(boards[claim["bench_a"]], boards[claim["bench_b"]])
-        is_least = nearest > lo - 1e-9 and nearest < hi + 1e-9
-        require(is_least, f"the clearance is {float(nearest)} m at t = {time} s, expected {lo} to {hi} m")
+                nearest = clearance(boards[i], boards[j])
+                require(nearest >= lo, f"benches {i} and {j} are nearer than {lo} m at t = {at} s")
+        if claim["until"] != "contact" and claim["hi"] is not None:
+            i, j = claim["bench_a"], claim["bench_b"]
+            boards = scene.boards(scene.chain(read_place(near["at"][0]), j + 2))
+            nearest = clearance(boards[i], boards[j])
+            # The steps have come there.
+            require(lo is None or nearest >= lo, f"benches {i} and {j} are nearer than {lo} m")
+            require(nearest <= claim["hi"], f"benches {i} and {j} are {float(nearest)} m apart, not {claim['hi']} m")
         self.counts["clearances"] += 1
 
-    def random_places(self, number, until, clear, moving):
-        """Checks that boards are apart and links hold at random times."""
-        ends = {"clear": clear, "moving": moving}
+    def ratios(self, places):
+        """Returns the speeds of all handles, with the head's as 1."""
+        ratios = [arb(1)]
+        for front, rear in zip(places, places[1:]):
+            forward, behind = self.scene.products(front, rear)
+            ratios.append(ratios[-1] * forward / behind)
+        return ratios
+
+    def greatest_speed(self, claim, fast, number):
+        """Checks that no handle is faster than claimed, and that one is as fast."""
+        limit, value_lo, value_hi, ratio_lo, ratio_hi = (
+            arb(claim[key]) for key in ("limit", "value_lo", "value_hi", "ratio_lo", "ratio_hi")
+        )
+        require(value_lo * ratio_hi <= limit and limit <= value_hi * ratio_lo, "the speeds are not those of the ratios")
+        for _ in range(2 * number):
+            time = self.random.uniform(0, claim["time_until"])
+            try:
+                ratios = self.ratios(self.at(time))
+            except Undecided:
+                self.counts["undecided"] += 1
+                continue
+            self.counts["places"] += 1
+            for handle, ratio in enumerate(ratios):
+                self.counts["speeds"] += 1
+                require(abs(ratio) <= ratio_hi, f"handle {handle} is faster than {claim['ratio_hi']} at t = {time} s")
+        if claim["handle"] > 0:
+            head = read_place(fast["at"][0])
+            travelled = self.scene.travelled(head)
+            require(travelled >= 0 and travelled <= self.scene.length, "the fastest place is not in the motion")
+            ratio = self.ratios(self.scene.chain(head, claim["handle"] + 1))[claim["handle"]]
+            require(abs(ratio) >= ratio_lo, f"handle {claim['handle']} is slower than {claim['ratio_lo']}")
+
+    def least_pitch(self, claim, lines, number):
+        """Checks random pitches that do not reach the radius, and the one that does."""
+        reach, far = (next((line for line in lines if line["type"] == kind), None) for kind in ("reach", "far"))
+        intervals = [line for line in lines if line["type"] in ("overlap", "head_locks")]
+        require((claim["radius"], claim["from"]) == (reach["radius"], reach["from"]), "the question is another")
+        ends = [claim["from"], *(line["to"] for line in intervals)]
+        require(ends[:-1] == [line["from"] for line in intervals], "a gap between the pitches")
+        require(claim["value_lo"] is None or claim["value_lo"] <= ends[-1], "value_lo is beyond the last pitch")
+        for line in self.random.sample(intervals, min(2 * number, len(intervals))):
+            pitch = line["from"] + self.random.random() * (line["to"] - line["from"])
+            scene = self.scene.on_spiral(arb(pitch))
+            a = scene.segments[0].a
+            self.counts["pitches"] += 1
+            if line["type"] == "overlap":
+                i, j = line["benches"]
+                require(j > i + 1 and a * line["theta"] >= claim["radius"], f"no overlap before with pitch {pitch} m")
+                boards = scene.boards(scene.chain((0, arb(line["theta"])), j + 2))
+                require(overlap(boards[i], boards[j]), f"benches {i} and {j} do not overlap with pitch {pitch} m")
+            else:
+                # The follower has come from half a turn or less behind.
+                head = arb(claim["radius"]) / a
+                _, behind = scene.follower((0, head), scene.links[0])
+                require(behind - head > 1.5 * PI, f"the head does not lock with pitch {pitch} m")
+        if claim["value_hi"] is None:
+            return
+        require(far is not None and far["pitch"] == claim["value_hi"], "the free pitch is another")
+        judge = copy.copy(self)
+        judge.scene = scene = self.scene.on_spiral(arb(claim["value_hi"]))
+        for share in [self.random.uniform(0, 1.2) for _ in range(number)] + [0.0]:
+            radius = claim["radius"] + share * max(far["radius"] - claim["radius"], 0.0)
+            places = scene.chain((0, arb(radius) / scene.segments[0].a), scene.benches + 1)
+            what = f"with pitch {claim['value_hi']} m and the head at {radius} m"
+            self.counts["places"] += 1
+            judge.check_links(what, places, moving=False)
+            judge.check_apart(what, scene.boards(places))
+        steps = [line for line in lines if line["type"] == "step"]
+        for line in self.random.sample(steps, min(number, len(steps))):
+            judge.span(line)
+
+    def random_places(self, number, until, ends):
+        """Checks at random times, up to the end of each claim, boards, links and obstacles."""
         for _ in range(number):
             for claim, end in ends.items():
                 # Boards may overlap from the start.
@@ -525,9 +751,11 @@ class Judge:
                     self.counts["undecided"] += 1
                     continue
                 self.counts["places"] += 1
-                self.check_links(time, places, moving=time < moving)
-                if claim == "clear":
+                self.check_links(time, places, moving=time < ends["stall"])
+                if claim == "contact":
                     self.check_apart(time, self.scene.boards(places))
+                elif claim != "stall":
+                    self.check_avoided(time, self.scene.boards(places), claim)
 
     def span(self, line):
         """Checks that the spans of a step contain the chain at a random place of the head."""
@@ -555,44 +783,64 @@ def read_place(place):
     return place[0], sum(map(arb, place[1:]), arb(0))
 
 
-def judged(lines, claim, places, seed):
+def judged(lines, places, seed):
     first = json.loads(lines[0])
     require(first.get("type") == "certificate" and first.get("format") == 2, "no certificate of format 2")
+    about = first.get("about", "events")
     judge = Judge(Scene(first["scene"]), seed)
-    results, steps = {}, []
-    for number, text in enumerate(lines[1:], 2):
-        line = json.loads(text)
-        if line["type"] == "result":
-            require(line["event"] in EVENTS, f"line {number}: a result about {line['event']}, expected {EVENTS}")
-            results[line["event"]] = line
-        elif line["type"] == "step":
-            steps.append(line)
-        else:
-            known = line["type"] in EVENTS or line["type"] in NOT_JUDGED
-            require(known, f"line {number} is a {line['type']}, of which nothing is known here")
-    require(tuple(results) == EVENTS, f"results about {list(results)}, expected {EVENTS}")
-    scene = judge.scene
-    until = float((scene.length / scene.speed).mid()) * (1 - 1e-12)
-    if results["lock"]["status"] == "proved":
-        until = min(until, results["lock"]["time_lo"])
-    ends = {}
-    for event in EVENTS:
-        result = results[event]
-        status = result["status"]
-        if status == "proved":
-            require(result["time_lo"] <= result["time_hi"], f"{event}: the times are not in order")
-            getattr(judge, event)(result)
-            judge.counts["events"] += 1
-        ends[event] = until if status == "none" and "time_lo" not in result else result.get("time_lo") or 0.0
-    if results["lock"]["status"] == "undecided":
-        until = min(until, ends["lock"])
-    judge.random_places(places, until, ends["contact"], ends["stall"])
+    lines = [json.loads(text) for text in lines[1:]]
+    for number, line in enumerate(lines, 2):
+        require(line["type"] in LINES[about], f"line {number} is a {line['type']}, of which nothing is known here")
+    if about == "events":
+        judged_events(judge, lines, places)
+        return judge.counts
+    claim = lines[-1]
+    require(claim["type"] == about, f"the last line is a {claim['type']}")
+    if about == "least_pitch":
+        judge.least_pitch(claim, lines, places)
+        return judge.counts
+    found = {line["type"]: line for line in lines}
+    if about == "greatest_speed":
+        judge.greatest_speed(claim, found.get("fast"), places)
+    else:
+        scene = judge.scene
+        until = claim["time_until"] if claim["until"] == "time" else float((scene.length / scene.speed).mid())
+        if claim["until"] == "contact":
+            until, (i, j) = found["contact"]["to"], found["contact"]["benches"]
+            boards = scene.boards(scene.chain(read_place(until), j + 2))
+            require((i, j) == (claim["bench_a"], claim["bench_b"]) and overlap(boards[i], boards[j]), "no contact")
+            until = float((scene.travelled(read_place(until)) / scene.speed).mid())
+        judge.least_clearance(claim, found.get("near"), until * (1 - 1e-9), places)
+    steps = [line for line in lines if line["type"] in ("step", "speeds")]
     for line in judge.random.sample(steps, min(places, len(steps))):
         judge.span(line)
-    if claim is not None and claim["least_clearance_status"] == "proved":
-        stop = min(until, ends["contact"]) if scene.stops_at_contact else until
-        judge.least_clearance(claim, stop, places)
     return judge.counts
+
+
+def judged_events(judge, lines, places):
+    results = [line for line in lines if line["type"] == "result"]
+    steps = [line for line in lines if line["type"] == "step"]
+    kinds = [result.get("obstacle", result["event"]) for result in results]
+    expected = [*EVENTS, *range(len(judge.scene.obstacles))]
+    require(kinds == expected, f"results about {kinds}, expected {expected}")
+    of = dict(zip(kinds, results))
+    scene = judge.scene
+    until = float((scene.length / scene.speed).mid()) * (1 - 1e-12)
+    if of["lock"]["status"] == "proved":
+        until = min(until, of["lock"]["time_lo"])
+    ends = {}
+    for kind, result in of.items():
+        status = result["status"]
+        if status == "proved":
+            require(result["time_lo"] <= result["time_hi"], f"{kind}: the times are not in order")
+            getattr(judge, result["event"])(result)
+            judge.counts["events"] += 1
+        ends[kind] = until if status == "none" and "time_lo" not in result else result.get("time_lo") or 0.0
+    if of["lock"]["status"] == "undecided":
+        until = min(until, ends["lock"])
+    judge.random_places(places, until, {kind: end for kind, end in ends.items() if kind not in ("lock", "path_end")})
+    for line in judge.random.sample(steps, min(places, len(steps))):
+        judge.span(line)
 
 
 def main():
@@ -604,9 +852,7 @@ def main():
     for file in arguments.certificates:
         counts, refused, undecided = None, None, None
         try:
-            claim = Path(f"{file}.clearance")
-            claim = json.loads(claim.read_text()) if claim.exists() else None
-            counts = judged(Path(file).read_text().splitlines(), claim, arguments.places, arguments.seed)
+            counts = judged(Path(file).read_text().splitlines(), arguments.places, arguments.seed)
         except Refused as error:
             refused = str(error)
         except Undecided as error:

@@ -4,7 +4,9 @@
 
 use crate::harness;
 
+use std::collections::BTreeSet;
 use std::net::UdpSocket;
+use std::path::PathBuf;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -179,11 +181,23 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
     assert_eq!(text(&output.stderr).matches("restarted").count(), 3, "{}", text(&output.stderr));
 }
 
+/// Returns the open files of a process that belong to a node of iceoryx2.
+fn files_of_nodes(process: u32) -> BTreeSet<PathBuf> {
+    let files = std::fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
+    let targets = files.filter_map(|file| std::fs::read_link(file.path()).ok());
+    targets.filter(|target| target.components().any(|part| part.as_os_str() == "nodes")).collect()
+}
+
 #[test]
-fn the_process_of_ros_2_ends_with_a_killed_publisher() {
+fn the_process_of_ros_2_inherits_no_files_and_ends_with_a_killed_publisher() {
     let publisher = Process::start(program("killed_parent").args(["run", "--ros2"]));
     let child = ros2_of(&publisher);
     wait_until("the show runs", || control("killed_parent", &["state"]).0 == 0);
+    let of_publisher = files_of_nodes(publisher.id());
+    assert!(!of_publisher.is_empty(), "a publisher keeps files of its node open");
+    assert!(!files_of_nodes(child).is_empty());
+    // A process may look at a file of another one's node for a moment.
+    wait_until("no file is inherited", || files_of_nodes(child).is_disjoint(&of_publisher));
     publisher.signal(SIGKILL);
     publisher.output_within(60);
     wait_until("the process of ROS 2 has ended", || !exists(child));

@@ -5,7 +5,10 @@ use crate::harness;
 
 use std::process::Command;
 
+use bench_dragon::soak::resources::child_of;
 use harness::{Process, can_run, json_lines, long, program, python, python_modules, scene_file, summary, text, unique};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use serde_json::Value;
 
 /// Returns a Cyclone DDS process that prints its messages of these topics.
@@ -207,9 +210,9 @@ fn stamps_are_on_the_clock_or_on_wall_time_as_the_scene_requests() {
     }
 }
 
-/// Each alert and each cue. Lines that `run` itself logs do not reach the process of ROS 2.
+/// `run` itself logs that the rate is too great, and later that the process of ROS 2 has ended.
 #[test]
-fn rosout_has_the_alerts_and_the_cues() {
+fn rosout_has_the_log_of_the_show_the_alerts_and_the_cues() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
@@ -218,16 +221,22 @@ fn rosout_has_the_alerts_and_the_cues() {
     std::fs::write(&scene, format!("{}\n{added}", std::fs::read_to_string(&scene).unwrap())).unwrap();
     let mut run = program("rosout");
     run.args(["--scene", scene.to_str().unwrap(), "run", "--rate", "30", "--start", "50", "--duration", "300"]);
-    let _publisher = Process::start(run.env("ROS_DOMAIN_ID", "12"));
+    let publisher = Process::start(run.env("ROS_DOMAIN_ID", "12"));
     let topic = "rosout:reliable:transient_local";
     let mut subscriber = Process::start(peer("rosout", "300", &[topic]).args(["--domain", "12"]));
     let printed = subscriber.lines();
-    for (words, level) in [("approaching: contact: bench 1 (the head) and bench 9", 30), ("cue 1 \\\"early\\\"", 20)] {
+    let expect = |words: &str, level: u8| {
         let line: Value = serde_json::from_str(&printed.until(words, 60)).unwrap();
         let message = &line["message"];
         assert_eq!((&message["level"], &message["name"]), (&level.into(), &unique("rosout").into()), "{message}");
         assert!(nanoseconds(&message["stamp"]) > 1_700_000_000_000_000_000, "{message}");
-    }
+    };
+    expect("publish.ros2.rate is 100, more than the loop's 30", 30);
+    expect("approaching: contact: bench 1 (the head) and bench 9", 30);
+    expect("cue 1 \\\"early\\\"", 20);
+    let process = child_of(publisher.id()).unwrap();
+    kill(Pid::from_raw(process as i32), Signal::SIGKILL).unwrap();
+    expect("the process of ROS 2 ended (signal: 9 (SIGKILL)): restarted in", 30);
 }
 
 /// Returns for `joins` subscribers, one after the other, the time of creation and all alerts.

@@ -25,9 +25,11 @@ use bench_dragon_motion::timeline::TimedEvent;
 /// Width of the enclosure in metres, with room for the rounding of both ends.
 const WIDTH: f64 = 0.9e-9;
 
-/// Factors of the step length after a step that is shown, and after a step that is not.
-const GROWTH: f64 = 1.25;
-const SHRINK: f64 = 0.5;
+/// Factors of the step length after a step that is shown, after one that is not, and after further ones that are not.
+/// Steps close to the longest cost more attempts, and make the certificate shorter.
+const GROWTH: f64 = 1.1;
+const SHRINK: f64 = 0.8;
+const SHRINK_FURTHER: f64 = 0.5;
 
 /// The shortest step, as a share of the path length in metres.
 const LEAST_STEP: f64 = 1e-14;
@@ -353,6 +355,7 @@ impl<'a, 'w> Descent<'a, 'w> {
     fn go_to(&mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> Option<f64> {
         let least = LEAST_STEP * (1.0 + self.chain.path.length());
         let longest = self.chain.team.shortest_link();
+        let mut shrink = SHRINK;
         while self.at.head != target.head {
             let remaining = target.travelled - self.at.travelled;
             let length = self.step.min(remaining);
@@ -363,7 +366,9 @@ impl<'a, 'w> Descent<'a, 'w> {
                 Ok(()) => {
                     self.at = to;
                     self.step = (self.step * GROWTH).min(longest);
-                    progress((self.at.travelled / self.end).clamp(0.0, 1.0));
+                    shrink = SHRINK;
+                    let steps = self.steps as f64 / self.most_steps as f64;
+                    progress((self.at.travelled / self.end).max(steps).clamp(0.0, 1.0));
                     false
                 }
                 Err(Refused { nearer: Some(nearer), .. }) => {
@@ -371,7 +376,7 @@ impl<'a, 'w> Descent<'a, 'w> {
                     false
                 }
                 Err(Refused { obstacle, .. }) if length > least => {
-                    self.step = SHRINK * length;
+                    self.step = std::mem::replace(&mut shrink, SHRINK_FURTHER) * length;
                     if self.links == Links::Front && obstacle == Obstacle::Stall(1) {
                         self.links = Links::All;
                     }

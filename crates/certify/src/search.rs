@@ -142,7 +142,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     /// Proves the whole motion, event by event.
     fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
-        let mut progress = |at: f64| progress((at / end).clamp(0.0, 1.0));
+        // A search of a long path may end with its most steps long before the path does.
+        let mut progress = |at: f64, steps: f64| progress((at / end).max(steps).clamp(0.0, 1.0));
         for event in self.given.events {
             match event.kind {
                 EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
@@ -232,7 +233,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     }
 
     /// Goes to a travel: see [`CertificateSearch::go_to_point`].
-    fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
         if travelled <= self.at.travelled {
             return Ok(());
         }
@@ -241,12 +242,12 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     }
 
     /// Goes in steps to a grid point, or so near to an event that the event prevents a step. A claim that cannot be
-    /// shown with any step length is given up.
+    /// shown with any step length is given up. `progress` receives the travel and the share of the most steps.
     fn go_to_point(
         &mut self,
         target: &GridPoint,
         event: Option<&Event>,
-        progress: &mut dyn FnMut(f64),
+        progress: &mut dyn FnMut(f64, f64),
     ) -> Result<(), Halt> {
         let least = LEAST_STEP * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
@@ -262,7 +263,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 Ok(shown) => {
                     self.accept(to, shown)?;
                     self.step = (self.step * GROWTH).min(longest);
-                    progress(self.at.travelled);
+                    progress(self.at.travelled, self.steps as f64 / self.given.most_steps as f64);
                 }
                 Err(obstacle) if self.step.min(remaining) > least => {
                     self.step = SHRINK * self.step.min(remaining);
@@ -400,7 +401,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Some((handles[1..].iter().map(|handle| handle.span).collect(), point))
     }
 
-    fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
         if !self.clear {
             return Ok(());
         }
@@ -452,7 +453,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    fn obstacle(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn obstacle(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
         let Some(obstacle) = self.number(event).filter(|number| self.free.contains(number)) else { return Ok(()) };
         let earliest = self.at.head;
         self.free.retain(|other| *other != obstacle);
@@ -471,7 +472,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    fn stall(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn stall(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
         if !self.moving {
             return Ok(());
         }

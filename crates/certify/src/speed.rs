@@ -139,7 +139,7 @@ impl<'a> RatioSearch<'a> {
                 let travelled = 0.5 * from + 0.5 * to;
                 if let Some(Bounds { fastest, speed, .. }) = bounds
                     && speed.lo > best.lo
-                    && (0.0..=self.end).contains(&travelled)
+                    && (self.least..=self.end - self.least).contains(&travelled)
                 {
                     best = GreatestRatio { lo: speed.lo, ratio: speed.middle(), handle: fastest, travelled, ..best };
                 }

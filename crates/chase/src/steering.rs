@@ -97,8 +97,8 @@ struct Show {
     /// The state that the latest commands have led to.
     plays: bool,
     epoch: u32,
-    /// True after a seek without an answer: the show may still execute it.
-    has_open_seek: bool,
+    /// The latest command without an answer: the show may still execute this command.
+    unanswered: Option<Command>,
     /// True until a show that was paused when it was found has been told to go on.
     is_new: bool,
     /// True if another client has made the show play while it should stand.
@@ -145,7 +145,7 @@ impl Steering {
                 settled_tick: 0,
                 plays,
                 epoch: header.epoch,
-                has_open_seek: false,
+                unanswered: None,
                 is_new: !plays,
                 is_released: false,
             });
@@ -160,12 +160,16 @@ impl Steering {
             return;
         }
         let has_jumped = header.epoch != show.epoch;
-        let is_sought = has_jumped && !show.has_open_seek;
-        show.has_open_seek &= !has_jumped;
+        let is_paused = playback == Some(PlaybackState::Paused);
+        let is_own_seek = has_jumped && matches!(show.unanswered, Some(Command::Seek(_)));
+        let is_own_pause = is_paused && show.plays && matches!(show.unanswered, Some(Command::Pause));
+        let is_sought = has_jumped && !is_own_seek;
+        show.unanswered = show.unanswered.filter(|_| !is_own_seek && !is_own_pause);
         show.epoch = header.epoch;
         match playback {
             Some(PlaybackState::Held) => self.waiting = Some(Waiting::Held),
             Some(PlaybackState::Paused) if show.is_new && self.waiting.is_none() => (),
+            Some(PlaybackState::Paused) if is_own_pause => (),
             Some(PlaybackState::Paused) if show.plays || self.waiting.is_some() => self.waiting = Some(Waiting::Paused),
             Some(PlaybackState::Paused) if is_sought => self.waiting = Some(Waiting::Sought),
             Some(PlaybackState::Playing | PlaybackState::Ended) if !show.plays => {
@@ -188,7 +192,7 @@ impl Steering {
         let Some(show) = &mut self.show else { return };
         let Some(Pending { command, sent_ns }) = show.pending.take() else { return };
         let Some((code, tick)) = answer else {
-            show.has_open_seek |= matches!(command, Command::Seek(_));
+            show.unanswered = Some(command);
             return;
         };
         show.settled_tick = tick;
@@ -228,9 +232,9 @@ impl Steering {
         let (waiting, latency, limits, end) = (self.waiting, self.latency, self.limits, self.end);
         let may_set_rate = now_ns.saturating_sub(self.rate_sent_ns) >= RATE_INTERVAL_NS;
         let show = self.show.as_mut()?;
-        if let Some(Pending { sent_ns, .. }) = show.pending {
+        if let Some(Pending { command, sent_ns }) = show.pending {
             if now_ns.saturating_sub(sent_ns) > PATIENCE_NS {
-                show.pending = None;
+                (show.pending, show.unanswered) = (None, Some(command));
             }
             return None;
         }
@@ -303,11 +307,19 @@ mod tests {
         FrameHeader { run_id: 1, tick, epoch, sim_time, playback, time_scale: 1.0, ..FrameHeader::default() }
     }
 
+    fn steering() -> Steering {
+        let mut steering = Steering::new(Limits { take_up: 0.1, seek_above: 0.5, seeks_back: true });
+        (0..3).for_each(|tick| steering.frame_came(&playing(tick, 0, tick as f64 / 60.0), at(tick)));
+        steering
+    }
+
+    fn at(tick: u64) -> u64 {
+        1_000_000_000 + tick * 16_666_667
+    }
+
     #[test]
     fn a_seek_whose_answer_is_lost_is_no_seek_of_another_client() {
-        let mut steering = Steering::new(Limits { take_up: 0.1, seek_above: 0.5, seeks_back: true });
-        let at = |tick: u64| 1_000_000_000 + tick * 16_666_667;
-        (0..3).for_each(|tick| steering.frame_came(&playing(tick, 0, tick as f64 / 60.0), at(tick)));
+        let mut steering = steering();
         let command = steering.command(Goal::Follow { time: 50.0, rate: 1.0 }, at(2));
         assert!(matches!(command, Some(Command::Seek(_))), "{command:?}");
         steering.answered(None);
@@ -315,5 +327,21 @@ mod tests {
         assert_eq!(steering.waiting(), None);
         steering.frame_came(&playing(4, 2, 70.0), at(4));
         assert_eq!(steering.waiting(), Some(Waiting::Sought));
+    }
+
+    #[test]
+    fn a_pause_whose_answer_is_lost_is_no_pause_of_another_client() {
+        let mut steering = steering();
+        assert!(matches!(steering.command(Goal::Stand(None), at(2)), Some(Command::Pause)));
+        // No answer is given up after two seconds, as one that is known to be lost.
+        assert_eq!(steering.command(Goal::Stand(None), at(200)), None);
+        let paused = |tick| FrameHeader { playback: PlaybackState::Paused as u32, ..playing(tick, 0, 3.0) };
+        steering.frame_came(&paused(201), at(201));
+        assert_eq!(steering.waiting(), None);
+        assert!(matches!(steering.command(Goal::Follow { time: 3.0, rate: 1.0 }, at(202)), Some(Command::Resume)));
+        steering.answered(Some((Code::Done, 203)));
+        steering.frame_came(&playing(203, 0, 3.0), at(203));
+        steering.frame_came(&paused(204), at(204));
+        assert_eq!(steering.waiting(), Some(Waiting::Paused));
     }
 }

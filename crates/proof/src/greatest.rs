@@ -12,8 +12,8 @@ use super::speeds::Speeds;
 pub(super) struct Greatest {
     /// The end of the last step, and a number that no ratio exceeds up to there.
     pub so_far: Option<(Place, Interval)>,
-    /// A handle and its ratio at a place of the motion.
-    fast: Option<(usize, Interval)>,
+    /// A handle, its ratio at a place of the motion, and the metres of the head there from the start.
+    fast: Option<(usize, Interval, Interval)>,
     /// Counts for the report.
     pub steps: u64,
     pub links: u64,
@@ -49,15 +49,16 @@ impl Greatest {
     pub fn add_fast(&mut self, scene: &Scene, handle: usize, spans: &[Span], at: &[Place]) -> Result<(), String> {
         let Some(&head) = at.first() else { return Err("no place is listed".to_owned()) };
         span_is_one(scene, Span(head, head)).map_err(|problem| format!("the head: {problem}"))?;
-        if !Interval::new(0.0).is_at_most(&scene.path.travelled(head)) {
-            return Err("the head has not come to the start".to_owned());
+        let travelled = scene.path.travelled(head);
+        if !Interval::new(0.0).is_at_most(&travelled) || !scene.path.is_within(head) {
+            return Err("the head is before the start or beyond the end of the path".to_owned());
         }
         if !self.so_far.is_some_and(|(end, _)| scene.path.in_order(head, end)) {
             return Err("no step has come there".to_owned());
         }
         let (Speeds { at_place, .. }, _) = Speeds::new(scene, Span(head, head), spans, at)?;
         let ratio = at_place.get(handle).ok_or_else(|| format!("handle {handle} is not listed"))?;
-        self.fast = Some((handle, ratio.abs()));
+        self.fast = Some((handle, ratio.abs(), travelled));
         Ok(())
     }
 
@@ -77,8 +78,11 @@ impl Greatest {
         if !most.is_at_most(&ratio_hi) {
             return Err("ratio_hi does not follow".to_owned());
         }
-        let fastest = if handle == 0 { Some((0, Interval::new(1.0))) } else { self.fast };
-        if !fastest.is_some_and(|(fastest, ratio)| fastest == handle && ratio_lo.is_at_most(&ratio)) {
+        let fastest = if handle == 0 { Some((0, Interval::new(1.0), zero)) } else { self.fast };
+        let is_before = |travelled: &Interval| travelled.is_at_most(&(until * scene.head_speed));
+        if !fastest
+            .is_some_and(|(fastest, ratio, at)| fastest == handle && ratio_lo.is_at_most(&ratio) && is_before(&at))
+        {
             return Err("ratio_lo of this handle does not follow".to_owned());
         }
         if !(zero.is_at_most(&value_lo) && (value_lo * ratio_hi).is_at_most(&limit)) {

@@ -105,7 +105,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens a file and finds the first frame.
+    /// Opens a file, or the directory of a bag, and finds the first frame.
     ///
     /// # Errors
     /// [`ReadError`]

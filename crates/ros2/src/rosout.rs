@@ -1,8 +1,9 @@
 //! `/rosout`: the lines of the program's log, the alerts and the cues, as rcl_interfaces/Log.
 //!
 //! In: records of the program's logger, kept in a queue from the start of the process ([`enqueue`]), so that warnings of
-//! before the node are sent too. Out: messages. Stamps are wall time, as in every node of ROS 2. Called by the topics'
-//! thread, which alone sends, and by the program's logger.
+//! before the node are sent too; and those of a parent process, which has no node ([`take_queued`], [`enqueue_line`]).
+//! Out: messages. Stamps are wall time, as in every node of ROS 2. Called by the topics' thread, which alone sends, and by
+//! the program's logger.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
@@ -11,6 +12,7 @@ use ros2_client::builtin_interfaces::Time;
 use ros2_client::builtin_topics::rosout::{TOPIC_NAME, TYPE_NAME};
 use ros2_client::{Context, Log, Node, Publisher};
 use rustdds::TopicKind;
+use serde::{Deserialize, Serialize};
 
 use super::Ros2Error;
 use super::topic_writer::policies;
@@ -25,10 +27,11 @@ const DEPTH: u32 = 100;
 const LINE_BYTES: usize = 400;
 
 /// The lines that wait for the node. The logger is one for the process, and older than the node.
-static LINES: Mutex<VecDeque<Line>> = Mutex::new(VecDeque::new());
+static LINES: Mutex<VecDeque<LogLine>> = Mutex::new(VecDeque::new());
 
-/// A line of the program's log.
-struct Line {
+/// A line of a program's log.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LogLine {
     stamp: Time,
     level: u8,
     text: String,
@@ -48,18 +51,27 @@ pub fn enqueue(record: &log::Record<'_>) {
         log::Level::Info => Log::INFO,
         log::Level::Debug | log::Level::Trace => Log::DEBUG,
     };
-    let line = Line {
+    enqueue_line(LogLine {
         stamp: Time::now(),
         level,
         text: record.args().to_string(),
         file: record.file().unwrap_or_default().to_owned(),
         line: record.line().unwrap_or_default(),
-    };
+    });
+}
+
+/// Queues a line of another process.
+pub fn enqueue_line(line: LogLine) {
     let mut lines = LINES.lock().unwrap_or_else(PoisonError::into_inner);
     if lines.len() == QUEUED_LINES {
         lines.pop_front();
     }
     lines.push_back(line);
+}
+
+/// Returns the queued lines, and empties the queue.
+pub fn take_queued() -> VecDeque<LogLine> {
+    std::mem::take(&mut *LINES.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// The writer of the topic.
@@ -93,8 +105,7 @@ impl Rosout {
 
     /// Sends the lines of the log.
     pub(super) fn send_queued(&self) {
-        let lines = std::mem::take(&mut *LINES.lock().unwrap_or_else(PoisonError::into_inner));
-        lines.into_iter().for_each(|line| self.send(line));
+        take_queued().into_iter().for_each(|line| self.send(line));
     }
 
     /// Sends a sentence about the show.
@@ -104,10 +115,10 @@ impl Rosout {
             Severity::Warning => Log::WARN,
             Severity::Error => Log::ERROR,
         };
-        self.send(Line { stamp: Time::now(), level, text, file: String::new(), line: 0 });
+        self.send(LogLine { stamp: Time::now(), level, text, file: String::new(), line: 0 });
     }
 
-    fn send(&self, Line { stamp, level, text, file, line }: Line) {
+    fn send(&self, LogLine { stamp, level, text, file, line }: LogLine) {
         let message = Log { stamp, level, name: self.name.clone(), msg: text, file, function: String::new(), line };
         // A full queue cannot be reported here: the report would be one more line.
         let _ = self.publisher.publish(message);

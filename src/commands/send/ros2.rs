@@ -9,7 +9,7 @@ use bench_dragon::ros2::Ros2Error;
 use bench_dragon::ros2::bridge::{Bridge, BridgeConfig, BridgeCounters, Notice};
 
 use super::super::ros2_process::Ros2Line;
-use super::super::{CommandError, Common, Output, stop_on_signals};
+use super::super::{CommandError, Common, Output, log_lines, stop_on_signals};
 use super::Ros2Arguments;
 
 /// Publishes until a signal comes.
@@ -18,6 +18,9 @@ pub(super) fn ros2(common: &Common, arguments: &Ros2Arguments) -> Result<(), Com
     let settings = common.scene.as_ref().map(|_| common.load_any_scene()).transpose()?;
     let settings = settings.map(|scene| scene.ros2.unwrap_or_default());
     let stop = stop_on_signals()?;
+    if arguments.log_on_stdin {
+        log_lines::receive();
+    }
     let mut printed = Ok(());
     let mut notify = |publisher: usize, notice: Notice| {
         let name = common.names.get(publisher).map_or("", String::as_str);

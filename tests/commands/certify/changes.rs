@@ -20,19 +20,27 @@ fn moved(number: &Value, random: &mut Rng) -> Option<Value> {
     Some(json!(if random.bool() { number * (1.0 + share) } else { number * (1.0 - share) }))
 }
 
+/// Returns the index of the first result: the lines before prove it.
+pub fn first_result(lines: &[Value]) -> usize {
+    const RESULTS: [&str; 4] = ["result", "least_clearance", "greatest_speed", "least_pitch"];
+    let is_result = |line: &Value| line["type"].as_str().is_some_and(|kind| RESULTS.contains(&kind));
+    lines.iter().position(is_result).unwrap_or(lines.len())
+}
+
 /// Changes a certificate in one place and returns a description of the change; `None` if nothing changed.
 pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
     let before = lines.clone();
-    let last = lines.len() - 4;
     let index = random.usize(1..lines.len());
-    let step = random.usize(1..last);
+    let step = random.usize(1..first_result(lines).max(2));
     let what = match random.u8(..9) {
         0 => {
             // A step becomes longer or shorter, and the next one begins at its end.
             let to = lines[step].get_mut("to")?.get_mut(1)?;
             *to = moved(to, random)?;
             let end = to.clone();
-            if let Some(from) = lines[step + 1].get_mut("from").and_then(|from| from.get_mut(1)) {
+            if let Some(from) =
+                lines.get_mut(step + 1).and_then(|line| line.get_mut("from")).and_then(|from| from.get_mut(1))
+            {
                 *from = end;
             }
             format!("the end of line {}", step + 1)
@@ -40,7 +48,7 @@ pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
         1 => {
             let mut found = Vec::new();
             numbers(&mut lines[index], &mut found);
-            let chosen = found.into_iter().nth(random.usize(..40))?;
+            let chosen = random.choice(found)?;
             *chosen = moved(chosen, random)?;
             format!("a number in line {}", index + 1)
         }
@@ -55,11 +63,12 @@ pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
             format!("a span in line {}", step + 1)
         }
         3 => {
-            let spans = lines[step].get_mut("spans")?.as_array_mut()?;
-            if !spans.is_empty() {
-                spans.remove(random.usize(..spans.len()));
+            let list = *random.choice(&["spans", "spans", "at", "last"])?;
+            let places = lines[step].get_mut(list)?.as_array_mut()?;
+            if !places.is_empty() {
+                places.remove(random.usize(..places.len()));
             }
-            format!("a span out of line {}", step + 1)
+            format!("one of {list} out of line {}", step + 1)
         }
         4 => {
             drop(lines.remove(index));

@@ -1,5 +1,6 @@
-//! Certificates, checked again by a second program in another language: `tests/python/second_judge.py`, with the ball
-//! arithmetic of Arb. It finds the handles itself and checks the claims, not the proof. `BENCH_DRAGON_LONG=1`: 500 scenes.
+//! Certificates of every question, checked again by a second program in another language:
+//! `tests/python/second_judge.py`, with the ball arithmetic of Arb. It finds the handles itself and checks the claims, not
+//! the proof. `BENCH_DRAGON_LONG=1`: 500 scenes.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,7 +14,10 @@ use crate::harness::{Process, aloud, can_run, json_lines, long, python, python_m
 /// Random times and steps of each certificate.
 const PLACES: &str = "5";
 
-/// Returns the text of a scene: a spiral, a route or a turnaround in turn.
+/// Metres from the centre that `plan pitch` is to reach.
+const RADIUS: &str = "2.0";
+
+/// Returns the text of a scene: a spiral, a route or a turnaround in turn. Every second route has obstacles.
 fn scene(number: u64) -> String {
     let mut random = Rng::with_seed(number);
     let mut between = |least: f64, greatest: f64| least + (greatest - least) * random.f64();
@@ -51,37 +55,68 @@ fn scene(number: u64) -> String {
             )
         }
     };
+    let stage = if number % 6 == 1 { stage(link, &mut between) } else { String::new() };
     format!(
         "name = \"scene {number}\"\n[team]\nbenches = {benches}\nhead_length = {head}\nbody_length = {body}\nwidth = \
-         {width}\nhole_inset = {inset}\n[path]\n{path}\n[motion]\nhead_speed = {}\non_contact = \"continue\"\n",
+         {width}\nhole_inset = {inset}\n[path]\n{path}\n[motion]\nhead_speed = {}\non_contact = \"continue\"\n{stage}",
         between(0.2, 3.0)
     )
 }
 
-/// Writes the certificate of a scene, and the claim about its least clearance. Returns its file, or `None` for a scene
-/// that the program refuses.
-fn certified(folder: &Path, name: &str, scene: &str, proves_clearance: bool) -> Option<PathBuf> {
-    let (input, file) = (folder.join(format!("{name}.toml")), folder.join(format!("{name}.jsonl")));
-    std::fs::write(&input, scene).unwrap();
-    let run = |arguments: &[&str]| {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
-        Process::start(program.arg("--scene").arg(&input).arg("--quiet").args(arguments)).output_within(300)
-    };
-    let output = run(&["events", "--certify", file.to_str().unwrap()]);
-    if output.status.code() == Some(2) {
-        return None;
-    }
-    assert!(output.status.success(), "{name}: {}", text(&output.stderr));
-    if proves_clearance {
-        let output = run(&["check", "--prove", "--json"]);
-        assert!(output.status.success(), "{name}: {}", text(&output.stderr));
-        std::fs::write(clearance_file(&file), output.stdout).unwrap();
-    }
-    Some(file)
+/// Returns a stage with a shape of each kind, placed near the path, and a boundary around it.
+fn stage(link: f64, between: &mut impl FnMut(f64, f64) -> f64) -> String {
+    let mut point = |far: f64| format!("[{}, {}]", link * between(-far, far), link * between(-far, far));
+    let [lamp, one, other, third, from, to] = [5.0; 6].map(&mut point);
+    let far = 20.0 * link;
+    format!(
+        "[placement]\norigin = [1.0, 2.0]\nrotation_turns = 0.3\nmirror = true\n[stage]\nboundary = {{ polygon = \
+         [[-{far}, -{far}], [{far}, -{far}], [{far}, {far}], [-{far}, {far}]] }}\n[[stage.obstacles]]\nname = \"lamp\"\n\
+         circle = {{ center = {lamp}, radius = {} }}\n[[stage.obstacles]]\nname = \"house\"\npolygon = [{one}, {other}, \
+         {third}]\n[[stage.obstacles]]\nname = \"rope\"\nline = [{from}, {to}]\nkeep_out = {}\n",
+        0.2 * link,
+        0.1 * link
+    )
 }
 
-fn clearance_file(certificate: &Path) -> PathBuf {
-    format!("{}.clearance", certificate.display()).into()
+/// The questions of certificates. Not every scene has an answer to each.
+const QUESTIONS: [(&str, &[&str]); 4] = [
+    ("events", &["events"]),
+    ("clearance", &["check", "--prove"]),
+    ("speed", &["plan", "speed", "--max-handle-speed", "2"]),
+    ("pitch", &["plan", "pitch", "--reach-radius"]),
+];
+
+/// Writes the certificates of a scene for some questions. Returns their files; none for a scene that the program refuses.
+fn certified(folder: &Path, name: &str, scene: &str, questions: &[&str]) -> Vec<PathBuf> {
+    let input = folder.join(format!("{name}.toml"));
+    std::fs::write(&input, scene).unwrap();
+    let mut files = Vec::new();
+    for (question, arguments) in QUESTIONS.into_iter().filter(|(question, _)| questions.contains(question)) {
+        let file = folder.join(format!("{name}.{question}"));
+        let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        program.arg("--scene").arg(&input).arg("--quiet").args(arguments);
+        if question == "pitch" {
+            program.arg(RADIUS);
+        }
+        let output = Process::start(program.arg("--certify").arg(&file)).output_within(300);
+        if output.status.success() && file.exists() {
+            files.push(file);
+            continue;
+        }
+        // A show that runs into a lock has no greatest speed; a scene with obstacles has only events; the search of a
+        // proof may give up.
+        let said = text(&output.stderr);
+        let is_unanswered =
+            ["lock", "obstacles", "no certificate is written", "reaches"].iter().any(|it| said.contains(it));
+        assert!(
+            output.status.success() || output.status.code() == Some(2) || is_unanswered,
+            "{name}, {question}: {said}"
+        );
+        if question == "events" {
+            return Vec::new();
+        }
+    }
+    files
 }
 
 /// Returns the judge's verdicts, in the order of the files.
@@ -95,53 +130,132 @@ fn verdicts(files: &[PathBuf]) -> Vec<Value> {
     verdicts
 }
 
-/// Returns the changes that make a certificate false, each with its name: of its results, its scene, and its steps.
-fn changes(lines: &[Value]) -> Vec<(String, Vec<Value>)> {
+/// A name and a changed certificate.
+type Changed = (String, Vec<Value>);
+
+/// Returns a certificate with some of its lines changed.
+fn with(lines: &[Value], edit: impl Fn(usize, &mut Value)) -> Vec<Value> {
+    let mut other = lines.to_vec();
+    other.iter_mut().enumerate().for_each(|(number, line)| edit(number, line));
+    other
+}
+
+/// Returns a certificate with one number of its result, or of the lines of a kind, changed.
+fn moved(lines: &[Value], kind: &str, field: &str, by: f64) -> Vec<Value> {
+    with(lines, |_, line| {
+        if line["type"] == kind {
+            line[field] = json!(line[field].as_f64().unwrap() + by);
+        }
+    })
+}
+
+/// Returns changes that make the results of a certificate of events false.
+fn false_results(lines: &[Value]) -> Vec<Changed> {
     let mut changed = Vec::new();
-    let mut change = |name: String, number: usize, edit: &dyn Fn(&mut Value)| {
-        let mut other = lines.to_vec();
-        edit(&mut other[number]);
-        changed.push((name, other));
-    };
-    for (number, line) in lines.iter().enumerate().filter(|(_, line)| line["status"] == "proved") {
-        let event = line["event"].as_str().unwrap();
+    for (number, result) in lines.iter().enumerate().filter(|(_, line)| line["status"] == "proved") {
+        let event = result["event"].as_str().unwrap();
+        let mut change = |name: String, edit: &dyn Fn(&mut Value)| {
+            changed.push((
+                name,
+                with(lines, |other, line| {
+                    if other == number {
+                        edit(line)
+                    }
+                }),
+            ));
+        };
         for by in [1e-6, -1e-6] {
-            change(format!("{event} moved by {by} s"), number, &|line| {
+            change(format!("{event} moved by {by} s"), &|line| {
                 for time in ["time_lo", "time_hi"] {
                     line[time] = json!(line[time].as_f64().unwrap() + by);
                 }
             });
         }
-        for bench in ["bench_a", "bench_b"].into_iter().filter(|bench| line[bench].is_u64()) {
-            change(format!("{bench} of the {event}"), number, &|line| {
-                line[bench] = json!(line[bench].as_u64().unwrap() + 1)
-            });
+        for bench in ["bench_a", "bench_b"].into_iter().filter(|bench| result[bench].is_u64()) {
+            change(format!("{bench} of the {event}"), &|line| line[bench] = json!(line[bench].as_u64().unwrap() + 1));
         }
         if event == "contact" {
-            change("a contact that is none".to_owned(), number, &|line| {
+            change("a contact that is none".to_owned(), &|line| {
                 *line = json!({ "type": "result", "event": "contact", "status": "none" });
             });
         }
     }
-    let scene = |from: &'static str, to: &'static str| {
-        move |line: &mut Value| {
-            let text = line["scene"].as_str().unwrap();
-            assert_eq!(text.matches(from).count(), 1);
-            line["scene"] = json!(text.replace(from, to));
-        }
+    changed
+}
+
+/// Returns changes of the certificate of `config/school.toml`: of its results, its scene, and its steps.
+fn changes(lines: &[Value]) -> Vec<Changed> {
+    let mut changed = false_results(lines);
+    let scene = |from: &str, to: &str| {
+        with(lines, |number, line| {
+            if number == 0 {
+                let text = line["scene"].as_str().unwrap();
+                assert_eq!(text.matches(from).count(), 1);
+                line["scene"] = json!(text.replace(from, to));
+            }
+        })
     };
-    change("wider boards".to_owned(), 0, &scene("width = 0.30", "width = 0.31"));
-    change("a longer head".to_owned(), 0, &scene("head_length = 3.41", "head_length = 3.42"));
-    change("an unknown line".to_owned(), lines.len() / 2, &|line| *line = json!({ "type": "clearance" }));
-    let mut moved = lines.to_vec();
-    for line in moved.iter_mut().filter(|line| line["type"] == "step") {
-        for end in [0, 1] {
-            let coordinate = &mut line["spans"][0][end][1];
-            *coordinate = json!(coordinate.as_f64().unwrap() + 0.01);
+    changed.push(("wider boards".to_owned(), scene("width = 0.30", "width = 0.31")));
+    changed.push(("a longer head".to_owned(), scene("head_length = 3.41", "head_length = 3.42")));
+    let unknown = with(lines, |number, line| {
+        if number == lines.len() / 2 {
+            *line = json!({ "type": "clearance" });
+        }
+    });
+    changed.push(("an unknown line".to_owned(), unknown));
+    let elsewhere = with(lines, |_, line| {
+        if line["type"] == "step" {
+            for end in [0, 1] {
+                let coordinate = &mut line["spans"][0][end][1];
+                *coordinate = json!(coordinate.as_f64().unwrap() + 0.01);
+            }
+        }
+    });
+    changed.push(("spans of handle 1 elsewhere".to_owned(), elsewhere));
+    changed
+}
+
+/// Returns changes of certificates of other questions, of the first files that can be changed so.
+fn other_changes(files: &[PathBuf]) -> Vec<Changed> {
+    let of = |question: &str, is_fit: &dyn Fn(&[Value]) -> bool| -> Vec<Value> {
+        let mut read = files.iter().filter(|file| file.extension().unwrap() == question).map(|file| lines_of(file));
+        read.find(|lines| is_fit(lines)).unwrap_or_else(|| panic!("no certificate of the {question} is fit"))
+    };
+    let last = |lines: &[Value]| lines.last().unwrap().clone();
+    let clearance = of("clearance", &|lines| last(lines)["lo"].as_f64() > Some(1e-3));
+    let speed = of("speed", &|lines| last(lines)["handle"].as_u64() > Some(0));
+    let pitch = of("pitch", &|lines| last(lines)["value_lo"].is_f64() && last(lines)["value_hi"].is_f64());
+    let mut changed = Vec::new();
+    for (lines, kind, fields) in [
+        (&clearance, "least_clearance", &[("lo", 2e-6), ("hi", -1e-6)][..]),
+        (&speed, "greatest_speed", &[("value_lo", 1e-6), ("value_hi", -1e-6), ("ratio_lo", 1e-6)][..]),
+        (&pitch, "least_pitch", &[("value_lo", 1e-3), ("value_hi", -1e-3), ("radius", -0.1), ("from", -1e-3)][..]),
+    ] {
+        for (field, by) in fields {
+            changed.push((format!("{field} of the {kind}"), moved(lines, kind, field, *by)));
         }
     }
-    changed.push(("spans of handle 1 elsewhere".to_owned(), moved));
+    let fastest = moved(&speed, "fast", "handle", 0.0);
+    let slower = with(&fastest, |_, line| {
+        if line["type"] == "fast" {
+            line["at"][0] = speed[1]["from"].clone();
+        }
+    });
+    changed.push(("a fast handle at another place".to_owned(), slower));
+    if let Some(touched) = files.iter().map(|file| lines_of(file)).find(|lines| has_touch(lines)) {
+        changed.extend(false_results(&touched).into_iter().filter(|(name, _)| name.contains("obstacle")));
+    }
     changed
+}
+
+/// Returns true if a certificate proves the first touch of an obstacle after the start.
+fn has_touch(lines: &[Value]) -> bool {
+    let is_touch = |line: &Value| line["event"] == "obstacle" && line["time_lo"].as_f64() > Some(1e-3);
+    lines.iter().any(|line| line["status"] == "proved" && is_touch(line))
+}
+
+fn lines_of(file: &Path) -> Vec<Value> {
+    std::fs::read_to_string(file).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 #[test]
@@ -154,82 +268,68 @@ fn a_second_judge_agrees_and_refuses_what_was_changed() {
     let folder = folder.path();
     // `long` is proved for minutes, and `ros2` is the paper's scene.
     let config: &[&str] =
-        if few { &["school"] } else { &["school", "paper", "wide", "procession", "turnaround", "tight"] };
+        if few { &["school"] } else { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] };
     let all = match () {
-        () if few => 5,
+        () if few => 8,
         () if long() => 500,
         () => 50,
     };
-    let wanted = all - config.len();
     let read = |name: &&str| (name.to_string(), std::fs::read_to_string(format!("config/{name}.toml")).unwrap());
     let scenes: Vec<_> = config.iter().map(read).collect();
     let random = (0..).map(|number| (format!("random{number}"), scene(number)));
     let left = Mutex::new(scenes.into_iter().chain(random).enumerate());
-    let files = Mutex::new(Vec::new());
+    let found = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
             scope.spawn(|| {
-                while files.lock().unwrap().len() < config.len() + wanted {
+                while found.lock().unwrap().len() < all {
                     let (number, (name, scene)) = left.lock().unwrap().next().unwrap();
-                    let file = certified(folder, &name, &scene, name.starts_with("random"));
-                    files.lock().unwrap().extend(file.map(|file| (number, file)));
+                    let questions: &[&str] = match () {
+                        () if name == "school" => &["events", "pitch"],
+                        () if !name.starts_with("random") => &["events"],
+                        () if number.is_multiple_of(9) => &["events", "clearance", "speed", "pitch"],
+                        () => &["events", "clearance", "speed"],
+                    };
+                    let files = certified(folder, &name, &scene, questions);
+                    if !files.is_empty() {
+                        found.lock().unwrap().push((number, files));
+                    }
                 }
             });
         }
     });
     // The same ones, whichever thread was first.
-    let mut files = files.into_inner().unwrap();
-    files.sort();
-    files.truncate(config.len() + wanted);
-    let mut files: Vec<PathBuf> = files.into_iter().map(|(_, file)| file).collect();
-    // What the judge must refuse: a certificate with a contact, a stall and a lock, changed.
-    let text = std::fs::read_to_string(folder.join("school.jsonl")).unwrap();
-    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    let changed = changes(&lines);
+    let mut found = found.into_inner().unwrap();
+    found.sort();
+    found.truncate(all);
+    let mut files: Vec<PathBuf> = found.into_iter().flat_map(|(_, files)| files).collect();
     let agreed = files.len();
+    // What the judge must refuse.
+    let mut changed = changes(&lines_of(&folder.join("school.events")));
+    changed.extend(other_changes(&files));
     for (number, (_, lines)) in changed.iter().enumerate() {
-        let file = folder.join(format!("changed{number}.jsonl"));
+        let file = folder.join(format!("changed{number}"));
         std::fs::write(&file, lines.iter().map(|line| format!("{line}\n")).collect::<String>()).unwrap();
         files.push(file);
-    }
-    // A least clearance that is too great or too small, and one of other benches.
-    let claims =
-        files[..agreed].iter().filter_map(|file| Some((file, std::fs::read_to_string(clearance_file(file)).ok()?)));
-    let claims = claims.map(|(file, claim)| (file.clone(), serde_json::from_str::<Value>(&claim).unwrap()));
-    let (file, claim) = claims.clone().find(|(_, claim)| claim["least_clearance_lo"].as_f64() > Some(1e-3)).unwrap();
-    let mut claimed = Vec::new();
-    for by in [1e-6, -1e-6] {
-        let mut other = claim.clone();
-        for end in ["least_clearance_lo", "least_clearance_hi"] {
-            other[end] = json!(other[end].as_f64().unwrap() + by);
-        }
-        let copy = folder.join(format!("clearance{by}.jsonl"));
-        std::fs::copy(&file, &copy).unwrap();
-        std::fs::write(clearance_file(&copy), other.to_string()).unwrap();
-        claimed.push(format!("a least clearance moved by {by} m"));
-        files.push(copy);
     }
     let verdicts = verdicts(&files);
     let (right, wrong) = verdicts.split_at(agreed);
     for verdict in right {
         assert!(verdict["refused"].is_null() && verdict["undecided"].is_null(), "{verdict}");
     }
-    let names = changed.iter().map(|(name, _)| name).chain(&claimed);
-    for (name, verdict) in names.zip(wrong) {
+    for ((name, _), verdict) in changed.iter().zip(wrong) {
         assert!(verdict["refused"].is_string(), "the judge accepts {name}: {verdict}");
     }
+    let names = ["events", "places", "spans", "pairs", "clearances", "speeds", "pitches", "obstacles", "undecided"];
     let count = |key: &str| right.iter().map(|verdict| verdict["counts"][key].as_u64().unwrap()).sum::<u64>();
-    let [events, places, spans, pairs, clearances, undecided] =
-        ["events", "places", "spans", "pairs", "clearances", "undecided"].map(count);
+    let counts = names.map(count);
     aloud(&format!(
-        "{agreed} certificates: {events} events, {places} places with {pairs} pairs of boards, {spans} spans and {clearances} \
-         least clearances are right; {undecided} places undecided; {} changes refused",
+        "{agreed} certificates of {all} scenes are right: {names:?} {counts:?}; {} changes refused",
         wrong.len()
     ));
-    let certificates = agreed as u64;
-    assert!(
-        events >= certificates && places >= 5 * certificates && clearances >= certificates / 2,
-        "{events} {places}"
-    );
-    assert!(spans > 10 * certificates && pairs > 10 * certificates && undecided * 100 <= places, "{spans} {pairs}");
+    let [events, places, spans, pairs, clearances, speeds, pitches, obstacles, undecided] = counts;
+    let scenes = all as u64;
+    assert!(events >= scenes && places >= 5 * scenes && clearances >= scenes / 2, "{counts:?}");
+    assert!(spans > 10 * scenes && pairs > 10 * scenes && undecided * 100 <= places, "{counts:?}");
+    assert!(speeds > 10 * scenes && pitches >= 10 && obstacles > scenes, "{counts:?}");
 }

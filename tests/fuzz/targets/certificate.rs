@@ -1,26 +1,28 @@
-//! Certificates of events as `verify` reads them: refused with a sentence, or accepted with claims that agree with the
-//! ordinary search.
+//! Certificates of all questions as `verify` reads them: refused with a sentence, or accepted with claims that agree with
+//! the ordinary search.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
-use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::proof::verify;
-use fastrand::Rng;
-use serde_json::{Value, json};
+use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
+use bench_dragon::certify::{CertificateLine, certify_least_clearance};
+use bench_dragon::proof::{Proved, verify};
+use serde_json::Value;
 
 use super::Target;
-use super::bytes::{changed, renumbered};
-use super::changes::change;
+use super::certificate_changes::mutate;
 use super::scene::is_quick;
-use super::truth::{certificate, is_true, scene, timeline};
+use super::truth::{Found, certificate, scene};
 
 pub const TARGET: Target =
     Target { name: "certificate", run, seeds, mutate, cases: 1500, hung: Duration::from_secs(30) };
 
 /// Bytes of the longest certificate that is checked: some hundred steps of a small team.
 const MOST_BYTES: usize = 200_000;
+
+/// Intervals of pitches before the last in an initial certificate.
+const INTERVALS: usize = 10;
 
 fn run(data: &[u8]) -> bool {
     if data.len() > MOST_BYTES {
@@ -37,13 +39,17 @@ fn run(data: &[u8]) -> bool {
             false
         }
         Ok(proved) => {
-            assert_eq!(proved.results.len(), 4, "{:?}", proved.results);
-            check_steps(data, [proved.steps, proved.links]);
-            // Scenes that the program refuses, or would search for long, have no other check.
-            let Some(timeline) = timeline_of(&proved.scene) else { return true };
-            for outcome in &proved.results {
-                assert!(is_true(outcome, &timeline), "accepted, but not true: {outcome:?}");
+            let Proved { results, least_clearance, greatest_speed, least_pitch, .. } = &proved;
+            let others = [least_clearance.is_some(), greatest_speed.is_some(), least_pitch.is_some()].map(u8::from);
+            let questions = u8::from(results.len() >= 4) + others.iter().sum::<u8>();
+            assert!(questions == 1 && (results.is_empty() || results.len() >= 4), "{proved:?}");
+            // The lines of a pitch, and a place at which a handle is fast, are counted in other ways.
+            if greatest_speed.is_none() && least_pitch.is_none() {
+                check_steps(data, [proved.steps, proved.links]);
             }
+            // Scenes that the program refuses, or would search for long, have no other check.
+            let contradiction = found(&proved.scene).and_then(|found| found.contradiction(&proved));
+            assert_eq!(contradiction, None, "accepted, but not true");
             true
         }
     }
@@ -53,7 +59,7 @@ fn run(data: &[u8]) -> bool {
 /// before ended.
 fn check_steps(data: &[u8], proved: [u64; 2]) {
     let (mut steps, mut links, mut end) = (0, 0, None);
-    for line in data.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
+    for line in text_lines(data) {
         let line: Value = serde_json::from_slice(line).expect("it was read");
         if line["type"] == "step" {
             steps += 1;
@@ -66,104 +72,120 @@ fn check_steps(data: &[u8], proved: [u64; 2]) {
     assert_eq!(proved, [steps, links], "steps and links");
 }
 
-/// Returns the events that the ordinary search finds in a scene, searched once; `None` if the search would take long.
-fn timeline_of(text: &str) -> Option<Timeline> {
-    static KNOWN: OnceLock<Mutex<HashMap<String, Option<Timeline>>>> = OnceLock::new();
+/// Returns the lines of a file.
+fn text_lines(data: &[u8]) -> impl Iterator<Item = &[u8]> {
+    data.split(|byte| *byte == b'\n').filter(|line| !line.is_empty())
+}
+
+/// Returns the results of the ordinary search for a scene, searched once; `None` if the search would take long.
+fn found(text: &str) -> Option<Arc<Found>> {
+    static KNOWN: OnceLock<Mutex<HashMap<String, Option<Arc<Found>>>>> = OnceLock::new();
     let mut known = KNOWN.get_or_init(Mutex::default).lock().unwrap_or_else(|error| error.into_inner());
     if known.len() > 1000 {
         known.clear();
     }
     if !known.contains_key(text) {
-        let found = if scene(text).is_some_and(|scene| is_quick(&scene)) { timeline(text) } else { None };
-        known.insert(text.to_owned(), found);
+        let found = if scene(text).is_some_and(|scene| is_quick(&scene)) { Found::new(text) } else { None };
+        known.insert(text.to_owned(), found.map(Arc::new));
     }
     known.get(text).cloned().flatten()
 }
 
-/// Returns certificates of small scenes of few steps: a line, a line on which boards overlap from the start, a bend,
-/// and a stall and a lock on a spiral.
+/// Returns the text of a scene of a team like the paper's.
+fn scene_of(benches: u32, hole_inset: f64, path: &str) -> String {
+    format!(
+        "[team]\nbenches = {benches}\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = {hole_inset}\n\
+         [path]\n{path}[motion]\nhead_speed = 1.0\n"
+    )
+}
+
+/// Returns certificates of few lines of each question. Events: on a line, on one on which boards overlap from the start,
+/// on a bend, a stall and a lock on a spiral, obstacles that are avoided or touched.
 fn seeds() -> Vec<Vec<u8>> {
     let line = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"line\"\nlength = 0.1\n";
     let bend = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nradius = 5.0\nside = \"left\"\nturns = 0.01\n";
+    let narrow = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nradius = 1.7\nside = \"left\"\nturns = 0.02\n";
     let spiral = "kind = \"spiral\"\npitch = 1.7\nstart_turn = 0.6\n";
-    let scenes = [
-        (1, 0.275, line),
-        (2, 0.275, line),
-        (3, 0.275, line),
-        (3, 0.8, line),
-        (1, 0.275, bend),
-        (3, 0.275, bend),
-        (1, 0.275, spiral),
-        (3, 0.275, spiral),
+    let lamp = "[stage]\n[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [0.4, 0.2], radius = 0.05 }\n";
+    let wall = "[stage]\nboundary = { polygon = [[-9, -2], [4, -2], [4, 2], [-9, 2]] }\n[[stage.obstacles]]\n\
+                name = \"wall\"\nline = [[0.31, -1], [0.31, 0.1]]\n";
+    let house = "[placement]\norigin = [1.0, 2.0]\nrotation_turns = 0.2\n[stage]\n[[stage.obstacles]]\nname = \"house\"\n\
+                 polygon = [[1.5, 2.2], [2, 2.2], [2, 3]]\nkeep_out = 0.1\n";
+    let events = [
+        scene_of(1, 0.275, line),
+        scene_of(2, 0.275, line),
+        scene_of(3, 0.275, line),
+        scene_of(3, 0.8, line),
+        scene_of(1, 0.275, bend),
+        scene_of(3, 0.275, bend),
+        scene_of(1, 0.275, spiral),
+        scene_of(3, 0.275, spiral),
+        scene_of(1, 0.275, line) + lamp,
+        scene_of(3, 0.275, line) + wall,
+        scene_of(2, 0.275, bend) + house,
     ];
-    let text = |(benches, inset, path)| {
-        format!(
-            "[team]\nbenches = {benches}\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = {inset}\n\
-             [path]\n{path}[motion]\nhead_speed = 1.0\n"
-        )
-    };
-    let lines = |scene: String| certificate(&scene).iter().map(|line| format!("{line}\n")).collect::<String>();
-    scenes.map(|scene| lines(text(scene)).into_bytes()).to_vec()
+    let events = events.map(|text| lines_of(&certificate(&text)));
+    let clearances =
+        [scene_of(3, 0.275, line), scene_of(3, 0.8, line), scene_of(3, 0.275, bend), scene_of(4, 0.275, spiral)];
+    let speeds = [scene_of(1, 0.275, line), scene_of(1, 0.275, bend), scene_of(3, 0.275, narrow)];
+    let pitches = [(3, 1.6, 0.5), (4, 1.6, 0.6), (8, 1.0, 0.7)].map(|(benches, body, radius)| {
+        let team = scene_of(benches, 0.1, spiral).replace("body_length = 2.2", &format!("body_length = {body}"));
+        (team.replace("head_length = 3.41", "head_length = 2.0"), radius)
+    });
+    (events.into_iter())
+        .chain(clearances.iter().map(|text| clearance(text)))
+        .chain(speeds.iter().map(|text| speed(text)))
+        .chain(pitches.iter().map(|(text, radius)| pitch(text, *radius)))
+        .collect()
 }
 
-fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
-    let text = String::from_utf8_lossy(data);
-    let parsed: Result<Vec<Value>, _> = text.lines().map(serde_json::from_str).collect();
-    let Some(mut lines) = parsed.ok().filter(|lines| lines.len() > 6) else { return changed(data, random) };
-    match random.u8(..8) {
-        0 => return changed(data, random),
-        1 => return renumbered(&text, random).into_bytes(),
-        _ => (),
-    }
-    if random.u8(..3) == 0 {
-        // The data of an event, and the claims about it.
-        let is_event = |line: &Value| !["step", "certificate"].contains(&line["type"].as_str().unwrap_or_default());
-        let events: Vec<usize> = (0..lines.len()).filter(|at| is_event(&lines[*at])).collect();
-        let Some(at) = events.get(random.usize(..events.len().max(1))) else { return changed(data, random) };
-        let mut texts: Vec<String> = lines.iter().map(Value::to_string).collect();
-        texts[*at] = match random.u8(..3) {
-            0 => {
-                let near = 1.0 + 10f64.powi(-random.i32(1..9)) * (2.0 * random.f64() - 1.0);
-                scaled(&lines[*at], near, random).to_string()
-            }
-            1 => texts[*at].replace("proved", "none").replace("undecided", "proved"),
-            _ => renumbered(&texts[*at], random),
-        };
-        return texts.iter().map(|line| format!("{line}\n")).collect::<String>().into_bytes();
-    }
-    for _ in 0..1 + random.usize(..3) {
-        // Lines that have lost their fields in an earlier change are not changed by name again.
-        if lines.len() > 6 && lines[0]["scene"].is_string() {
-            change(&mut lines, random);
-        }
-    }
+/// Returns the lines that a search writes.
+fn written(search: impl FnOnce(&mut dyn FnMut(&CertificateLine) -> std::io::Result<()>)) -> Vec<u8> {
+    let mut lines = Vec::new();
+    search(&mut |line| {
+        lines.push(serde_json::to_value(line)?);
+        Ok(())
+    });
+    lines_of(&lines)
+}
+
+/// Returns the text of a file of these lines.
+pub fn lines_of(lines: &[Value]) -> Vec<u8> {
     lines.iter().map(|line| format!("{line}\n")).collect::<String>().into_bytes()
 }
 
-/// Returns a line with one of its numbers that is not whole multiplied by a factor.
-fn scaled(line: &Value, factor: f64, random: &mut Rng) -> Value {
-    fn count(value: &Value) -> usize {
-        match value {
-            Value::Array(values) => values.iter().map(count).sum(),
-            Value::Object(fields) => fields.values().map(count).sum(),
-            value => usize::from(value.is_f64()),
-        }
-    }
-    fn scale(value: &mut Value, left: &mut usize, factor: f64) {
-        match value {
-            Value::Array(values) => values.iter_mut().for_each(|value| scale(value, left, factor)),
-            Value::Object(fields) => fields.values_mut().for_each(|value| scale(value, left, factor)),
-            value => {
-                if let Some(number) = value.as_f64().filter(|_| value.is_f64()) {
-                    if *left == 0 {
-                        *value = json!(number * factor);
-                    }
-                    *left = left.wrapping_sub(1);
-                }
-            }
-        }
-    }
-    let (mut line, mut left) = (line.clone(), random.usize(..count(line).max(1)));
-    scale(&mut line, &mut left, factor);
-    line
+fn clearance(text: &str) -> Vec<u8> {
+    let motion = scene(text).expect("a scene").motion;
+    let timeline = motion.timeline(&mut |_| ());
+    let freeze = timeline.freeze(true);
+    let hint = motion.least_clearance(&timeline, freeze, &mut |_| ()).expect("three benches").least;
+    written(|write| {
+        certify_least_clearance(&motion, freeze, &hint, text, 1000, write, &mut |_| ()).expect("lines");
+    })
+}
+
+fn speed(text: &str) -> Vec<u8> {
+    let scene = scene(text).expect("a scene");
+    let timeline = scene.motion.timeline(&mut |_| ());
+    written(|write| {
+        let found = certify_greatest_speed(&scene, &timeline, 1.5, text, 50_000, write, &mut |_| ());
+        found.expect("no lock").expect("lines");
+    })
+}
+
+/// Returns a certificate of the least pitch whose first pitch is not far from the least: with fewer lines.
+fn pitch(text: &str, radius: f64) -> Vec<u8> {
+    let scene = scene(text).expect("a scene");
+    let lines = written(|write| {
+        let found = certify_least_pitch(scene.team(), radius, text, write, &mut |_| ());
+        found.expect("a pitch").expect("lines");
+    });
+    let mut lines: Vec<Value> = text_lines(&lines).map(|line| serde_json::from_slice(line).expect("JSON")).collect();
+    let is_interval = |line: &Value| line["type"] == "overlap" || line["type"] == "head_locks";
+    let first = lines.iter().rposition(is_interval).map_or(2, |last| last.saturating_sub(INTERVALS).max(2));
+    let from = lines[first]["from"].clone();
+    lines.drain(2..first);
+    let last = lines.len() - 1;
+    (lines[1]["from"], lines[last]["from"]) = (from.clone(), from);
+    lines_of(&lines)
 }

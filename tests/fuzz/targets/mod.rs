@@ -7,6 +7,7 @@
 
 pub mod bytes;
 pub mod certificate;
+mod certificate_changes;
 pub mod command_line;
 pub mod control;
 pub mod environment;

@@ -9,7 +9,7 @@ use bench_dragon::publisher::live::{FrameSource, Period};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
 use bench_dragon::show::convert::Stamps;
-use mcap::{Message, Schema};
+use mcap::{Message, MessageStream, Schema};
 
 use crate::harness::{Process, can_run, json_lines, python, python_modules, summary, text};
 use crate::replay::files::{is_frame, on_channel, rewrite, with_bytes};
@@ -73,7 +73,7 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
     }
     let (sentence, _) = refusal(&bags[1], &[]);
     assert!(
-        sentence.contains("2 recordings") && sentence.contains("0.mcap") && sentence.contains("1.mcap"),
+        sentence.contains("bag_of_two: 1.mcap: it has a frame of period 0 after that of 0, expected"),
         "{sentence}"
     );
     let options: [(&[&str], &str); 6] = [
@@ -220,6 +220,51 @@ fn a_bag_of_another_recorder_is_played() {
     let played = Process::start(&mut replay("replay_bag_folder", &bag, &scene, &["--rate", "400"])).output_within(60);
     let played = summary(&played);
     assert_eq!((&played["frames"], &played["end"]), (&frames.len().into(), &"recording".into()), "{played}");
+}
+
+/// `ros2 bag record --max-bag-duration` begins a new file at times; the latched stage is in the first.
+#[test]
+fn a_bag_of_several_files_is_played_as_one_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = small_recording("replay_split", folder.path());
+    let bytes = std::fs::read(&file).unwrap();
+    let times: Vec<u64> = MessageStream::new(&bytes).unwrap().map(|message| message.unwrap().log_time).collect();
+    let (first, last) = (*times.iter().min().unwrap(), *times.iter().max().unwrap());
+    let bag = folder.path().join("bag");
+    std::fs::create_dir(&bag).unwrap();
+    for (part, name) in ["bag_9.mcap", "bag_10.mcap", "bag_11.mcap"].into_iter().enumerate() {
+        let part_of = |message: &Message<'_>| (message.log_time - first) * 3 / (last - first + 1);
+        rewrite(&bytes, &bag.join(name), |it| if part_of(&it) == part as u64 { vec![it] } else { vec![] });
+    }
+    let frames = contents(&file, None).unwrap();
+    // Without metadata.yaml, which a killed recorder does not write.
+    assert_eq!(contents(&bag, None).unwrap(), frames);
+    let scene = scene(folder.path(), "school", 64, "");
+    let played = Process::start(&mut replay("replay_split", &bag, &scene, &["--rate", "400"])).output_within(60);
+    let played = summary(&played);
+    assert_eq!((&played["frames"], &played["end"]), (&frames.len().into(), &"recording".into()), "{played}");
+
+    let list = |names: &[&str]| {
+        let lines: String = names.iter().map(|name| format!("    - {name}\n")).collect();
+        let text = format!("rosbag2_bagfile_information:\n  version: 9\n  relative_file_paths:\n{lines}  files:\n");
+        std::fs::write(bag.join("metadata.yaml"), text).unwrap();
+    };
+    list(&["bag_9.mcap", "bag_10.mcap"]);
+    let some = contents(&bag, None).unwrap();
+    assert!(some.len() > 1 && some.len() < frames.len() && frames.starts_with(&some), "{} frames", some.len());
+    let refusal = || contents(&bag, None).unwrap_err().to_string();
+    list(&["bag_9.mcap", "bag_12.mcap"]);
+    assert!(
+        refusal().starts_with("its metadata.yaml lists bag_12.mcap, which is not there, expected"),
+        "{}",
+        refusal()
+    );
+    list(&["bag_0.db3"]);
+    assert!(refusal().starts_with("its recording bag_0.db3 is no .mcap, expected"), "{}", refusal());
+    list(&["bag_9.mcap", "bag_10.mcap", "bag_11.mcap"]);
+    let whole = std::fs::read(bag.join("bag_11.mcap")).unwrap();
+    std::fs::write(bag.join("bag_11.mcap"), &whole[..whole.len() / 2]).unwrap();
+    assert!(refusal().starts_with("bag_11.mcap: it has no end"), "{}", refusal());
 }
 
 fn length_at(bytes: &[u8], at: usize) -> u64 {

@@ -1,15 +1,16 @@
 //! Reads a recording: checks that it can be played, reads its contents, and its chunks one by one.
 //!
-//! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics. Out: a [`Recording`],
-//! which has frames of a known type; then [`Item`]s, chunk by chunk, in the order of the file. That is the order of
-//! reception: log times decrease if the recording machine's clock was set back. Called by the
+//! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics, or a bag of several. Out: a
+//! [`Recording`], which has frames of a known type; then [`Item`]s, chunk by chunk, in the order of the files. That is the
+//! order of reception: log times decrease if the recording machine's clock was set back. Called by the
 //! [`replay`](crate::replay).
 
 use std::collections::HashMap;
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use byteorder::LittleEndian;
@@ -17,6 +18,7 @@ use mcap::records::{AttachmentIndex, ChunkIndex, Record, op};
 use mcap::{Channel, parse_record};
 use serde::de::DeserializeOwned;
 
+use super::bag::recordings_of;
 use super::index::{Index, index, told};
 use super::recover::records_of_chunk;
 use super::run::SCENE_ATTACHMENT;
@@ -87,6 +89,17 @@ pub enum ReadError {
     /// A frame can be read but not played.
     #[error("it has a frame {0}")]
     Frame(String),
+    /// A directory is no bag.
+    #[error("{}, expected a directory with recordings (.mcap), or a recording", printable(.0))]
+    Bag(String),
+    /// One of the files of a bag cannot be played.
+    #[error("{}: {error}", printable(.file))]
+    InFile {
+        /// The name of the file.
+        file: String,
+        /// The reason.
+        error: Box<ReadError>,
+    },
     /// The recording ends before the start.
     #[error("--start is {} and the recording reaches {end} s of the show, expected an earlier start", number(*.start))]
     Start {
@@ -112,14 +125,42 @@ pub enum Item {
     Stage(Box<StageMessage>),
 }
 
-/// A file that can be played.
+/// A file, or the files of a bag, that can be played.
 pub struct Recording {
+    files: Vec<OpenFile>,
+    /// The chunks in the order of the files, each with the index of its file.
+    chunks: Vec<(usize, ChunkIndex)>,
+    channels: HashMap<ChannelKey, Topic>,
+    contents: Contents,
+}
+
+/// The index of a file, and the number of a channel in it.
+type ChannelKey = (usize, u16);
+
+/// An open file.
+struct OpenFile {
     file: File,
     length: u64,
-    /// The chunks, in the order of the file.
-    chunks: Vec<ChunkIndex>,
-    channels: HashMap<u16, Topic>,
-    contents: Contents,
+    /// Its name in errors; `None` outside of a bag.
+    name: Option<String>,
+}
+
+impl OpenFile {
+    fn open(path: &Path, is_in_bag: bool) -> Result<Self, ReadError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = is_in_bag.then_some(name);
+        let opened = File::open(path).and_then(|mut file| Ok((file.seek(SeekFrom::End(0))?, file)));
+        let (length, file) = opened.map_err(|error| named(error.into(), name.as_deref()))?;
+        Ok(Self { file, length, name })
+    }
+}
+
+/// Adds the name of its file to an error.
+fn named(error: ReadError, file: Option<&str>) -> ReadError {
+    match file {
+        Some(file) => ReadError::InFile { file: file.to_owned(), error: Box::new(error) },
+        None => error,
+    }
 }
 
 /// The contents of a recording.
@@ -152,18 +193,34 @@ impl Contents {
 }
 
 impl Recording {
-    /// Opens a file, and reads its index and the first message of each topic.
+    /// Opens a file, or the files of a directory that `ros2 bag record` wrote. Reads their indexes and the first message
+    /// of each topic.
     ///
     /// # Errors
     /// [`ReadError`]
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let mut file = File::open(path)?;
-        let length = file.seek(SeekFrom::End(0))?;
-        let Index { channels, mut chunks, attachments, counts } = index(&mut file, length)?;
+        let is_bag = path.is_dir();
+        let paths: Vec<PathBuf> = if is_bag { recordings_of(path)? } else { vec![path.to_owned()] };
+        let (mut files, mut chunks, mut channels) = (Vec::new(), Vec::new(), HashMap::new());
+        let (mut counts, mut scene_text) = (Some(HashMap::new()), None);
+        for (number, path) in paths.iter().enumerate() {
+            let mut opened = OpenFile::open(path, is_bag)?;
+            let (index, text) = opened.read_index().map_err(|error| named(error, opened.name.as_deref()))?;
+            channels.extend(index.channels.into_iter().map(|(id, channel)| ((number, id), channel)));
+            let mut of_file = index.chunks;
+            of_file.sort_by_key(|chunk| chunk.chunk_start_offset);
+            chunks.extend(of_file.into_iter().map(|chunk| (number, chunk)));
+            // The frames of a bag are counted if each of its files counts its own.
+            counts = counts.zip(index.counts).map(|(mut all, of_file)| {
+                all.extend(of_file.into_iter().map(|(id, count)| ((number, id), count)));
+                all
+            });
+            scene_text = scene_text.or(text);
+            files.push(opened);
+        }
         let (channels, name) = played(&channels)?;
-        chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
-        let handles = channels.iter().find(|(_, topic)| **topic == Topic::Handles).map(|(id, _)| *id);
-        let frames = counts.and_then(|counts| counts.get(&handles?).copied());
+        let handles = || channels.iter().filter(|(_, topic)| **topic == Topic::Handles).map(|(key, _)| key);
+        let frames = counts.map(|counts| handles().filter_map(|key| counts.get(key)).sum());
         // Filled below.
         let contents = Contents {
             name,
@@ -173,10 +230,11 @@ impl Recording {
             frames,
             ends: [FrameHeader::default(); 2],
             stage: StageMessage::default(),
-            scene_text: scene_text(&mut file, length, &attachments)?,
+            scene_text,
         };
-        let mut recording = Self { file, length, chunks, channels, contents };
+        let mut recording = Self { files, chunks, channels, contents };
         recording.read_contents()?;
+        recording.check_order()?;
         Ok(recording)
     }
 
@@ -195,32 +253,12 @@ impl Recording {
     /// # Errors
     /// [`ReadError::Damaged`], after the messages before it, or [`ReadError::File`].
     pub fn read_chunk(&mut self, chunk: usize, handle: &mut dyn FnMut(Item)) -> Result<(), ReadError> {
-        let Some(index) = self.chunks.get(chunk) else { return Ok(()) };
-        let at = index.chunk_start_offset;
-        let damaged = |reason: &dyn Display| ReadError::Damaged { at, reason: reason.to_string() };
-        let bytes = usize::try_from(index.chunk_length).ok().filter(|_| {
-            let end = at.checked_add(index.chunk_length);
-            end.is_some_and(|end| end <= self.length)
-        });
-        let mut record = vec![0; bytes.ok_or_else(|| damaged(&"a chunk beyond the file's end"))?];
-        self.file.seek(SeekFrom::Start(at))?;
-        self.file.read_exact(&mut record)?;
-        let Some(([op::CHUNK, _, _, _, _, _, _, _, _], body)) = record.split_first_chunk() else {
-            return Err(damaged(&"no chunk is where the index has one"));
-        };
-        for record in records_of_chunk(body).map_err(|error| damaged(&told(&error)))? {
-            let Record::Message { header, data } = record else { continue };
-            let Some(topic) = self.channels.get(&header.channel_id) else { continue };
-            let item = match topic {
-                Topic::Handles => Some(Item::Frame(data.into_owned())),
-                Topic::Alerts => decoded(&data).map(|Stamped { layout, .. }| Item::Alert(layout)),
-                Topic::Cues => decoded(&data).map(|Stamped { layout, .. }| Item::Cue(layout)),
-                Topic::Status => decoded(&data).map(|Stamped { layout, .. }| Item::Status(Box::new(layout))),
-                _ => decoded(&data).map(|Stamped { layout, .. }| Item::Stage(Box::new(layout))),
-            };
-            handle(item.ok_or_else(|| damaged(&format_args!("a message of {} cannot be read", topic.name())))?);
-        }
-        Ok(())
+        let Some((file, index)) = self.chunks.get(chunk) else { return Ok(()) };
+        let (file, index) = (*file, index.clone());
+        let of_file = &mut self.files[file];
+        let channels = &self.channels;
+        let read = of_file.read_chunk(&index, &|id| channels.get(&(file, id)).copied(), handle);
+        read.map_err(|error| named(error, self.files[file].name.as_deref()))
     }
 
     /// Reads the first message of each topic, and the last frame.
@@ -247,9 +285,41 @@ impl Recording {
         Ok(())
     }
 
+    /// Checks that each file of a bag begins after the one before it, with frames of the same run.
+    fn check_order(&mut self) -> Result<(), ReadError> {
+        let mut before = self.contents.ends[0];
+        for file in 1..self.files.len() {
+            let chunks =
+                self.chunks.partition_point(|(of, _)| *of < file)..self.chunks.partition_point(|(of, _)| *of <= file);
+            let frame = |item| if let Item::Frame(bytes) = item { Some(bytes) } else { None };
+            let Some(bytes) = self.first_within(chunks, Topic::Handles, frame)? else { continue };
+            let header = header_of(&bytes)?;
+            let reason = match (header.run_id == before.run_id, header.tick > before.tick) {
+                (true, true) => None,
+                (true, false) => Some(format!("of period {} after that of {}", header.tick, before.tick)),
+                (false, _) => Some("of another run than the first".to_owned()),
+            };
+            if let Some(reason) = reason {
+                let error = ReadError::Frame(format!("{reason}, expected the files of one bag in their order"));
+                return Err(named(error, self.files[file].name.as_deref()));
+            }
+            before = header;
+        }
+        Ok(())
+    }
+
     /// Returns the first message of a topic for which `pick` returns a value.
     fn first<T>(&mut self, topic: Topic, pick: impl Fn(Item) -> Option<T>) -> Result<Option<T>, ReadError> {
-        for chunk in 0..self.chunks.len() {
+        self.first_within(0..self.chunks.len(), topic, pick)
+    }
+
+    fn first_within<T>(
+        &mut self,
+        chunks: Range<usize>,
+        topic: Topic,
+        pick: impl Fn(Item) -> Option<T>,
+    ) -> Result<Option<T>, ReadError> {
+        for chunk in chunks {
             let mut found = None;
             if self.may_hold(chunk, topic) {
                 self.read_chunk(chunk, &mut |item| found = found.take().or_else(|| pick(item)))?;
@@ -280,8 +350,53 @@ impl Recording {
 
     /// Returns true if a chunk can have messages of a topic, as one without an index of its messages can.
     fn may_hold(&self, chunk: usize, topic: Topic) -> bool {
-        let offsets = &self.chunks[chunk].message_index_offsets;
-        offsets.is_empty() || self.channels.iter().any(|(id, of)| *of == topic && offsets.contains_key(id))
+        let (file, index) = &self.chunks[chunk];
+        let offsets = &index.message_index_offsets;
+        let is_held = |(of, id): &ChannelKey| of == file && offsets.contains_key(id);
+        offsets.is_empty() || self.channels.iter().any(|(key, of)| *of == topic && is_held(key))
+    }
+}
+
+impl OpenFile {
+    /// Reads the index, and the text of the scene.
+    fn read_index(&mut self) -> Result<(Index, Option<String>), ReadError> {
+        let index = index(&mut self.file, self.length)?;
+        let text = scene_text(&mut self.file, self.length, &index.attachments)?;
+        Ok((index, text))
+    }
+
+    /// Calls `handle` with the messages of a chunk whose channel has a topic.
+    fn read_chunk(
+        &mut self,
+        index: &ChunkIndex,
+        topic_of: &dyn Fn(u16) -> Option<Topic>,
+        handle: &mut dyn FnMut(Item),
+    ) -> Result<(), ReadError> {
+        let at = index.chunk_start_offset;
+        let damaged = |reason: &dyn Display| ReadError::Damaged { at, reason: reason.to_string() };
+        let bytes = usize::try_from(index.chunk_length).ok().filter(|_| {
+            let end = at.checked_add(index.chunk_length);
+            end.is_some_and(|end| end <= self.length)
+        });
+        let mut record = vec![0; bytes.ok_or_else(|| damaged(&"a chunk beyond the file's end"))?];
+        self.file.seek(SeekFrom::Start(at))?;
+        self.file.read_exact(&mut record)?;
+        let Some(([op::CHUNK, _, _, _, _, _, _, _, _], body)) = record.split_first_chunk() else {
+            return Err(damaged(&"no chunk is where the index has one"));
+        };
+        for record in records_of_chunk(body).map_err(|error| damaged(&told(&error)))? {
+            let Record::Message { header, data } = record else { continue };
+            let Some(topic) = topic_of(header.channel_id) else { continue };
+            let item = match topic {
+                Topic::Handles => Some(Item::Frame(data.into_owned())),
+                Topic::Alerts => decoded(&data).map(|Stamped { layout, .. }| Item::Alert(layout)),
+                Topic::Cues => decoded(&data).map(|Stamped { layout, .. }| Item::Cue(layout)),
+                Topic::Status => decoded(&data).map(|Stamped { layout, .. }| Item::Status(Box::new(layout))),
+                _ => decoded(&data).map(|Stamped { layout, .. }| Item::Stage(Box::new(layout))),
+            };
+            handle(item.ok_or_else(|| damaged(&format_args!("a message of {} cannot be read", topic.name())))?);
+        }
+        Ok(())
     }
 }
 
@@ -353,12 +468,14 @@ fn decoded<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
 }
 
 /// Returns the played channels and the name of their publisher.
-fn played(channels: &HashMap<u16, Arc<Channel<'_>>>) -> Result<(HashMap<u16, Topic>, String), ReadError> {
+fn played(channels: &HashMap<ChannelKey, Arc<Channel<'_>>>) -> Result<(HashMap<ChannelKey, Topic>, String), ReadError> {
     let handles = format!("/{}", Topic::Handles.name());
     let own = MessageType::of(Topic::Handles).ros_name();
     let is_own = |channel: &Channel<'_>| channel.schema.as_ref().is_some_and(|schema| schema.name == own);
     let all = channels.values();
     let mut names: Vec<&str> = all.clone().filter_map(|channel| channel.topic.strip_suffix(&handles)).collect();
+    names.sort_unstable();
+    names.dedup();
     if names.len() > 1 {
         // Another program's topic may have the same ending.
         names = all.filter(|channel| is_own(channel)).filter_map(|it| it.topic.strip_suffix(&handles)).collect();
@@ -371,11 +488,11 @@ fn played(channels: &HashMap<u16, Arc<Channel<'_>>>) -> Result<(HashMap<u16, Top
         _ => return Err(ReadError::Publishers(names.join(", "))),
     };
     let mut played = HashMap::new();
-    for (id, channel) in channels {
+    for (key, channel) in channels {
         let last = channel.topic.strip_prefix(name).and_then(|rest| rest.strip_prefix('/'));
         if let Some(topic) = TOPICS.into_iter().find(|topic| Some(topic.name()) == last) {
             check_type(channel, topic)?;
-            played.insert(*id, topic);
+            played.insert(*key, topic);
         }
     }
     Ok((played, name.trim_start_matches('/').to_owned()))
