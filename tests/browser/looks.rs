@@ -42,6 +42,11 @@ fn seat_shows_the_dragon() {
 }
 
 #[test]
+fn slow_computer_shows_stills() {
+    run_scenario("tests/python/stage_seat.py", "slow_computer_shows_stills");
+}
+
+#[test]
 fn cameras_are_kept() {
     run_scenario("tests/python/stage_seat.py", "cameras_are_kept");
 }
