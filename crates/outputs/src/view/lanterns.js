@@ -20,7 +20,7 @@ const ON_BODY = [-0.41, 0, 0.41], ON_HEAD = [-0.7, -0.44, -0.18, 0.09];
 /** The reach of halos from the middle of a board. */
 const HALO_REACH = 1.6;
 /** Pictures from one ground to the next, and from one picture of the halos. */
-const GROUND_EVERY = 3, AIR_EVERY = 3;
+const GROUND_EVERY = 3, AIR_EVERY = 2;
 /** The step of the sizes in which sprites are cut. */
 const SIZES = 1.06;
 /** Handles of a line of light that is drawn at once. */
@@ -246,7 +246,7 @@ export class Lanterns {
   boards(context, view, { boards, dragon, kit }) {
     const wide = dragon.stage.width * view.pixels, edge = Math.max(0.02 * view.pixels, 0.9);
     const coats = wide > 7 ? [[kit.edge, wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
-    if (wide > 24) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
+    if (wide > 16) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
     context.globalAlpha = Math.min(1, dragon.show.life * 1.5);
     for (const [strokeStyle, lineWidth, inset] of coats) {
       Object.assign(context, { strokeStyle, lineWidth });
