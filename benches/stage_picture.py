@@ -50,14 +50,15 @@ def server(*arguments):
 
 
 @contextlib.contextmanager
-def pages(url, count, address="", **viewport):
-    """Pages, each in a separate Chromium."""
+def pages(url, count, address="", script="", **viewport):
+    """Pages, each in a separate Chromium, in which `script` runs first."""
     with contextlib.ExitStack() as stack:
         playwright = stack.enter_context(sync_playwright())
         opened = []
         for _ in range(count):
             chromium = stack.enter_context(playwright.chromium.launch(executable_path="/usr/bin/chromium"))
             opened.append(chromium.new_page(viewport=viewport))
+            opened[-1].add_init_script(script)
             opened[-1].goto(url + address)
         yield opened
 
@@ -152,9 +153,9 @@ def renderers():
 TEAMS = [("223 benches", ["--start", "300"]), ("5,000 benches", ["--scene", str(ROOT / "config" / "long.toml")])]
 
 
-def used_by(url, address, arguments, size):
+def used_by(url, address, arguments, size, script):
     """Returns pictures a second of a page, and milliseconds of processor a picture."""
-    with started("run", "--quiet", "--json", *arguments), pages(url, 1, address, **size) as [page]:
+    with started("run", "--quiet", "--json", *arguments), pages(url, 1, address, script, **size) as [page]:
         page.wait_for_timeout(4000)
         first, before = picture(page), chromium_cpu()
         page.wait_for_timeout(5000)
@@ -163,14 +164,14 @@ def used_by(url, address, arguments, size):
     return 1000 * drawn / (last["now"] - first["now"]), (after - before) / drawn
 
 
-def compared(looks, size, turns, *serving):
+def compared(looks, size, turns, *serving, script=""):
     """Measures pages, by their addresses, in turn, so that other work of the machine affects all alike."""
     for name, arguments in TEAMS:
         found = {look: [] for look in looks}
         for _ in range(turns):
             for look, address in looks.items():
                 with server(*serving) as (url, _):
-                    found[look].append(used_by(url, address, arguments, size))
+                    found[look].append(used_by(url, address, arguments, size, script))
         medians = {look: [statistics.median(figures) for figures in zip(*turns)] for look, turns in found.items()}
         for look, (rate, used) in medians.items():
             print(f"{name}, {size['width']} x {size['height']}: {look:18} {rate:5.1f} pictures/s, {used:6.1f} ms of processor a picture")
@@ -187,6 +188,10 @@ VIEW = "crates/outputs/src/view"
 OLD_STAGE = ("handle(message) {", 'handle(message) {\n    if (message.type === "stage") message = { ...message, ...message.dragons[0], name: "" };')
 
 
+# Both draw as many pictures a second: what a page costs besides its pictures is then the same share of each.
+EQUAL = "{ const next = requestAnimationFrame; window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 80); }"
+
+
 def before():
     """Serves the page of an earlier commit, as it was, beside the present one."""
     git = lambda *arguments: subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True).stdout
@@ -197,7 +202,7 @@ def before():
                 pathlib.Path(folder, pathlib.Path(file).name).write_text(text.replace(*OLD_STAGE), encoding="utf-8")
         pathlib.Path(folder, "publishers.js").write_text(f"export const publishers = {json.dumps([NAME])};\n", encoding="utf-8")
         pages = {"#show": "#show", "#show before": "pages/index.html#show"}
-        for medians in compared(pages, {"width": 1920, "height": 1080}, 5, "--pages", folder):
+        for medians in compared(pages, {"width": 1920, "height": 1080}, 5, "--pages", folder, script=EQUAL):
             print(f"    ratio {medians['#show'][1] / medians['#show before'][1]:.2f}")
 
 
