@@ -34,8 +34,14 @@ export class Dragon {
     this.marks = [];
   }
 
-  /** The name by which people know it. */
+  /** The name by which people know it; after the publisher's for one of several dragons of several publishers. */
   get name() {
+    const { part, publisher } = this;
+    return part && publisher.several ? `${publisher.name} ${part}` : this.ownName;
+  }
+
+  /** Its name in its show, or that of its publisher for a single dragon. */
+  get ownName() {
     return this.part || this.publisher.name;
   }
 

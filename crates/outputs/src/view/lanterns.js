@@ -3,7 +3,7 @@
 // the light is other than black.
 //
 // Light is drawn small and enlarged: pools on the ground at an eighth of the size, halos at a quarter. The ground is
-// paving times light, and is made again in every third picture, or for another camera.
+// paving times light, and is made again in every third picture, or for another camera; so are the halos.
 
 import { headPicture, tailPicture } from "./dragon_head.js";
 import { STRIDE } from "./hermite.js";
@@ -19,8 +19,8 @@ const FINE = 22, CLOSE = 16;
 const ON_BODY = [-0.41, 0, 0.41], ON_HEAD = [-0.7, -0.44, -0.18, 0.09];
 /** The reach of halos from the middle of a board. */
 const HALO_REACH = 1.6;
-/** Pictures from one ground to the next, and from one picture of the halos. */
-const GROUND_EVERY = 3, AIR_EVERY = 2;
+/** Pictures from one ground to the next, and from one picture of the halos to the next, which is made between. */
+const LIGHT_EVERY = 3;
 /** The step of the sizes in which sprites are cut. */
 const SIZES = 1.06;
 /** Handles of a line of light that is drawn at once. */
@@ -65,8 +65,8 @@ export class Lanterns {
   draw(context, camera, dragons) {
     const view = viewOf(context.canvas, camera),
         teams = dragons.map((dragon) => ({ ...boardsOf(view, dragon), kit: this.kits.of(dragon.identity) }));
-    const isOther = this.lighted !== view.key, isNew = isOther || this.picture % GROUND_EVERY === 0;
-    const isAir = isOther || this.picture % (view.pixels >= FINE ? AIR_EVERY : GROUND_EVERY) === 0;
+    const isOther = this.lighted !== view.key, isNew = isOther || this.picture % LIGHT_EVERY === 0;
+    const isAir = isOther || this.picture % LIGHT_EVERY === 1;
     this.lighted = view.key;
     this.picture++;
     view.fine = view.pixels >= FINE;
@@ -246,7 +246,7 @@ export class Lanterns {
   boards(context, view, { boards, dragon, kit }) {
     const wide = dragon.stage.width * view.pixels, edge = Math.max(0.02 * view.pixels, 0.9);
     const coats = wide > 7 ? [[kit.edge, wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
-    if (wide > 16) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
+    if (wide > 24) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
     context.globalAlpha = Math.min(1, dragon.show.life * 1.5);
     for (const [strokeStyle, lineWidth, inset] of coats) {
       Object.assign(context, { strokeStyle, lineWidth });

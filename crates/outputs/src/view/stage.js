@@ -86,7 +86,7 @@ function meet() {
   const now = publishers.flatMap((one) => one.dragons), key = now.map(({ name }) => name).join(" ");
   if (now.length === dragons.length && now.every((one, k) => one === dragons[k]) && key === meet.key) return;
   [dragons, several, meet.key] = [now, now.length > 1, key];
-  const identities = several ? identitiesOf(now.map(({ name }) => name)) : [null];
+  const identities = several ? identitiesOf(now.map(({ ownName }) => ownName)) : [null];
   now.forEach((dragon, k) => (dragon.identity = identities[k]));
   root.toggleAttribute("data-several", several);
   roster.list(several ? dragons : []);
