@@ -228,7 +228,7 @@ fn a_team_that_starts_on_an_obstacle_or_outside_the_boundary_meets_it_at_once_wi
 #[test]
 fn a_picture_has_every_obstacle_at_its_place_with_its_keep_out() {
     let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
-    let output = program.args(["--scene", "config/square.toml", "draw", "--at", "46"]).output().unwrap();
+    let output = program.args(["--scene", "tests/compute/ground.toml", "draw", "--at", "46"]).output().unwrap();
     let svg = text(&output.stdout);
     let picture = roxmltree::Document::parse(&svg).unwrap();
     let group = |id: &str| picture.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
@@ -246,6 +246,12 @@ fn a_picture_has_every_obstacle_at_its_place_with_its_keep_out() {
     assert_eq!(outline("boundary"), "M-30 -20L30 -20L30 25L-30 25Z");
     let wide: Vec<_> = group("keep-outs").children().filter_map(|node| node.attribute("stroke-width")).collect();
     assert_eq!(wide, ["3", "3", "2", "2"]);
+    // Dashes around each side of a keep-out: 1 circle, 2 + 1 sides of the spectators, 5 of the house, 4 of the boundary.
+    let rims = group("keep-out-rims");
+    assert!(rims.attribute("stroke-dasharray").is_some());
+    assert_eq!(rims.children().filter(roxmltree::Node::is_element).count(), 13);
+    let of_lamp = rims.children().find(roxmltree::Node::is_element).unwrap().attribute("d").unwrap();
+    assert_eq!(of_lamp, "M3.1 3.5A0.9 0.9 0 0 1 4.9 3.5A0.9 0.9 0 0 1 3.1 3.5Z");
     assert!(picture.descendants().any(|node| node.attribute("id") == Some("obstacle-names")));
     let without = Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["draw", "--at", "46"]).output().unwrap();
     assert!(!text(&without.stdout).contains("ground\""), "a scene without obstacles has no ground");
