@@ -31,7 +31,9 @@ EVENTS = ("contact", "stall", "lock", "path_end")
 # Lines of the certificates of each question, beside the first: any other line is refused.
 LINES = {
     "events": ("step", "result", "reached", *EVENTS),
-    "least_clearance": ("step", "near", "contact", "path_end", "least_clearance"),
+    "least_clearance": (
+        "step", "near", "near_obstacle", "contact", "path_end", "least_clearance", "obstacle_clearance"
+    ),
     "greatest_speed": ("speeds", "fast", "greatest_speed"),
     "least_pitch": ("reach", "overlap", "head_locks", "far", "step", "least_pitch"),
 }
@@ -666,6 +668,30 @@ class Judge:
             require(nearest <= claim["hi"], f"benches {i} and {j} are {float(nearest)} m apart, not {claim['hi']} m")
         self.counts["clearances"] += 1
 
+    def obstacle_clearance(self, claim, near, until, number):
+        """Checks that no board is nearer to an obstacle than claimed, and that one is as near."""
+        scene, lo, hi = self.scene, claim["lo"], claim["hi"]
+        shape = scene.obstacles[claim["obstacle"]]
+        time = float((scene.travelled(read_place(near["at"][0])) / scene.speed).mid()) if near else until
+        around = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+        # A board that overlaps the shape has no distance here.
+        times = around if lo is not None and shape.distance + lo > 0 else []
+        for at in times:
+            wider = Obstacle(shape.kind, shape.points, shape.distance + arb(lo))
+            try:
+                avoided = [wider.is_avoided(board) for board in scene.boards(self.at(at))]
+            except Undecided:
+                self.counts["undecided"] += 1
+                continue
+            self.counts["places"] += 1
+            self.counts["obstacles"] += len(avoided)
+            require(all(avoided), f"a board is nearer to obstacle {claim['obstacle']} than {lo} m at t = {at} s")
+        if hi is not None:
+            bench = claim["bench"]
+            board = scene.boards(scene.chain(read_place(near["at"][0]), bench + 2))[bench]
+            wider = Obstacle(shape.kind, shape.points, shape.distance + arb(hi))
+            require(wider.is_reached(board), f"bench {bench} is not within {hi} m of obstacle {claim['obstacle']}")
+
     def ratios(self, places):
         """Returns the speeds of all handles, with the head's as 1."""
         ratios = [arb(1)]
@@ -794,7 +820,9 @@ def judged(lines, places, seed):
     if about == "events":
         judged_events(judge, lines, places)
         return judge.counts
-    claim = lines[-1]
+    beside = [line for line in lines if line["type"] == "obstacle_clearance"]
+    require(len(beside) == (len(judge.scene.obstacles) if about == "least_clearance" else 0), "a result is missing")
+    claim = lines[-1 - len(beside)]
     require(claim["type"] == about, f"the last line is a {claim['type']}")
     if about == "least_pitch":
         judge.least_pitch(claim, lines, places)
@@ -811,6 +839,10 @@ def judged(lines, places, seed):
             require((i, j) == (claim["bench_a"], claim["bench_b"]) and overlap(boards[i], boards[j]), "no contact")
             until = float((scene.travelled(read_place(until)) / scene.speed).mid())
         judge.least_clearance(claim, found.get("near"), until * (1 - 1e-9), places)
+        near = {line["obstacle"]: line for line in lines if line["type"] == "near_obstacle"}
+        for result in beside:
+            until = result["time_until"] if result["until"] == "time" else float((scene.length / scene.speed).mid())
+            judge.obstacle_clearance(result, near.get(result["obstacle"]), until * (1 - 1e-9), places)
     steps = [line for line in lines if line["type"] in ("step", "speeds")]
     for line in judge.random.sample(steps, min(places, len(steps))):
         judge.span(line)

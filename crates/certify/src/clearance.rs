@@ -108,8 +108,8 @@ pub struct ClearanceEnclosures {
 }
 
 /// Encloses the least clearance of all pairs of boards that share no handle, and that of each obstacle, from the start
-/// until the show ends at `show_end`. The enclosures are a nanometre wide, unless the search gives up after `most_steps`.
-/// `progress` receives the share that is done, from 0 to 1.
+/// until the show ends at `show_end`. The enclosures are a nanometre wide, unless the search gives up after
+/// `most_steps`. `progress` receives the share that is done, from 0 to 1.
 pub fn enclose_least_clearance(
     motion: &Motion,
     show_end: &TimedEvent,
@@ -120,8 +120,8 @@ pub fn enclose_least_clearance(
     Descent::new(chain_of(motion), show_end.event.travelled, most_steps, None).run(motion, show_end, hints, progress)
 }
 
-/// Encloses the least clearances as [`enclose_least_clearance`] does, and writes a certificate. `scene` is the text of the
-/// motion's scene. The certificate of a show that ends with a lock ends a nanometre of travel before the lock.
+/// Encloses the least clearances as [`enclose_least_clearance`] does, and writes a certificate. `scene` is the text of
+/// the motion's scene. The certificate of a show that ends with a lock ends a nanometre of travel before the lock.
 ///
 /// # Errors
 /// [`CertifyError::Write`]

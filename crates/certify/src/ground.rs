@@ -13,6 +13,9 @@ use bench_dragon_motion::model::{self, Point};
 /// Rounding of a corner in the path's own coordinates, as a share of the coordinates.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
+/// Metres of an overlap with an outline that is no more than a touch.
+const DEEPEST: f64 = 1e-10;
+
 /// An obstacle in the path's own coordinates.
 pub(super) struct Barrier {
     obstacle: Obstacle,
@@ -88,6 +91,12 @@ impl Barrier {
         let pin = Board { centre: board.inner_point(), half_length: 0.0, half_width: 0.0, ..in_doubles };
         let is_inner = board.first_order.is_none_or(|(first, _)| first.holds_front_point(metres.min(0.0).abs()));
         shape.kind() == ShapeKind::Line || is_inner && shape.signed_distance(&pin) > *rounding
+    }
+
+    /// Returns true if a least clearance can be enclosed: of an overlap with a shape other than a circle it cannot.
+    pub fn is_decidable(&self, clearance: f64) -> bool {
+        let Obstacle { shape, keep_out, .. } = &self.obstacle;
+        shape.kind() == ShapeKind::Circle || clearance + keep_out > -DEEPEST
     }
 
     /// Returns an upper bound of the clearance of a board, metres.

@@ -206,8 +206,8 @@ impl Ensemble {
         Ok((first.map(|(meeting, pair)| self.contact_event(&meeting, pair)), until))
     }
 
-    /// Returns the first contact of boards of two dragons up to a time of the show: its time, and a bench of each, counted
-    /// within it; `None` if there is none, or the search gave up.
+    /// Returns the first contact of boards of two dragons up to a time of the show: its time, and a bench of each,
+    /// counted within it; `None` if there is none, or the search gave up.
     pub fn first_contact_of(
         &self,
         pair: [usize; 2],

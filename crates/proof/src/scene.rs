@@ -203,8 +203,8 @@ impl Scene {
         Ok(Self { name, delay, frame, team, path, head_speed, obstacles })
     }
 
-    /// Returns the seconds of the show at which the head has travelled some metres: before the path's start 0, and at it
-    /// from 0 until it begins to move.
+    /// Returns the seconds of the show at which the head has travelled some metres: before the path's start 0, and at
+    /// it from 0 until it begins to move.
     pub fn time(&self, travelled: &Interval) -> Interval {
         let zero = Interval::new(0.0);
         let seconds = (travelled / self.head_speed).max(&zero);
