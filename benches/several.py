@@ -9,6 +9,9 @@ figures. Needs:
 
     cargo build --release
     python3 benches/several.py [--seconds 15] [--rounds 3] [--counts 1,2,10] [--rates 60,1000] [--scene FILE]
+
+With --one-show N in place of --scene, each publisher has one show of N dragons of 223 benches that coil into each other
+in pairs, with alerts: for example --one-show 16 --counts 1 --rates 60 --rounds 1 --seconds 60.
 """
 
 import argparse
@@ -18,13 +21,39 @@ import re
 import signal
 import statistics
 import subprocess
+import tempfile
 import time
 import urllib.request
 
 PROGRAM = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release", "bench-dragon")
 # Time until tables are made and every service is connected.
 WARM_UP = 4
-COLUMNS = ("cpu", "memory", "p50", "p99", "max")
+# Start of a show of several, simulated seconds: both teams of a pair are in the coil.
+START = 100
+DRAGON = """
+[[dragons]]
+name = "d{number}"
+placement = {{ origin = [{x}.0, {y}.0], rotation_turns = {turns} }}
+[dragons.team]
+benches = 223
+head_length = 3.41
+body_length = 2.20
+width = 0.30
+hole_inset = 0.275
+[dragons.path]
+kind = "spiral"
+pitch = 1.7
+start_turn = 8
+[dragons.motion]
+head_speed = 1.0
+"""
+COLUMNS = ("cpu", "memory", "step", "p50", "p99", "max")
+
+
+def one_show(count):
+    """Returns the scene of dragons that coil in pairs, 300 m from each other."""
+    place = lambda number: {"x": 300 * (number // 2 % 4), "y": 300 * (number // 8), "turns": 0.5 * (number % 2)}
+    return "[alerts]\n" + "".join(DRAGON.format(number=number, **place(number)) for number in range(count))
 
 
 def cpu_seconds(process):
@@ -50,12 +79,16 @@ def missed(url):
 def round_of(count, rate, arguments):
     names = [f"several_{os.getpid()}_{place}" for place in range(count)]
     scene = ["--scene", arguments.scene] if arguments.scene else []
-    run = ["run", "--json", "--quiet", "--loop", "--rate", str(rate)]
+    start = ["--start", str(START)] if arguments.one_show else []
+    run = ["run", "--json", "--quiet", "--loop", "--rate", str(rate), *start]
     publishers = [subprocess.Popen([PROGRAM, "--name", name, *scene, *run], stdout=subprocess.PIPE) for name in names]
     reader = [part for name in names for part in ("--name", name)] + ["metrics", "--json", "--listen", "127.0.0.1:0"]
     reader = subprocess.Popen([PROGRAM, *reader], stdout=subprocess.PIPE)
     try:
         url = json.loads(reader.stdout.readline())["url"]
+        # The search for contacts of a show of several may take longer.
+        while missed(url)[0] < count:
+            time.sleep(0.1)
         time.sleep(WARM_UP)
         began = time.monotonic()
         before = [cpu_seconds(one) for one in [*publishers, reader]]
@@ -75,6 +108,7 @@ def round_of(count, rate, arguments):
     lateness = {name: [one["wakeup_ns"][name] / 1000 for one in summaries] for name in ("p50", "p99", "max")}
     return {
         "cpu": cpu[:-1], "memory": memory, **lateness, "reader": cpu[-1],
+        "step": [one["step_ns"]["p99"] / 1000 for one in summaries],
         "skipped": sum(one["skipped"] for one in summaries), "periods": sum(one["skipped"] + one["frames"] for one in summaries),
         "missed": now_lost - lost, "received": now_received - received,
     }
@@ -88,9 +122,15 @@ def main():
     parser.add_argument("--counts", type=numbers, default=[1, 2, 10])
     parser.add_argument("--rates", type=numbers, default=[60, 1000])
     parser.add_argument("--scene")
+    parser.add_argument("--one-show", type=int, metavar="N")
     arguments = parser.parse_args()
+    if arguments.one_show:
+        folder = tempfile.TemporaryDirectory()
+        arguments.scene = os.path.join(folder.name, "show.toml")
+        with open(arguments.scene, "w", encoding="utf-8") as file:
+            file.write(one_show(arguments.one_show))
     print(f"{os.cpu_count()} CPUs; load before: {' '.join(f'{one:.2f}' for one in os.getloadavg())}")
-    heads = ("CPU each, %", "memory, MB", "late p50, us", "late p99, us", "late max, us")
+    heads = ("CPU each, %", "memory, MB", "step p99, us", "late p50, us", "late p99, us", "late max, us")
     print(f"{'Hz':>5} {'dragons':>7}" + "".join(f"{one:>22}" for one in heads) + f"{'skipped':>22}{'missed by the reader':>22}{'reader CPU, %':>15}")
     for rate in arguments.rates:
         rounds = {count: [] for count in arguments.counts}

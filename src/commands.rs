@@ -114,19 +114,11 @@ impl Common {
         self.names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Reads the scene that the command line names.
+    /// Reads the scene that the command line names, of one dragon or of several.
     ///
     /// # Errors
     /// Bad input: the sentence names the file, the line and the field.
     pub fn load_scene(&self) -> Result<Scene, CommandError> {
-        Ok(self.scene_text()?.parse()?)
-    }
-
-    /// Reads the scene, of one dragon or of several.
-    ///
-    /// # Errors
-    /// As [`Common::load_scene`].
-    pub fn load_any_scene(&self) -> Result<Scene, CommandError> {
         Ok(self.scene_text()?.parse_any()?)
     }
 
@@ -295,15 +287,6 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     let sentence = "the scene names the solver \"paper\", whose head is too fast: only exact motion can be certified, \
                     expected motion.accuracy or another solver";
     Err(CommandError::BadInput(sentence.to_owned()))
-}
-
-/// Refuses a scene of several dragons where `what` knows one.
-pub fn expect_one(scene: &Scene, what: &str) -> Result<(), CommandError> {
-    if scene.ensemble.is_none() {
-        return Ok(());
-    }
-    let sentence = format!("{what} knows one dragon and the scene has several, expected a scene with [team]");
-    Err(CommandError::BadInput(sentence))
 }
 
 /// Refuses a scene of several dragons, whose clearance no proof knows.

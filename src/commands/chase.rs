@@ -23,9 +23,10 @@ use bench_dragon::messages::ChaseStatus;
 use bench_dragon::messages::chase::{ChaseSource, ChaseState};
 use bench_dragon::messages::json::ChaseObject;
 use bench_dragon::messages::sentence::chase_sentence;
+use bench_dragon::motion::Motion;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::proof::scene_hash;
-use bench_dragon::show::scene::SceneText;
+use bench_dragon::show::scene::{Scene, SceneText};
 
 use super::{CommandError, Common, Output, expect_exact_motion, stop_on_signals, wall_seconds};
 
@@ -103,6 +104,9 @@ struct PsnArguments {
     /// The stage's axes that are the sender's x, y and z, as of `send psn`
     #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
     axes: Axes,
+    /// The dragon whose head it is, in a show of several
+    #[arg(long, value_name = "NAME")]
+    dragon: Option<String>,
     /// How long to go on when the tracker is not seen, before the show is paused
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = wall_seconds)]
     freewheel: f64,
@@ -187,18 +191,40 @@ fn scene_text(common: &Common, stop: &AtomicBool) -> Result<Option<SceneText>, C
     Ok(found.map(|text| SceneText { text, file, stem: common.name().to_owned() }))
 }
 
+/// Returns the motion of the head that the tracker is at, and its delay in the show.
+fn followed(scene: Scene, dragon: Option<&str>) -> Result<(Motion, f64), CommandError> {
+    let refused = |sentence: String| Err(CommandError::BadInput(sentence));
+    match (&scene.ensemble, dragon) {
+        (None, None) => Ok((scene.motion, 0.0)),
+        (None, Some(name)) => {
+            refused(format!("--dragon names {name} and the scene has one dragon, expected no --dragon"))
+        }
+        (Some(ensemble), name) => match ensemble.dragons().iter().find(|dragon| Some(dragon.name.as_str()) == name) {
+            Some(dragon) => Ok((dragon.motion.clone(), dragon.delay)),
+            None => {
+                let names: Vec<&str> = ensemble.dragons().iter().map(|dragon| dragon.name.as_str()).collect();
+                let names = names.join(", ");
+                refused(format!(
+                    "the scene has several dragons, expected --dragon with one of {names}: a tracker is at one head"
+                ))
+            }
+        },
+    }
+}
+
 fn psn(common: &Common, arguments: &PsnArguments, stop: &Arc<AtomicBool>) -> Result<(), CommandError> {
-    let PsnArguments { tracker, group, interface, axes, freewheel } = *arguments;
+    let PsnArguments { tracker, group, interface, axes, ref dragon, freewheel } = *arguments;
     let Some(text) = scene_text(common, stop)? else { return Ok(()) };
     let scene_hash = scene_hash(&text.text);
-    let scene = text.parse()?;
+    let scene = text.parse_any()?;
     expect_exact_motion(&scene)?;
+    let (motion, delay) = followed(scene, dragon.as_deref())?;
     let inputs = sources::psn(group, interface, tracker, stop)?;
     let to_stage = Box::new(move |position| {
         let [x, y, _up] = axes.stage(position);
         [x, y]
     });
-    let leader = TrackerLeader { tracker, track: Track::new(scene.motion, freewheel), to_stage, scene_hash };
+    let leader = TrackerLeader { tracker, track: Track::new(motion, delay, freewheel), to_stage, scene_hash };
     let what = format!("tracker {tracker} of PosiStageNet at {group}");
     follow(common, stop, ChaseSource::Psn, Leader::Tracker(leader), inputs, &what)
 }

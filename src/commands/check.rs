@@ -27,8 +27,7 @@ use super::events::{bench_name, find_least_clearance, least_clearance, sentence}
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{
-    CommandError, Common, Output, expect_exact_motion, expect_one, expect_one_dragon, figure, number, progress_bar,
-    search_timeline,
+    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, number, progress_bar, search_timeline,
 };
 
 /// Arguments of `check`.
@@ -51,7 +50,7 @@ pub struct CheckArguments {
     /// The last time of --swept: seconds, or an event; by default the end of the show
     #[arg(long, value_name = "TIME", requires = "swept", allow_negative_numbers = true)]
     until: Option<String>,
-    /// The benches of --swept, counted from 1; by default all
+    /// The benches of --swept, counted from 1, of several dragons as in gold:1-20; by default all
     #[arg(long, value_name = "FIRST-LAST", requires = "swept", value_parser = benches)]
     benches: Option<Benches>,
     /// Write the certificate of the proof to this file, for `verify`
@@ -339,8 +338,8 @@ impl CheckArguments {
     /// Writes the file of --swept and returns what it holds.
     fn covered(&self, scene: &Scene, timeline: &Timeline, common: &Common) -> Result<Option<Swept>, CommandError> {
         let Some(file) = &self.swept else { return Ok(None) };
-        expect_one(scene, "--swept")?;
-        let stretch = Stretch { from: self.from.as_deref(), until: self.until.as_deref(), benches: self.benches };
+        let stretch =
+            Stretch { from: self.from.as_deref(), until: self.until.as_deref(), benches: self.benches.as_ref() };
         let ground = swept(scene, timeline, stretch, common)?;
         ground.write(scene, file)?;
         Ok(Some(ground))

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::solve::time_of;
 use super::swept::{Benches, Stretch, benches, swept};
-use super::{CommandError, Common, Output, expect_one, figure, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
 
 /// Arguments of `draw`.
 #[derive(Debug, clap::Args)]
@@ -47,7 +47,7 @@ struct Many {
     /// The last time, inclusive: seconds, or an event; with --swept by default the end of the show
     #[arg(long, value_name = "TIME", requires = "stretch", allow_negative_numbers = true)]
     until: Option<String>,
-    /// The benches whose ground is drawn, counted from 1; by default all
+    /// The benches whose ground is drawn, counted from 1, of several dragons as in gold:1-20; by default all
     #[arg(long, value_name = "FIRST-LAST", requires = "swept", value_parser = benches)]
     benches: Option<Benches>,
     /// One SVG that moves, in place of many: in real time, about --every seconds between two moments
@@ -108,17 +108,8 @@ const VIEW: Accepted = Accepted { least: 1e-9, greatest: 1e9, unit: "metres" };
 
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
-    let scene = common.load_any_scene()?;
+    let scene = common.load_scene()?;
     let look = arguments.look.look()?;
-    if look.style == Style::Lanterns {
-        expect_one(&scene, "--look lanterns")?;
-    }
-    if arguments.many.swept {
-        expect_one(&scene, "--swept")?;
-    }
-    if arguments.many.animated {
-        expect_one(&scene, "--animated")?;
-    }
     let timeline = search_timeline(&scene, common);
     let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);
     let many = &arguments.many;
@@ -141,7 +132,8 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
         }
         _ => {
             let time = time_of("--at", &arguments.at, &timeline)?;
-            let stretch = Stretch { from: Some(&many.from), until: many.until.as_deref(), benches: many.benches };
+            let stretch =
+                Stretch { from: Some(&many.from), until: many.until.as_deref(), benches: many.benches.as_ref() };
             let ground = many.swept.then(|| swept(&scene, &timeline, stretch, common)).transpose()?;
             session.draw_one(look, time, ground.as_ref().map(|ground| &ground.area))
         }

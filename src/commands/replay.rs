@@ -65,7 +65,7 @@ pub struct ReplayArguments {
 /// Plays the recording until it is over, its duration is, or a signal comes.
 pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), CommandError> {
     let options = arguments.options()?;
-    let mut scene = common.load_any_scene()?;
+    let mut scene = common.load_scene()?;
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
     }
@@ -115,6 +115,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         opened: Box::new(print_start),
         announce: Box::new(|_| ()),
         sample: Box::new(|_| ()),
+        alive: Box::new(|| ()),
         ended: Box::new(|_| ()),
     };
     let mut published = publish(common, &stage.stage, &publishing, &mut frames, (transports, doors), &stop, hooks)?;

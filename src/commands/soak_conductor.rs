@@ -55,7 +55,7 @@ pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<()
 
 /// Returns the facts of a scene's show. Searches for its events.
 fn facts_of(scene: &Scene) -> ShowFacts {
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.timeline(&mut |_| ());
     let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
     let stops = scene.alerts.is_some() && scene.on_contact == OnContact::Stop;
     let cue = |cue: &Cue| Some((cue.time(&scene.motion, &timeline)?, cue.then == CueAction::Pause));

@@ -41,7 +41,7 @@ struct TimeLine {
 
 /// Solves the scene at the requested times and prints the table.
 pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandError> {
-    let scene = common.load_any_scene()?;
+    let scene = common.load_scene()?;
     let searched = [EventKind::Contact, EventKind::Obstacle];
     let wants_contact = arguments.at.iter().any(|time| searched.iter().any(|kind| time.trim() == kind.name()));
     let timeline = if wants_contact { search_timeline(&scene, common) } else { scene.timeline_without_contact() };

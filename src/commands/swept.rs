@@ -3,7 +3,8 @@
 use std::ops::Range;
 use std::path::Path;
 
-use bench_dragon::drawing::swept::{Ring, SweptArea, TOLERANCE};
+use bench_dragon::drawing::swept::{Ring, SweptArea, SweptStretch, TOLERANCE};
+use bench_dragon::motion::ensemble::Dragon;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::Scene;
 use serde::Serialize;
@@ -19,25 +20,33 @@ pub struct Stretch<'a> {
     /// The last time; the end of the show without one.
     pub until: Option<&'a str>,
     /// Benches, counted from 1; all without them.
-    pub benches: Option<Benches>,
+    pub benches: Option<&'a Benches>,
 }
 
-/// The first and the last bench, counted from 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The benches of one dragon.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Benches {
-    first: usize,
-    last: usize,
+    /// The name of the dragon; `None` in a show of one.
+    dragon: Option<String>,
+    /// The first and the last bench, counted from 1.
+    range: (usize, usize),
 }
 
-/// Returns the benches that `text` names, as in `200-223` or `7`.
+/// Returns the benches that `text` names, as in `200-223` or `7`, with several dragons as in `gold:1-20`.
 ///
 /// # Errors
 /// A sentence about text of another form.
 pub fn benches(text: &str) -> Result<Benches, String> {
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let (dragon, numbers) = text.split_once(':').map_or((None, text), |(name, rest)| (Some(name.trim()), rest));
+    let (first, last) = numbers.split_once('-').unwrap_or((numbers, numbers));
     match (first.trim().parse(), last.trim().parse()) {
-        (Ok(first), Ok(last)) if 1 <= first && first <= last => Ok(Benches { first, last }),
-        _ => Err("expected benches counted from 1, as in 200-223".to_owned()),
+        (Ok(first), Ok(last)) if 1 <= first && first <= last => {
+            Ok(Benches { dragon: dragon.map(str::to_owned), range: (first, last) })
+        }
+        _ => {
+            Err("expected benches counted from 1, as in 200-223, or of one of several dragons, as in gold:1-20"
+                .to_owned())
+        }
     }
 }
 
@@ -50,7 +59,10 @@ pub struct Swept {
     pub from: f64,
     /// Simulated seconds of the last position.
     pub until: f64,
-    benches: Range<usize>,
+    /// The first and the last bench by the numbers of the show, counted from 0.
+    benches: [usize; 2],
+    /// The same for people.
+    words: String,
 }
 
 /// Unites the ground that boards of a scene cover. Without a last time, the stretch ends with the show.
@@ -71,21 +83,62 @@ pub fn swept(scene: &Scene, timeline: &Timeline, stretch: Stretch<'_>, common: &
             figure(from)
         )));
     }
-    let all = scene.team().benches;
-    let Benches { first, last } = stretch.benches.unwrap_or(Benches { first: 1, last: all });
-    if last > all {
-        return Err(CommandError::BadInput(format!(
-            "--benches ends with bench {last}, expected benches from 1 to {all}"
-        )));
-    }
-    let benches = first - 1..last;
-    let travelled = [from, until].map(|time| scene.motion.travelled_at(time));
+    let (stretches, benches, words) = selected(scene, [from, until], stretch.benches)?;
     let bar = progress_bar(1000, common).with_message("uniting the ground");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let area = SweptArea::new(&scene.motion, travelled.into(), benches.clone(), &mut progress);
+    let area = SweptArea::new(&stretches, &mut progress);
     bar.finish_and_clear();
     let area = area.map_err(|none| CommandError::Failed(format!("--until {}: {none}", figure(until))))?;
-    Ok(Swept { area, from, until, benches })
+    Ok(Swept { area, from, until, benches, words })
+}
+
+/// Returns the boards of a stretch of time, the first and the last bench by the numbers of the show, and both in words.
+fn selected<'s>(
+    scene: &'s Scene,
+    times: [f64; 2],
+    benches: Option<&Benches>,
+) -> Result<(Vec<SweptStretch<'s>>, [usize; 2], String), CommandError> {
+    let refused = |sentence: String| Err(CommandError::BadInput(sentence));
+    let Some(ensemble) = &scene.ensemble else {
+        if benches.is_some_and(|benches| benches.dragon.is_some()) {
+            return refused("--benches names a dragon and the scene has one, expected benches as in 1-20".to_owned());
+        }
+        let range = range(benches, scene.team().benches)?;
+        let travelled = times.map(|time| scene.motion.travelled_at(time)).into();
+        let words = format!("benches {} to {}", range.start + 1, range.end);
+        let (ends, motion) = ([range.start, range.end - 1], &scene.motion);
+        return Ok((vec![SweptStretch { motion, travelled, benches: range }], ends, words));
+    };
+    let of = |dragon: &'s Dragon, benches: Range<usize>| SweptStretch {
+        motion: &dragon.motion,
+        travelled: times.map(|time| dragon.travelled_at(time)).into(),
+        benches,
+    };
+    let Some(benches) = benches else {
+        let all = ensemble.dragons().iter().map(|dragon| of(dragon, 0..dragon.motion.team().benches)).collect();
+        return Ok((all, [0, ensemble.handles() - 2], "all benches".to_owned()));
+    };
+    let named = ensemble.dragons().iter().position(|dragon| Some(&dragon.name) == benches.dragon.as_ref());
+    let Some(number) = named else {
+        let names: Vec<&str> = ensemble.dragons().iter().map(|dragon| dragon.name.as_str()).collect();
+        let names = names.join(", ");
+        return refused(format!("--benches names no dragon of the scene, expected one of {names}, as in gold:1-20"));
+    };
+    let (dragon, first) = (&ensemble.dragons()[number], ensemble.handles_of(number).start);
+    let range = range(Some(benches), dragon.motion.team().benches)?;
+    let words = format!("benches {} to {} of {}", range.start + 1, range.end, dragon.name);
+    let ends = [first + range.start, first + range.end - 1];
+    Ok((vec![of(dragon, range)], ends, words))
+}
+
+/// Returns benches of a team counted from 0.
+fn range(benches: Option<&Benches>, all: usize) -> Result<Range<usize>, CommandError> {
+    let (first, last) = benches.map_or((1, all), |benches| benches.range);
+    if last > all {
+        let sentence = format!("--benches ends with bench {last}, expected benches from 1 to {all}");
+        return Err(CommandError::BadInput(sentence));
+    }
+    Ok(first - 1..last)
 }
 
 /// The line of `check --swept --json`.
@@ -120,7 +173,7 @@ struct Properties<'a> {
     from: f64,
     /// Simulated seconds.
     until: f64,
-    /// The first and the last bench, counted from 0.
+    /// The first and the last bench by the numbers of the show, counted from 0.
     benches: [usize; 2],
 }
 
@@ -133,11 +186,10 @@ struct MultiPolygon {
 impl Swept {
     /// Returns a sentence on the ground.
     pub fn sentence(&self) -> String {
-        let Self { area, from, until, benches } = self;
-        let (first, last) = (benches.start + 1, benches.end);
+        let Self { area, from, until, words, .. } = self;
         let rings = area.polygons().len();
         format!(
-            "Ground covered from {} s to {} s by benches {first} to {last}: {:.3} m2, in {rings} polygon{}.",
+            "Ground covered from {} s to {} s by {words}: {:.3} m2, in {rings} polygon{}.",
             figure(*from),
             figure(*until),
             area.area(),
@@ -166,7 +218,7 @@ impl Swept {
                 tolerance: TOLERANCE,
                 from: self.from,
                 until: self.until,
-                benches: [self.benches.start, self.benches.end - 1],
+                benches: self.benches,
             },
             geometry: MultiPolygon {
                 r#type: "MultiPolygon",

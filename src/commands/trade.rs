@@ -4,13 +4,15 @@ use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
 
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
+use bench_dragon::motion::ensemble::Dragon;
 use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::display::{self, Display, DisplayMeasurement, Precision, Reader};
 use bench_dragon::trade::{LAST_SECOND_SAMPLES, Measurement, SPREAD_SAMPLES, measure, publisher_frame_ns};
 use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
+use serde::Serialize;
 
-use super::{CommandError, Common, Output, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, progress_bar, warn_of_gap};
 
 /// Arguments of `trade`.
 #[derive(Debug, Clone, clap::Args)]
@@ -51,49 +53,102 @@ fn delay(text: &str) -> Result<f64, String> {
 
 /// Measures every solver, and readers at every rate, and prints tables or JSON lines.
 pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
-    /// Share of the solvers in a progress bar of 1000.
-    const SOLVERS: f64 = 850.0;
+    /// Share of the solvers in the progress of a dragon.
+    const SOLVERS: f64 = 0.85;
     let scene = common.load_scene()?;
+    let parts = parts(&scene);
+    if parts.len() > 1 && (arguments.plot.is_some() || arguments.display_plot.is_some()) {
+        let sentence = "--plot and --display-plot draw one dragon and the scene has several, expected neither of them";
+        return Err(CommandError::BadInput(sentence.to_owned()));
+    }
     // A file that cannot be written is reported before minutes of measuring.
     let [plot_file, display_file] =
         [&arguments.plot, &arguments.display_plot].map(|file| file.as_deref().map(Output::file).transpose());
-    let (plot_file, display_file) = (plot_file?, display_file?);
+    let (mut plot_file, mut display_file) = (plot_file?, display_file?);
     announce(&scene, common);
-    if !scene.motion.ground().is_empty() {
+    if !scene.ground().is_empty() {
         log::warn!("`trade` leaves out the obstacles of the scene: it measures handles and the boards' first contact");
     }
-    let timeline = search_timeline(&scene, common);
-    let bar = progress_bar(1000, common).with_message("measuring");
-    let measured = measure(&scene, &timeline, &mut |share| bar.set_position((SOLVERS * share) as u64));
-    let displayed = if common.json && !arguments.wants_display() {
-        Ok(Vec::new())
-    } else {
-        let frame_ns = publisher_frame_ns(&scene, &timeline);
-        let display = Display { rate: arguments.display_rate.unwrap_or(60.0), delay: arguments.delay, frame_ns };
-        let mut progress = |share| bar.set_position((SOLVERS + (1000.0 - SOLVERS) * share) as u64);
-        display::measure(&scene, &timeline, display, &mut progress)
-    };
-    bar.finish_and_clear();
-    let (measurements, displayed) = (measured.map_err(CommandError::Failed)?, displayed.map_err(CommandError::Failed)?);
-    if let Some(file) = plot_file {
-        draw(file, |svg| plot(svg, &scene.name, &measurements))?;
-    }
-    if let Some(file) = display_file {
-        draw(file, |svg| display_plot(svg, &scene.name, &displayed))?;
-    }
+    let bar = progress_bar(1000, common);
     let mut output = Output::standard();
-    if common.json {
-        for measurement in &measurements {
-            output.json(measurement)?;
+    let share = 1.0 / parts.len() as f64;
+    for (k, part) in parts.iter().enumerate() {
+        let progress = |done: f64| bar.set_position((1000.0 * share * (k as f64 + done)) as u64);
+        let timeline = part.scene.timeline(&mut |_| ());
+        warn_of_gap(&timeline);
+        bar.set_message("measuring");
+        let measured = measure(&part.scene, &timeline, &mut |done| progress(SOLVERS * done));
+        let measurements = measured.map_err(CommandError::Failed)?;
+        let displayed = if common.json && !arguments.wants_display() {
+            Vec::new()
+        } else {
+            let frame_ns = publisher_frame_ns(&part.scene, &timeline);
+            let display = Display { rate: arguments.display_rate.unwrap_or(60.0), delay: arguments.delay, frame_ns };
+            let mut progress = |done| progress(SOLVERS + (1.0 - SOLVERS) * done);
+            display::measure(&part.scene, &timeline, display, &mut progress).map_err(CommandError::Failed)?
+        };
+        if k + 1 == parts.len() {
+            bar.finish_and_clear();
         }
-        for measurement in &displayed {
-            output.json(measurement)?;
+        bar.suspend(|| part.print(&mut output, common.json, &measurements, &displayed))?;
+        if let Some(file) = plot_file.take() {
+            draw(file, |svg| plot(svg, &scene.name, &measurements))?;
         }
-    } else {
-        print(&mut output, &measurements)?;
-        print_display(&mut output, &scene, &displayed)?;
+        if let Some(file) = display_file.take() {
+            draw(file, |svg| display_plot(svg, &scene.name, &displayed))?;
+        }
     }
     output.finish()
+}
+
+/// One dragon, measured alone.
+struct Part {
+    /// Its name, if the scene has several.
+    dragon: Option<String>,
+    /// The scene of that dragon, where its path has it: errors do not depend on the placement.
+    scene: Scene,
+}
+
+/// A JSON line, with the name of the dragon if there are several.
+#[derive(Serialize)]
+struct Line<'a, M: Serialize> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dragon: Option<&'a str>,
+    #[serde(flatten)]
+    measurement: &'a M,
+}
+
+/// Returns the dragons of a scene, each as a scene of its own.
+fn parts(scene: &Scene) -> Vec<Part> {
+    let Some(ensemble) = &scene.ensemble else { return vec![Part { dragon: None, scene: scene.clone() }] };
+    let part = |Dragon { name, delay: _, motion }: &Dragon| Part {
+        dragon: Some(name.clone()),
+        scene: Scene { motion: motion.in_own_frame(), ensemble: None, ..scene.clone() },
+    };
+    ensemble.dragons().iter().map(part).collect()
+}
+
+impl Part {
+    fn print(
+        &self,
+        output: &mut Output,
+        json: bool,
+        measurements: &[Measurement],
+        displayed: &[DisplayMeasurement],
+    ) -> Result<(), CommandError> {
+        let dragon = self.dragon.as_deref();
+        if json {
+            measurements.iter().try_for_each(|measurement| output.json(&Line { dragon, measurement }))?;
+            return displayed.iter().try_for_each(|measurement| output.json(&Line { dragon, measurement }));
+        }
+        if let Some(name) = dragon {
+            let benches = self.scene.team().benches;
+            output.line(&format!("{name}, {benches} benches, measured alone in its own time:"))?;
+        }
+        print(output, measurements)?;
+        print_display(output, &self.scene, displayed)?;
+        if dragon.is_some() { output.line("") } else { Ok(()) }
+    }
 }
 
 /// Prints a line if no bar shows progress.
@@ -101,9 +156,10 @@ fn announce(scene: &Scene, common: &Common) {
     if common.quiet || stderr().is_terminal() {
         return;
     }
-    let benches = scene.team().benches;
+    let benches = scene.benches();
     let time = if benches > 1000 { "some minutes" } else { "about half a minute" };
-    eprintln!("measuring every solver on scene {} ({benches} benches), which takes {time}", scene.name);
+    let each = if scene.ensemble.is_some() { " a dragon" } else { "" };
+    eprintln!("measuring every solver on scene {} ({benches} benches), which takes {time}{each}", scene.name);
 }
 
 fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), CommandError> {

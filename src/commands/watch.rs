@@ -296,14 +296,19 @@ impl Screen<'_> {
             ),
             format!("rate {:.1} Hz  received {}  missed {}", report.rate, report.received, report.missed),
             format!("latency {latency}"),
-            format!(
-                "head ({:.3}, {:.3}) m  {} handles  clearance {clearance}",
-                report.head.x, report.head.y, header.handles
-            ),
+            format!("{}  {} handles  clearance {clearance}", self.dancers(report), header.handles),
         ];
         lines.extend(report.status.iter().flat_map(status_lines));
         lines.extend(report.chase.map(|(status, has_died)| chase_line(&status, has_died, header.time_scale)));
         lines
+    }
+
+    /// Returns the place of the head, or the names of several dragons.
+    fn dancers(&self, report: &IntervalReport) -> String {
+        match self.stage.dragons.len() {
+            0 | 1 => format!("head ({:.3}, {:.3}) m", report.head.x, report.head.y),
+            _ => self.stage.dragons.iter().map(|dragon| dragon.name.as_str()).collect::<Vec<_>>().join(", "),
+        }
     }
 
     /// Returns the wall time to the event that the latest alert announced.

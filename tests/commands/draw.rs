@@ -5,6 +5,7 @@ mod colours;
 mod labels;
 mod lanterns;
 mod moving;
+mod several;
 use crate::harness;
 
 use std::collections::{BTreeMap, BTreeSet};

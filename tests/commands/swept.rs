@@ -25,6 +25,45 @@ fn the_ground_is_that_of_sampled_boards() {
     }
 }
 
+/// The ground of one of two dragons, of both, and of one that stands in part of the time.
+#[test]
+fn the_ground_of_two_dragons_is_that_of_sampled_boards() {
+    if !can_run(python_modules(&["numpy", "shapely"])) {
+        return;
+    }
+    let lengths = ["3.41", "2.20", "0.30", "0.275"];
+    for (dragon, stretch) in
+        [("gold:0", ["20", "23", "2", "20"]), ("jade:21", ["48", "53", "1", "12"]), ("all:20", ["48", "52", "1", "33"])]
+    {
+        let mut peer = python();
+        peer.args(["tests/python/swept.py", env!("CARGO_BIN_EXE_bench-dragon"), "config/crossing.toml"]);
+        let output = peer.args(stretch).args(lengths).arg(dragon).output().unwrap();
+        println!("{dragon} {stretch:?}: {}", text(&output.stdout));
+        assert!(output.status.success(), "{dragon} {stretch:?}: {}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn benches_of_several_dragons_have_their_dragons_name() {
+    let file = tempfile::tempdir().unwrap().path().join("ground.json");
+    for (scene, benches, expected) in [
+        ("crossing", "1-12", "--benches names no dragon of the scene, expected one of gold, jade, as in gold:1-20"),
+        ("crossing", "rose:1-12", "expected one of gold, jade"),
+        ("crossing", "jade:1-13", "--benches ends with bench 13, expected benches from 1 to 12"),
+        ("paper", "jade:1-12", "--benches names a dragon and the scene has one"),
+        ("paper", "jade:", "expected benches counted from 1"),
+    ] {
+        let scene = format!("config/{scene}.toml");
+        let mut command = program("swept");
+        command.args(["--scene", &scene, "draw", "--swept", "--until", "1", "--benches", benches, "-o"]).arg(&file);
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{benches}");
+        assert!(text(&output.stderr).contains(expected), "{benches}: {}", text(&output.stderr));
+    }
+    let svg = printed(&["--scene", "config/crossing.toml", "draw", "--swept", "--at", "52", "--until", "52"]);
+    assert!(svg.contains("ground covered: "), "{svg}");
+}
+
 fn printed(arguments: &[&str]) -> String {
     let output = program("swept").args(arguments).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));

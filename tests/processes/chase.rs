@@ -187,6 +187,32 @@ fn a_show_follows_the_tracker_of_another_one() {
     state(&lines, "lost");
 }
 
+/// The head of jade stands where it is after 100 s of its own, which begin 5 s after the show's.
+#[test]
+fn a_show_of_two_follows_the_head_of_one() {
+    let (leader, follower, to) = ("chase_jade", "chase_coil", port().to_string());
+    let coil = include_str!("../../config/coil.toml");
+    let (_, jade) = coil.split_once("delay = 5.0\n").unwrap();
+    let alone = format!("[placement]\nrotation_turns = 0.5\n{}", jade.replace("[dragons.", "["));
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("jade.toml");
+    std::fs::write(&scene, alone).unwrap();
+    let _leading = publisher(leader, &["--scene", scene.to_str().unwrap(), "--start", "100", "--paused"]);
+    let coil = concat!(env!("CARGO_MANIFEST_DIR"), "/config/coil.toml");
+    let _following = publisher(follower, &["--scene", coil, "--start", "104", "--paused"]);
+    let address = format!("127.0.0.1:{to}");
+    let _sent = Process::start(program(leader).args(["send", "psn", "--trackers", "head", "--to", &address]));
+    let (_chase, lines) = chase(follower, &["psn", "--dragon", "jade", "--group", &address]);
+    state(&lines, "locked");
+    let mut watch = Process::start(program(follower).args(["--json", "watch"]));
+    let watched = watch.lines();
+    let arrived = |line: &str| {
+        let line: Value = serde_json::from_str(line).unwrap();
+        line["sim_time"].as_f64().is_some_and(|time| (time - 105.0).abs() < 0.05)
+    };
+    watched.all_until_one(arrived, "the show at 105 s", 60);
+}
+
 #[test]
 fn the_log_of_a_chased_show_replays_bit_for_bit() {
     let name = "chase_log";
@@ -225,6 +251,9 @@ fn bad_options_are_refused_with_one_sentence() {
         (&["psn", "--tracker", "0"], "1..=65535"),
         (&["psn", "--axes", "x,y"], "once each"),
         (&["psn", "--group", "desk.local"], "an IPv4 address"),
+        (&["psn", "--scene", "config/paper.toml", "--dragon", "jade"], "has one dragon"),
+        (&["psn", "--scene", "config/coil.toml"], "expected --dragon with one of gold, jade"),
+        (&["psn", "--scene", "config/coil.toml", "--dragon", "rose"], "one of gold, jade"),
     ] {
         let mut command = program(name);
         command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("chase").args(arguments);

@@ -60,6 +60,31 @@ fn head_and_tail_remain_where_the_team_is_smaller_than_the_step() {
     every_frame_is_the_whole_one_rounded(1000, true, &[0, 223]);
 }
 
+/// Each of several dragons keeps its head and its tail.
+#[test]
+fn of_two_dragons_both_ends_of_each_remain() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let name = "light_two";
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("two.toml");
+    let crossing = include_str!("../../config/crossing.toml");
+    let light = "[publish]\nqueue = 480\nprecision = \"f32\"\nevery = 7";
+    std::fs::write(&file, crossing.replace("[publish]", light)).unwrap();
+    let mut peer = python();
+    peer.args(["tests/python/light_peer.py", "--name", &unique(name), "--teams", "21", "13"]);
+    let peer = Process::start(&mut peer);
+    let mut run = program(name);
+    run.arg("--scene").arg(&file).args(["run", "--json", "--rate", "50", "--start", "52", "--duration", "5"]);
+    let frames = summary(&Process::start(&mut run).output_within(300))["frames"].as_u64().unwrap();
+    let output = peer.output_within(300);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let compared: Value = json_lines(&output).pop().unwrap();
+    assert!(compared["compared"].as_u64().unwrap() > 20, "{compared} of {frames} frames");
+    assert_eq!(compared["handles"], serde_json::json!([0, 7, 14, 20, 21, 28, 33]));
+}
+
 #[test]
 fn nothing_is_there_unasked() {
     let name = "light_off";

@@ -1,5 +1,5 @@
-//! A show of several dragons, as programs: it runs, is watched, recorded and proved under its one name. What does not know
-//! several refuses it with one sentence.
+//! A show of several dragons, as programs: it runs, is watched, recorded and proved under its one name. What does not
+//! know several refuses it with one sentence.
 
 use crate::harness;
 
@@ -43,6 +43,58 @@ fn a_show_of_two_runs_is_recorded_and_proved() {
     }
 }
 
+/// The contact is that of the two: 3 s before it the show waits.
+#[test]
+fn a_cue_before_the_contact_of_two_pauses_the_show() {
+    let (folder, name) = (tempfile::tempdir().unwrap(), "several_cue");
+    let scene = folder.path().join("coil.toml");
+    let gold = "[[dragons]]\nname = \"gold\"";
+    let cue = "[[cues]]\nname = \"closing\"\nbefore = \"contact\"\nseconds = 3.0\nthen = \"pause\"\n";
+    std::fs::write(&scene, include_str!("../../config/coil.toml").replace(gold, &format!("{cue}{gold}"))).unwrap();
+    let mut command = program(name);
+    command.arg("--scene").arg(&scene).args(["run", "--start", "330", "--paused"]);
+    let mut run = Process::start(&mut command);
+    let told = run.lines();
+    let mut watch = Process::start(program(name).args(["--json", "watch"]));
+    let watched = watch.lines();
+    watched.until("\"alert\"", 60);
+    assert!(program(name).args(["control", "go"]).status().unwrap().success());
+    let cue: Value = serde_json::from_str(&watched.until("\"closing\"", 60)).unwrap();
+    assert!((cue["cue_time"].as_f64().unwrap() - (335.726_813_722_605 - 3.0)).abs() < 1e-9, "{cue}");
+    let state = Process::start(program(name).args(["--json", "control", "state"])).output_within(60);
+    assert_eq!(json_lines(&state)[0]["playback"], "paused");
+    drop((run, watch, told));
+}
+
+/// Each dragon alone, in its own time.
+#[test]
+fn the_trade_of_two_has_both_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("pair.toml");
+    let dragon = |name: &str, benches: u32, placement: &str| {
+        format!(
+            "[[dragons]]\nname = \"{name}\"\ndelay = 2.0\nplacement = {placement}\n\
+             [dragons.team]\nbenches = {benches}\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n[dragons.path]\n\
+             kind = \"spiral\"\npitch = 1.7\nstart_turn = 3\n[dragons.motion]\nhead_speed = 1.0\n"
+        )
+    };
+    let jade = dragon("jade", 5, "{ origin = [40.0, 7.0], rotation_turns = 0.3 }");
+    std::fs::write(&scene, dragon("gold", 4, "{ origin = [0.0, 0.0] }") + &jade).unwrap();
+    let mut command = program("several_trade");
+    let output = Process::start(command.arg("--scene").arg(&scene).args(["--json", "trade"])).output_within(500);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let lines = json_lines(&output);
+    for name in ["gold", "jade"] {
+        let own: Vec<_> = lines.iter().filter(|line| line["dragon"] == name).collect();
+        assert!(own.iter().any(|line| line["solver"] == "newton"), "{lines:?}");
+        for line in own.iter().filter(|line| !line["solver"].as_str().unwrap().starts_with("paper")) {
+            let promised = line["accuracy"].as_f64().unwrap_or(0.0).max(1e-9);
+            assert!(line["max_position_error"].as_f64().unwrap() < promised, "{line}");
+        }
+    }
+    assert!(lines.iter().all(|line| line["dragon"].is_string()), "{lines:?}");
+}
+
 #[test]
 fn what_knows_one_dragon_refuses_several_with_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
@@ -51,13 +103,9 @@ fn what_knows_one_dragon_refuses_several_with_one_sentence() {
     for arguments in [
         vec!["events", "--certify", file],
         vec!["check", "--prove"],
-        vec!["check", "--swept", file],
         vec!["plan", "pitch", "--reach-radius", "4.5"],
         vec!["plan", "speed", "--max-handle-speed", "2"],
-        vec!["trade"],
-        vec!["soak", "--duration", "1"],
-        vec!["draw", "--look", "lanterns"],
-        vec!["draw", "--swept"],
+        vec!["trade", "--plot", file],
         vec!["chase", "psn"],
     ] {
         let output = program("several_one").args(["--scene", COIL]).args(&arguments).output().unwrap();

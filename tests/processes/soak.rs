@@ -247,6 +247,37 @@ fn a_conducted_show_obeys_while_clients_are_killed() {
     place.assert_clean();
 }
 
+/// Two dragons under one clock: the links of each, and every frame against the commands.
+#[test]
+fn a_conducted_show_of_two_passes() {
+    let place = Place::new("soak_two");
+    let scene = place.folder().join("coil.toml");
+    let coil = include_str!("../../config/coil.toml").replace("[publish]", "[publish]\nqueue = 1000");
+    std::fs::write(&scene, coil).unwrap();
+    let mut soak = place.program();
+    soak.args(["--scene", scene.to_str().unwrap(), "soak", "--json", "--duration", "8s", "--rate", "200"]);
+    soak.args(["--conduct", "7", "--subscribers", "2", "--report", "report"]);
+    let output = Process::start(soak.args(ANY_SPEED)).output_within(150);
+    assert!(output.status.success(), "{} {}", text(&output.stderr), text(&output.stdout));
+    let report = json_lines(&output).pop().unwrap();
+    assert_eq!(report["verdict"], "PASS");
+    assert!(number(&report["conducted"], "sent") >= 20, "{report}");
+    let subscribers = report["subscribers"].as_array().unwrap();
+    for subscriber in subscribers {
+        let seen = &subscriber["seen"];
+        assert_eq!(
+            (number(seen, "missed"), number(seen, "disobedient"), number(seen, "wrong_links")),
+            (0, 0, 0),
+            "{seen}"
+        );
+        assert!(number(seen, "links_checked") > 100 && number(seen, "times_checked") > 100, "{seen}");
+        // A link between the dragons would be metres off.
+        assert!(seen["worst_link_error"].as_f64().unwrap() < 1e-8, "{seen}");
+    }
+    assert_is_whole_page(&std::fs::read_to_string(place.folder().join("report.html")).unwrap(), subscribers.len());
+    place.assert_clean();
+}
+
 /// A second control client sends commands: the test reports effects of commands that its own client did not send.
 #[test]
 fn a_show_that_somebody_else_conducts_too_fails() {

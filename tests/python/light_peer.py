@@ -1,6 +1,6 @@
 """Compares the frames of `<name>/poses32` with those of `<name>/poses`, number by number, until the publisher leaves.
 
-    light_peer.py --name NAME
+    light_peer.py --name NAME [--teams HANDLES...]
 
 Prints a JSON line with the counts, and ends with an error if a frame is not its counterpart rounded.
 """
@@ -40,7 +40,8 @@ def take(port, into):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--name", required=True)
-    name = parser.parse_args().name
+    parser.add_argument("--teams", type=int, nargs="+", help="handles of each dragon, if there are several")
+    name, teams = (arguments := parser.parse_args()).name, arguments.teams
     iox2.set_log_level(iox2.LogLevel.Fatal)
     node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
     services = [open_service(node, f"{name}/poses", HandlePose), open_service(node, f"{name}/poses32", HandlePose32)]
@@ -60,7 +61,7 @@ def main():
     for sequence in compared:
         (header, poses), (header_32, poses_32) = whole[sequence], light[sequence]
         assert header == header_32, f"{header} and {header_32}"
-        handles = indices_of(services[1], len(poses))
+        handles = indices_of(services[1], *(teams or [len(poses)]))
         for field in poses.dtype.names:
             rounded = poses[field][handles].astype(np.float32)
             same = rounded.view(np.uint32) == poses_32[field].view(np.uint32)

@@ -6,4 +6,5 @@ mod harness;
 mod ros2;
 mod ros2_control;
 mod ros2_feed;
+mod ros2_several;
 mod ros2_topics;

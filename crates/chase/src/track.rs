@@ -54,6 +54,8 @@ pub enum Following {
 /// The head's motion along the path of a show.
 pub struct Track {
     motion: Motion,
+    /// Simulated seconds of the show before the motion begins.
+    delay: f64,
     freewheel: f64,
     estimate: Option<DelayLockedLoop>,
     readings: u32,
@@ -62,10 +64,10 @@ pub struct Track {
 }
 
 impl Track {
-    /// Creates the track of a motion, whose head follows its path exactly. `freewheel` is how long a performer that is
-    /// not seen is followed, seconds.
-    pub fn new(motion: Motion, freewheel: f64) -> Self {
-        Self { motion, freewheel, estimate: None, readings: 0, fitting_ns: None, distance: f64::NAN }
+    /// Creates the track of a motion, whose head follows its path exactly and begins after `delay` simulated seconds of
+    /// the show. `freewheel` is how long a performer that is not seen is followed, seconds.
+    pub fn new(motion: Motion, delay: f64, freewheel: f64) -> Self {
+        Self { motion, delay, freewheel, estimate: None, readings: 0, fitting_ns: None, distance: f64::NAN }
     }
 
     /// Returns the limits of the corrections.
@@ -99,7 +101,10 @@ impl Track {
     /// head a performer is looked for first.
     pub fn read(&mut self, point: Point, at_ns: u64, show_time: f64) {
         let head_speed = self.motion.head_speed();
-        let near = self.estimate.as_ref().map_or(head_speed * show_time, |estimate| estimate.position(at_ns));
+        let near = self
+            .estimate
+            .as_ref()
+            .map_or(head_speed * (show_time - self.delay).max(0.0), |estimate| estimate.position(at_ns));
         let Projection { travelled, distance } = self.project(point, near);
         self.distance = distance;
         if distance > MOST_DISTANCE {
@@ -138,7 +143,7 @@ impl Track {
             (Following::Locked | Following::Freewheeling, Some(estimate)) => {
                 let head_speed = self.motion.head_speed();
                 // The head moves forward only, and a place before the start is the start.
-                let time = (estimate.position(now_ns) / head_speed).max(0.0);
+                let time = self.delay + (estimate.position(now_ns) / head_speed).max(0.0);
                 Goal::Follow { time, rate: (estimate.rate() / head_speed).max(0.0) }
             }
             (Following::Lost, _) => Goal::Stand(None),
@@ -153,7 +158,7 @@ mod tests {
     use bench_dragon_show::scene::Scene;
 
     fn track() -> Track {
-        Track::new(Scene::paper().motion, 2.0)
+        Track::new(Scene::paper().motion, 0.0, 2.0)
     }
 
     #[test]
@@ -173,6 +178,18 @@ mod tests {
             assert!((found.travelled - travelled).abs() < 1e-6, "{found:?} for {travelled}");
             assert!((found.distance - across.abs()).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_dragon_with_a_delay_is_behind_the_show() {
+        let mut track = Track::new(Scene::paper().motion, 30.0, 2.0);
+        let path = track.motion.path().clone();
+        for k in 0..10u64 {
+            let place = 100.0 + 0.1 * k as f64;
+            track.read(path.point(path.param_at(place)), 5_000_000_000 + 100_000_000 * k, 130.0);
+        }
+        let Goal::Follow { time, .. } = track.goal(5_900_000_000) else { panic!("not locked") };
+        assert!((time - 130.9).abs() < 0.05, "{time}");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use svg::node::element::{Animate, AnimateTransform, Group, Rectangle};
 
-use super::camera::Camera;
+use super::camera::{Camera, StageBox};
 use super::marks::{Happened, Tense};
 use super::palette::Palette;
 use super::{Drawing, Surroundings, benches, marks, metres, rounded, sheet};
@@ -81,29 +81,34 @@ impl Drawing<'_> {
         let happened = marks::happened(self.timeline, *until);
         let now = happened.iter().rev().find(|past| past.tense == Tense::Present);
         let touching: Vec<usize> = now.into_iter().flat_map(Happened::benches).map(|bench| bench as usize).collect();
-        let team = self.motion.team();
-        let mut stage = self.with_obstacles(self.stage(), palette).add(self.path(&self.dragons.all()[0], palette));
+        let dragons = &self.dragons;
+        let paths = dragons.all().iter().map(|of| self.path(of, palette));
+        let mut stage = paths.fold(self.with_obstacles(self.stage(), palette), Group::add);
         let mut boards = Group::new().set("id", "benches");
-        if team.width * self.camera.scale > 4.0 {
+        if self.motion.team().width * self.camera.scale > 4.0 {
             boards = boards.set("stroke", palette.ground).set("stroke-width", self.camera.metres(0.7));
         }
-        let reach = team.longest_link() + 2.0 * team.hole_inset;
-        let view = self.camera.view().padded(reach);
-        for bench in (0..team.benches).rev() {
-            let way: Vec<Board> = samples.iter().map(|(_, chain)| benches::board(team, chain, bench)).collect();
+        let view = self.camera.view().padded(dragons.greatest_board());
+        let ways: Vec<Vec<(usize, Board)>> =
+            samples.iter().map(|(_, chain)| dragons.seen(chain, &StageBox::ALL)).collect();
+        for (place, (bench, _)) in ways[0].iter().enumerate().rev() {
+            let bench = *bench;
+            let way: Vec<Board> = ways.iter().map(|boards| boards[place].1).collect();
             if !way.iter().any(|board| view.contains(board.centre)) {
                 continue;
             }
             let colours = (0..=COLOURS).map(|colour| key_times.sample(colour * key_times.steps() / COLOURS));
-            let colours: Vec<String> =
-                colours.map(|sample| self.fill(samples[sample].1.speed[bench], palette)).collect();
+            let colours: Vec<String> = match dragons.colour(bench, palette) {
+                Some(colour) => vec![colour.to_owned()],
+                None => colours.map(|sample| self.fill(samples[sample].1.speed[bench], palette)).collect(),
+            };
             let mut board = moving(&way, &colours, &key_times, &self.camera, bench);
-            if bench == 0 {
+            if dragons.is_head(bench) {
                 let upright = lying(&way[0]);
                 let sign = benches::head_sign(&upright, &self.camera, palette);
                 board = board.adding(benches::outline(&upright, palette.ink, 1.6, &self.camera)).adding(sign);
             }
-            if bench > 0 && bench + 1 == team.benches {
+            if dragons.is_tail(bench) {
                 board = board.adding(benches::tail_sign(&lying(&way[0]), &self.camera, palette));
             }
             if touching.contains(&bench) {
@@ -173,17 +178,29 @@ impl Drawing<'_> {
         match now {
             None => group.add(number(&format!("{} s", rounded(until, 1))).add(one)),
             Some(now) => {
-                let benches: Vec<String> = now.benches().map(|bench| (bench + 1).to_string()).collect();
-                let kind = match benches.len() {
-                    0 => String::new(),
-                    1 => format!("bench {}", benches[0]),
-                    _ => format!("benches {}", benches.join(" and ")),
-                };
                 let heading = sheet::words(&heading.to_uppercase(), (x, y + 6.0), 34, palette.danger);
                 group
                     .add(heading.set("font-weight", 800).add(one))
-                    .add(sheet::words(&kind, (x, y + 40.0), 22, palette.danger).add(other))
+                    .add(sheet::words(&self.concerned(now), (x, y + 40.0), 22, palette.danger).add(other))
             }
+        }
+    }
+}
+
+impl Drawing<'_> {
+    /// Returns the benches of an event in words.
+    fn concerned(&self, now: &Happened) -> String {
+        if self.dragons.are_several() {
+            let roster = &self.dragons.roster;
+            let names =
+                now.benches().map(|bench| roster.bench(bench).replace(" (the head)", "").replace(" (the tail)", ""));
+            return names.collect::<Vec<_>>().join(" and ");
+        }
+        let benches: Vec<String> = now.benches().map(|bench| (bench + 1).to_string()).collect();
+        match benches.len() {
+            0 => String::new(),
+            1 => format!("bench {}", benches[0]),
+            _ => format!("benches {}", benches.join(" and ")),
         }
     }
 }

@@ -11,11 +11,6 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::model::{Point, Vector};
 use bench_dragon_motion::solve::Chain;
 
-/// Returns the board of a bench of the only dragon of a chain.
-pub fn board(team: &Team, chain: &Chain, bench: usize) -> Board {
-    board_from(team, chain, 0, bench)
-}
-
 /// Returns the board of a bench of the dragon whose handles begin at `first`. The heading keeps digits that the
 /// difference of two far handles has lost.
 fn board_from(team: &Team, chain: &Chain, first: usize, bench: usize) -> Board {

@@ -29,7 +29,7 @@ pub struct Drawn<'a> {
 impl<'a> Dragons<'a> {
     /// Creates the only dragon of a picture.
     pub fn one(motion: &'a Motion) -> Self {
-        Self::new(vec![Drawn { name: "", first: 0, motion }])
+        Self { drawn: vec![Drawn { name: "", first: 0, motion }], roster: motion.roster() }
     }
 
     /// Creates the dragons of a show of several.
@@ -39,14 +39,8 @@ impl<'a> Dragons<'a> {
             first: ensemble.handles_of(k).start,
             motion: &dragon.motion,
         };
-        Self::new(ensemble.dragons().iter().enumerate().map(drawn).collect())
-    }
-
-    fn new(drawn: Vec<Drawn<'a>>) -> Self {
-        let obstacles = drawn[0].motion.ground().obstacles().iter().map(|obstacle| obstacle.name.clone());
-        let dragons = drawn.iter().map(|of| (of.name.to_owned(), of.motion.team().benches as u32));
-        let roster = Roster::new(dragons.collect(), obstacles.collect());
-        Self { drawn, roster }
+        let drawn = ensemble.dragons().iter().enumerate().map(drawn).collect();
+        Self { drawn, roster: ensemble.roster() }
     }
 
     /// Returns the dragons.
@@ -57,6 +51,15 @@ impl<'a> Dragons<'a> {
     /// Returns the first dragon.
     pub fn first(&self) -> &'a Motion {
         self.drawn[0].motion
+    }
+
+    /// Returns a length that no board has, metres.
+    pub fn greatest_board(&self) -> f64 {
+        let length = |of: &Drawn| {
+            let team = of.motion.team();
+            team.longest_link() + 2.0 * team.hole_inset + team.width
+        };
+        self.drawn.iter().map(length).fold(0.0, f64::max)
     }
 
     /// Returns true if there are several.
@@ -86,6 +89,12 @@ impl<'a> Dragons<'a> {
         let of = self.owner(bench).1;
         let benches = of.motion.team().benches;
         benches > 1 && bench == of.first + benches - 1
+    }
+
+    /// Returns the name of the element at an end of a dragon: `head`, or `head-gold` if there are several.
+    pub fn end_id(&self, bench: usize) -> String {
+        let (end, name) = (if self.is_head(bench) { "head" } else { "tail" }, self.owner(bench).1.name);
+        if name.is_empty() { end.to_owned() } else { format!("{end}-{name}") }
     }
 
     /// Returns the colour of a bench's dragon, if there are several.

@@ -51,13 +51,16 @@ const TAIL: [(&str, &str); 3] = [
 impl Drawing<'_> {
     /// Returns the SVG of a chain at a time, in the light of its lanterns.
     pub(super) fn lanterns(&self, time: f64, chain: &Chain) -> String {
-        let team = self.motion.team();
-        let view = self.camera.view().padded(POOL + 0.5 * team.head_length);
-        let boards = benches::seen(team, chain, 0, &view);
+        let dragons = &self.dragons;
+        let longest = dragons.all().iter().map(|of| of.motion.team().head_length).fold(0.0, f64::max);
+        let view = self.camera.view().padded(POOL + 0.5 * longest);
+        let boards = dragons.seen(chain, &view);
         let mut document = self.document(time, chain, &super::palette::DARK).add(definitions());
         let black = Rectangle::new().set("width", WIDTH).set("height", rounded(self.height, 4)).set("fill", "#000000");
         document = document.add(black);
-        let stage = self.stage().add(ground(&boards, &view, exposure(team.benches, chain)));
+        let all_benches = dragons.all().iter().map(|of| of.motion.team().benches).sum();
+        let is_head = |bench: usize| dragons.is_head(bench);
+        let stage = self.stage().add(ground(&boards, is_head, &view, exposure(all_benches, chain)));
         let mut stage = self.with_obstacles(stage, &super::palette::DARK);
         let mut wood = Group::new().set("id", "benches");
         for (bench, board) in boards.iter().rev() {
@@ -76,7 +79,7 @@ impl Drawing<'_> {
             let front = Point::new(chain.x[*bench], chain.y[*bench]);
             people =
                 people.add(used(if bench % 2 == 0 { "dancer" } else { "dancer-2" }).set("transform", turned(front)));
-            let places: &[f64] = if *bench == 0 { &ON_HEAD } else { &ON_BODY };
+            let places: &[f64] = if is_head(*bench) { &ON_HEAD } else { &ON_BODY };
             for (number, share) in places.iter().enumerate() {
                 let at = board.centre + share * board.half_length * board.axis;
                 let (halo, lamp) = if number == 1 { ("halo-gold", "gold") } else { ("halo-red", "red") };
@@ -86,8 +89,8 @@ impl Drawing<'_> {
         }
         stage = stage.add(wood).add(people).add(halos).add(lamps);
         for (bench, board) in boards.iter().rev() {
-            if *bench == 0 || *bench + 1 == team.benches {
-                stage = stage.add(crown(board, *bench == 0));
+            if is_head(*bench) || dragons.is_tail(*bench) {
+                stage = stage.add(crown(board, is_head(*bench)).set("id", dragons.end_id(*bench)));
             }
         }
         self.finished(&document.add(Group::new().set("clip-path", "url(#frame)").add(stage)))
@@ -107,7 +110,7 @@ fn used(name: &str) -> Use {
 }
 
 /// Returns the paving in the light of the pools.
-fn ground(boards: &[(usize, Board)], view: &StageBox, exposure: f64) -> Group {
+fn ground(boards: &[(usize, Board)], is_head: impl Fn(usize) -> bool, view: &StageBox, exposure: f64) -> Group {
     let whole = || {
         let corner = Rectangle::new().set("x", metres(view.least.x)).set("y", metres(view.least.y));
         corner.set("width", metres(view.width())).set("height", metres(view.height()))
@@ -119,7 +122,7 @@ fn ground(boards: &[(usize, Board)], view: &StageBox, exposure: f64) -> Group {
         mask = mask.set(attribute, metres(value));
     }
     for (bench, board) in boards {
-        let head = if *bench == 0 { 1.3 } else { 1.0 };
+        let head = if is_head(*bench) { 1.3 } else { 1.0 };
         let pool = used("pool").set("x", metres(board.centre.x)).set("y", metres(board.centre.y));
         mask = mask.add(pool.set("opacity", rounded((exposure * head).min(1.0), 3)));
     }
@@ -132,7 +135,7 @@ fn crown(board: &Board, head: bool) -> Group {
     let end = board.centre + if head { 1.0 } else { -1.0 } * board.half_length * board.axis;
     let degrees = rounded(board.axis.y.atan2(board.axis.x).to_degrees(), 2);
     let place = format!("translate({} {})rotate({degrees})scale({CROWN})", metres(end.x), metres(end.y));
-    let mut group = Group::new().set("id", if head { "head" } else { "tail" }).set("transform", place);
+    let mut group = Group::new().set("transform", place);
     let shapes: &[(&str, &str)] = if head { &HEAD } else { &TAIL };
     for (data, colour) in shapes {
         let half = Path::new().set("d", *data).set("fill", *colour);

@@ -287,11 +287,9 @@ impl<'a> Drawing<'a> {
     }
 
     fn overlaps(&self, chain: &Chain) -> Vec<(usize, usize, f64)> {
-        let team = self.motion.team();
         // A board that overlaps a visible board may be outside the picture.
-        let reach = team.longest_link() + 2.0 * team.hole_inset + team.width;
-        let near = self.dragons.seen(chain, &self.camera.view().padded(reach));
-        benches::overlapping(&near, 1e-9 * team.longest_link())
+        let near = self.dragons.seen(chain, &self.camera.view().padded(self.dragons.greatest_board()));
+        benches::overlapping(&near, 1e-9 * self.motion.team().longest_link())
     }
 
     fn title(&self, time: f64) -> String {

@@ -13,7 +13,7 @@ use svg::node::element::{
 use super::camera::StageBox;
 use super::figure::{self, Placed};
 use super::look::Seat;
-use super::{Drawing, FACE, WIDTH, benches, rounded, village};
+use super::{Drawing, FACE, WIDTH, rounded, village};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::solve::Chain;
@@ -107,15 +107,22 @@ impl Eye {
     }
 }
 
+/// The end of a dragon at which a bench is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    Head,
+    Tail,
+    None,
+}
+
 impl Drawing<'_> {
     /// Returns the SVG of a chain at a time, from a seat.
     pub(super) fn seat(&self, time: f64, chain: &Chain, seat: Seat) -> String {
-        let team = self.motion.team();
+        let dragons = &self.dragons;
         let mut stage = StageBox::EMPTY;
         chain.x.iter().zip(&chain.y).for_each(|(x, y)| stage.include(Point::new(*x, *y)));
         let eye = Eye::new(seat, &stage, self.height);
-        let boards: Vec<(usize, Board)> =
-            (0..team.benches).map(|bench| (bench, benches::board(team, chain, bench))).collect();
+        let boards = dragons.seen(chain, &StageBox::ALL);
         let mut things: Vec<(f64, Group)> = Vec::new();
         let (mut pools, mut bloom) = (lighting("pools"), lighting("bloom"));
         for (bench, board) in &boards {
@@ -124,13 +131,18 @@ impl Drawing<'_> {
             pools = pools.add(
                 used("pool")
                     .set("transform", placed(&foot, wide, wide * flat))
-                    .set("opacity", if *bench == 0 { 0.4 } else { 0.24 }),
+                    .set("opacity", if dragons.is_head(*bench) { 0.4 } else { 0.24 }),
             );
-            let (thing, halos) = carried(&eye, *bench, team.benches - 1, board);
+            let end = match (dragons.is_head(*bench), dragons.is_tail(*bench)) {
+                (true, _) => End::Head,
+                (false, true) => End::Tail,
+                (false, false) => End::None,
+            };
+            let (thing, halos) = carried(&eye, *bench, end, board);
             bloom = bloom.add(halos);
             things.push((foot.depth, thing));
         }
-        for handle in 0..team.handles() {
+        for handle in 0..chain.handles() {
             let (sine, cosine) = chain.heading[handle].sin_cos();
             // Beside the handle, on its right.
             let at = Point::new(chain.x[handle] + 0.2 * sine, chain.y[handle] - 0.2 * cosine);
@@ -179,7 +191,7 @@ fn placed(at: &Spot, wide: f64, high: f64) -> String {
 }
 
 /// Returns a bench with its lanterns and, at the ends, head or tail; and the lanterns' halos.
-fn carried(eye: &Eye, bench: usize, last: usize, board: &Board) -> (Group, Group) {
+fn carried(eye: &Eye, bench: usize, end: End, board: &Board) -> (Group, Group) {
     let (axis, side) = (board.axis, board.axis.yx().component_mul(&nalgebra::Vector2::new(-1.0, 1.0)));
     let corner = |along: f64, across: f64, height: f64| eye.spot(board.centre + along * axis + across * side, height);
     let (long, wide) = (board.half_length, board.half_width);
@@ -199,7 +211,7 @@ fn carried(eye: &Eye, bench: usize, last: usize, board: &Board) -> (Group, Group
     let is_away = axis.y * eye.right.0 - axis.x * eye.right.1 > 0.0;
     let mut lamps = Group::new();
     let mut halos = Group::new();
-    let places = if bench == 0 { ON_HEAD } else { ON_BODY };
+    let places = if end == End::Head { ON_HEAD } else { ON_BODY };
     for step in 0..3 {
         let which = if is_away { 2 - step } else { step };
         let at = board.centre + places[which] * long * axis;
@@ -213,18 +225,18 @@ fn carried(eye: &Eye, bench: usize, last: usize, board: &Board) -> (Group, Group
             halos = halos.add(halo.set("transform", placed(&middle, middle.scale, middle.scale)));
         }
     }
-    let crown = if bench == 0 {
-        Some(figure::head(eye, Placed { origin: board.centre + (long - 1.1) * axis, axis }))
-    } else {
-        (bench == last).then(|| figure::tail(eye, Placed { origin: board.centre - long * axis, axis }))
+    let crown = match end {
+        End::Head => Some(figure::head(eye, Placed { origin: board.centre + (long - 1.1) * axis, axis })),
+        End::Tail => Some(figure::tail(eye, Placed { origin: board.centre - long * axis, axis })),
+        End::None => None,
     };
     // The head is at the front of its board, the tail at the rear.
     thing = match crown {
-        Some(crown) if is_away == (bench == 0) => thing.add(crown).add(lamps),
+        Some(crown) if is_away == (end == End::Head) => thing.add(crown).add(lamps),
         Some(crown) => thing.add(lamps).add(crown),
         None => thing.add(lamps),
     };
-    if let Some(pearl) = (bench == 0).then(|| eye.spot(board.centre + (long + 1.35) * axis, 2.35)).flatten() {
+    if let Some(pearl) = (end == End::Head).then(|| eye.spot(board.centre + (long + 1.35) * axis, 2.35)).flatten() {
         thing = thing.add(used("pearl").set("transform", placed(&pearl, pearl.scale, pearl.scale)));
         halos = halos.add(used("halo-white").set("transform", placed(&pearl, pearl.scale, pearl.scale)));
     }

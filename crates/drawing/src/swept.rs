@@ -30,6 +30,17 @@ const TOGETHER: usize = 24;
 /// A polygon's ring of corners, without the first one again at the end.
 pub type Ring = Vec<[f64; 2]>;
 
+/// Boards of one dragon, and the stretch of its motion.
+#[derive(Debug, Clone)]
+pub struct SweptStretch<'a> {
+    /// The motion.
+    pub motion: &'a Motion,
+    /// Metres that its head has travelled at the beginning and at the end; equal for a dragon that stands.
+    pub travelled: (f64, f64),
+    /// The benches, counted from 0.
+    pub benches: Range<usize>,
+}
+
 /// The ground that boards cover.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweptArea {
@@ -37,19 +48,17 @@ pub struct SweptArea {
 }
 
 impl SweptArea {
-    /// Unites the positions of the boards of `benches`, counted from 0, while the head travels `from` to `to` metres.
-    /// `progress` receives the share that is done, from 0 to 1.
+    /// Unites the positions of the boards of all stretches. `progress` receives the share that is done, from 0 to 1.
     ///
     /// # Errors
-    /// [`NoFollower`] if a handle has no place before the end of the stretch.
-    pub fn new(
-        motion: &Motion,
-        stretch: (f64, f64),
-        benches: Range<usize>,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<Self, NoFollower> {
+    /// [`NoFollower`] if a handle has no place before the end of its stretch.
+    pub fn new(stretches: &[SweptStretch<'_>], progress: &mut dyn FnMut(f64)) -> Result<Self, NoFollower> {
         let mut union = Union { waiting: Vec::new(), levels: Vec::new() };
-        sweep(motion, stretch, benches, STRAIGHT, progress, &mut |moved| union.add(moved))?;
+        let share = 1.0 / stretches.len() as f64;
+        for (k, SweptStretch { motion, travelled, benches }) in stretches.iter().enumerate() {
+            let mut of_all = |part| progress(share * (k as f64 + part));
+            sweep(motion, *travelled, benches.clone(), STRAIGHT, &mut of_all, &mut |moved| union.add(moved))?;
+        }
         let metres = |corner: &IntPoint<i64>| [corner.x as f64 * GRID, corner.y as f64 * GRID];
         let in_metres = |ring: &GridRing| ring.iter().map(metres).collect();
         let polygons = union.finish();

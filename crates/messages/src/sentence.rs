@@ -6,7 +6,9 @@
 use std::fmt::Display;
 use std::io;
 
-use super::layouts::{ChaseStatus, CollisionAlert, Cue, NO_BENCH, Stage};
+use super::layouts::{ChaseStatus, CollisionAlert, Cue, Stage};
+pub use super::roster::name_in;
+use super::roster::obstacle_number;
 use crate::chase::{ChaseSource, ChaseState};
 use crate::state::EventKind;
 use crate::state::{FrameState, Level};
@@ -49,62 +51,11 @@ pub fn chase_sentence(status: &ChaseStatus) -> String {
     format!("{subject} {}{error}{distance}", state.map_or("in an unknown state", ChaseState::words))
 }
 
-/// Returns the name of a bench for people, counted from 1; of a number that follows the handles, an obstacle's.
-pub fn bench_name(bench: u32, benches: u32) -> String {
-    let number = u64::from(bench) + 1;
-    match number {
-        _ if bench > benches => format!("obstacle {}", bench - benches),
-        1 => "bench 1 (the head)".to_owned(),
-        _ if number == u64::from(benches) => format!("bench {number} (the tail)"),
-        _ => format!("bench {number}"),
-    }
-}
-
-/// Returns the name of a bench or an obstacle of a show by its number, for people.
-///
-/// # Examples
-///
-/// ```
-/// use bench_dragon_messages::sentence::name_in;
-/// use bench_dragon_messages::{List, SceneName, Stage, StageDragon, StageObstacle};
-///
-/// let gold = StageDragon { benches: 4, name: SceneName::new("gold"), ..StageDragon::default() };
-/// let jade = StageDragon { first_handle: 5, benches: 3, name: SceneName::new("jade"), ..StageDragon::default() };
-/// let well = StageObstacle { name: SceneName::new("well"), ..StageObstacle::default() };
-/// let stage = Stage { dragons: List::of([gold, jade]), obstacles: List::of([well]), ..Stage::default() };
-/// assert_eq!(name_in(&stage, 1), "bench 2 of gold");
-/// assert_eq!(name_in(&stage, 5), "bench 1 (the head) of jade");
-/// // Nine handles come before the obstacles.
-/// assert_eq!(name_in(&stage, 9), "the well");
-/// ```
-pub fn name_in(stage: &Stage, number: u32) -> String {
-    let of = |first: u32, benches: u32| number.checked_sub(first).filter(|bench| *bench < benches);
-    for dragon in stage.dragons.iter() {
-        if let Some(bench) = of(dragon.first_handle, dragon.benches) {
-            let name = bench_name(bench, dragon.benches);
-            let dragon = dragon.name.as_str();
-            return if dragon.is_empty() { name } else { format!("{name} of {dragon}") };
-        }
-    }
-    // Before the stage has come, only the head is known by its number.
-    let Some(obstacle) = obstacle_number(stage, number) else { return bench_name(number, NO_BENCH) };
-    match stage.obstacles.get(obstacle as usize) {
-        Some(named) => format!("the {}", named.name.as_str()),
-        None => format!("obstacle {}", u64::from(obstacle) + 1),
-    }
-}
-
 /// Returns the name of the obstacle that an alert is about: that of its event, or else the nearest one; `None` if it is
 /// about boards alone.
 pub fn obstacle_in<'a>(stage: &'a Stage, alert: &CollisionAlert) -> Option<&'a str> {
-    let of = |number: u32| stage.obstacles.get(obstacle_number(stage, number)? as usize);
+    let of = |number: u32| stage.obstacles.get(obstacle_number(stage, number)?);
     of(alert.event_bench_b).or_else(|| of(alert.bench_b)).map(|obstacle| obstacle.name.as_str())
-}
-
-/// Returns the number of an obstacle, from 0, of a number that follows the handles.
-fn obstacle_number(stage: &Stage, number: u32) -> Option<u32> {
-    let handles = stage.dragons.iter().map(|dragon| dragon.first_handle.saturating_add(dragon.benches)).max()?;
-    number.checked_sub(handles.saturating_add(1)).filter(|_| number != NO_BENCH)
 }
 
 /// Returns an alert of a show as a sentence; the stage has the names. A past event is in the past tense, since the show

@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
 use crate::contact::LeastClearance;
@@ -107,6 +108,17 @@ impl Ensemble {
     pub fn owner(&self, number: usize) -> Option<(usize, usize)> {
         let dragon = self.first_handles.partition_point(|first| *first <= number).checked_sub(1)?;
         (dragon < self.dragons.len()).then(|| (dragon, number - self.first_handles[dragon]))
+    }
+
+    /// Returns the greatest error of a link in a frame besides rounding, metres, as [`Motion::link_tolerance`].
+    pub fn link_tolerance(&self) -> f64 {
+        self.dragons.iter().map(|dragon| dragon.motion.link_tolerance()).fold(0.0, f64::max)
+    }
+
+    /// Returns the names of the benches and obstacles, for people.
+    pub fn roster(&self) -> Roster {
+        let dragon = |dragon: &Dragon| (dragon.name.clone(), dragon.motion.team().benches as u32);
+        Roster::new(self.dragons.iter().map(dragon).collect(), self.ground().names())
     }
 
     /// Returns the obstacles, in stage coordinates.

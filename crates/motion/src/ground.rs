@@ -66,6 +66,11 @@ impl Ground {
         &self.obstacles
     }
 
+    /// Returns the names of the obstacles.
+    pub fn names(&self) -> Vec<String> {
+        self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect()
+    }
+
     /// Returns true if the ground is empty.
     pub fn is_empty(&self) -> bool {
         self.obstacles.is_empty()

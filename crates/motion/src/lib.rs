@@ -18,6 +18,7 @@ pub mod solve;
 pub mod sweep;
 pub mod timeline;
 
+use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
 use crate::model::board::Board;
@@ -481,6 +482,11 @@ impl Motion {
             Some(TimedObstacleClearance { obstacle, least, time: self.time_at(least.travelled), searched_until })
         });
         timed.collect()
+    }
+
+    /// Returns the names of the benches and obstacles, for people.
+    pub fn roster(&self) -> Roster {
+        Roster::new(vec![(String::new(), self.team().benches as u32)], self.ground().names())
     }
 
     /// Returns the obstacle that an event of this motion reaches; `None` for other kinds.

@@ -148,6 +148,40 @@ impl Placement {
         y.iter_mut().for_each(|y| *y += self.origin.y);
     }
 
+    /// Places all handles of `own`, as [`Placement::chain`], among those of `all` from `first` on.
+    ///
+    /// # Panics
+    /// If `all` has fewer handles.
+    pub fn put(&self, own: &Chain, first: usize, all: &mut Chain) {
+        if self.is_identity() {
+            return all.put(first, own);
+        }
+        let to = first..first + own.handles();
+        let Chain { x, y, heading, speed, vx, vy } = all;
+        let [x, y, heading, speed, vx, vy] = [x, y, heading, speed, vx, vy].map(|numbers| &mut numbers[to.clone()]);
+        speed.copy_from_slice(&own.speed);
+        match &self.turn {
+            Some(turn) => {
+                let origin = self.origin;
+                for ((x, y), (own_x, own_y)) in x.iter_mut().zip(y).zip(own.x.iter().zip(&own.y)) {
+                    let (turned_x, turned_y) = turn.vector(*own_x, *own_y);
+                    (*x, *y) = (turned_x + origin.x, turned_y + origin.y);
+                }
+                for ((vx, vy), (own_vx, own_vy)) in vx.iter_mut().zip(vy).zip(own.vx.iter().zip(&own.vy)) {
+                    (*vx, *vy) = turn.vector(*own_vx, *own_vy);
+                }
+                heading.iter_mut().zip(&own.heading).for_each(|(heading, own)| *heading = turn.heading(*own));
+            }
+            None => {
+                x.iter_mut().zip(&own.x).for_each(|(x, own)| *x = own + self.origin.x);
+                y.iter_mut().zip(&own.y).for_each(|(y, own)| *y = own + self.origin.y);
+                heading.copy_from_slice(&own.heading);
+                vx.copy_from_slice(&own.vx);
+                vy.copy_from_slice(&own.vy);
+            }
+        }
+    }
+
     /// Returns the outline of a segment on the stage.
     pub fn outline(&self, outline: SegmentOutline) -> SegmentOutline {
         let SegmentOutline { kind, start, heading, length } = outline;

@@ -47,6 +47,10 @@ pub fn sweep(
     boards.turn_back = motion.singularities(&mut |_| ()).stall.is_some_and(|stall| stall.travelled < to);
     let mut at = boards.positions(from, usize::MAX)?;
     boards.begun = at.iter().map(|board| board.front).collect();
+    // Boards that stand cover their place.
+    if from >= to {
+        boards.report(&at, &at, moved);
+    }
     let shortest = motion.team().shortest_link();
     let mut travelled = from;
     let mut step = FIRST_SHARE * shortest;

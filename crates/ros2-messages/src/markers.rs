@@ -183,7 +183,7 @@ impl MarkerArray {
     /// Creates the markers of a stage, without positions.
     pub fn of(message: &StageMessage) -> Self {
         let stage = &message.stage;
-        let width = stage.first_dragon().width;
+        let width = greatest_width(stage);
         let bench = |of: &StageDragon, bench: u32| {
             let length = if bench == 0 { of.head_length } else { of.body_length };
             let number = (of.first_handle + bench) as i32;
@@ -222,7 +222,7 @@ impl MarkerArray {
         stage: &Stage,
         alert: Option<&CollisionAlert>,
     ) {
-        let width = stage.first_dragon().width;
+        let width = greatest_width(stage);
         let stamp = Time::of(frame.stamp_ns);
         let lifetime = self.lifetime(frame);
         for marker in &mut self.markers {
@@ -272,6 +272,11 @@ impl HasStamp for MarkerArray {
     fn set_stamp(&mut self, stamp: Time) {
         self.markers.iter_mut().for_each(|marker| marker.header.stamp = stamp);
     }
+}
+
+/// Returns the width of the widest board, metres: signs and words have its size.
+fn greatest_width(stage: &Stage) -> f64 {
+    stage.dragons.iter().map(|dragon| dragon.width).fold(0.0, f64::max)
 }
 
 /// Returns the markers of the obstacles: the outlines, the keep-outs and the names.

@@ -109,24 +109,34 @@ pub fn handle_pose_32(pose: HandlePose) -> HandlePose32 {
     HandlePose32 { x: x as f32, y: y as f32, heading: heading as f32, vx: vx as f32, vy: vy as f32 }
 }
 
-/// The choice of handles for a decimated frame: the head, every `every`-th handle behind it, and always the tail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The choice of handles for a decimated frame: of each dragon the head, every `every`-th handle behind it, and always
+/// the tail.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Decimation {
-    /// Handles of the team, at least 2.
-    pub handles: usize,
-    /// The stride in handles, at least 1.
-    pub every: usize,
+    every: usize,
+    handles: Vec<usize>,
 }
 
 impl Decimation {
-    /// Returns the number of poses in a decimated frame.
-    pub fn poses(self) -> usize {
-        (self.handles - 1).div_ceil(self.every) + 1
+    /// Chooses from dragons with these numbers of handles, at least 2, in the order of the frame. `every` is at least 1.
+    pub fn new(dragons: impl IntoIterator<Item = usize>, every: usize) -> Self {
+        let (mut handles, mut first) = (Vec::new(), 0);
+        for count in dragons {
+            let tail = first + count - 1;
+            handles.extend((first..tail).step_by(every).chain([tail]));
+            first += count;
+        }
+        Self { every, handles }
     }
 
-    /// Returns the handle at an index of a decimated frame.
-    pub fn handle(self, index: usize) -> usize {
-        (index * self.every).min(self.handles - 1)
+    /// Returns the stride in handles.
+    pub fn every(&self) -> usize {
+        self.every
+    }
+
+    /// Returns the handles of a decimated frame in order.
+    pub fn handles(&self) -> &[usize] {
+        &self.handles
     }
 }
 
@@ -395,10 +405,11 @@ mod tests {
             (2, 1, vec![0, 1]),
             (4, 1, vec![0, 1, 2, 3]),
         ] {
-            let decimation = Decimation { handles, every };
-            let found: Vec<_> = (0..decimation.poses()).map(|index| decimation.handle(index)).collect();
-            assert_eq!(found, expected, "{decimation:?}");
+            let decimation = Decimation::new([handles], every);
+            assert_eq!(decimation.handles(), expected, "{decimation:?}");
         }
+        // Of two dragons, both ends of each.
+        assert_eq!(Decimation::new([15, 4], 7).handles(), [0, 7, 14, 15, 18]);
     }
 
     fn timed(kind: EventKind, bench_b: Option<u32>) -> TimedEvent {

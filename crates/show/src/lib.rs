@@ -6,6 +6,7 @@
 pub mod alerts;
 pub mod clock;
 pub mod convert;
+mod dancer;
 mod playback;
 pub mod scene;
 mod several;
@@ -17,15 +18,16 @@ use std::sync::Arc;
 use crate::scene::cue::CueAction;
 use crate::scene::{OnContact, Scene};
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::clearance::{ClearanceMonitor, ObstacleMonitor, PairClearance};
+use bench_dragon_motion::Method;
+use bench_dragon_motion::clearance::PairClearance;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::linkage::NoFollower;
-use bench_dragon_motion::placement::Placement;
-use bench_dragon_motion::solve::{Chain, Solver, Velocities};
+use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
-use bench_dragon_motion::{Choice, Method};
 
-use several::{Closest, Several};
+pub use dancer::solve_at_or_just_before;
+use dancer::{Closest, Dancer};
+use several::Several;
 
 use alerts::{Alert, LevelTracker};
 use bench_dragon_messages::control::{COMMANDS_PER_FRAME, Code, Command, CommandRecord};
@@ -125,30 +127,53 @@ pub struct Outcome {
     pub cue: u32,
 }
 
+/// The dragons in play: the one of a show without names, or several.
+enum Cast {
+    One(Box<Dancer>),
+    Several(Box<Several>),
+}
+
+impl Cast {
+    fn new(scene: &Scene) -> Self {
+        match &scene.ensemble {
+            Some(ensemble) => Self::Several(Box::new(Several::new(scene, ensemble))),
+            None => Self::One(Box::new(Dancer::new(scene, &scene.motion))),
+        }
+    }
+
+    /// Returns the greatest overlap in metres that rounding explains before a contact.
+    fn overlap_tolerance(&self, scene: &Scene) -> f64 {
+        let (longest_link, error) = match self {
+            Self::One(dancer) => (scene.team().longest_link(), dancer.clearance_error),
+            Self::Several(several) => (several.longest_link(), several.clearance_error()),
+        };
+        ROUNDING_OVERLAP * longest_link + error
+    }
+
+    fn solve(&mut self, sim_time: f64, moves: bool, chain: &mut Chain) -> Result<Closest, NoFollower> {
+        match self {
+            Self::One(dancer) => dancer.solve(sim_time, moves, chain),
+            Self::Several(several) => several.solve(sim_time, moves, chain),
+        }
+    }
+}
+
 /// A scene in play.
 pub struct Show {
     clock: ShowClock,
-    solver: Box<dyn Solver>,
+    cast: Cast,
     solver_reason: String,
-    velocities: Velocities,
-    /// Travel of the head per simulated second, metres; NaN if the method does not follow the path exactly.
-    metres_per_second: f64,
     timeline: Timeline,
-    clearance: Option<ClearanceMonitor>,
-    obstacles: Option<ObstacleMonitor>,
     level: Option<LevelTracker>,
+    /// True if boards are measured against obstacles.
+    has_obstacles: bool,
     /// Greatest overlap in metres that rounding explains before a contact; `None` if the solver does not follow the
     /// searched motion.
     overlap_tolerance: Option<f64>,
     /// The time requested for the chain, and true if the chain moves then.
     solved: Option<(f64, bool)>,
-    /// The nearest two boards of the solution.
-    nearest_boards: Option<PairClearance>,
-    /// The nearest two boards of the solution, or a board that is nearer to an obstacle.
-    closest: Option<PairClearance>,
-    placement: Placement,
-    /// The dragons of a scene with several, in place of `solver`, `clearance`, `obstacles` and `placement`.
-    several: Option<Box<Several>>,
+    /// The nearest boards of the solution.
+    closest: Closest,
     /// The cues in the order of their times.
     cues: Vec<ReachedCue>,
     missing_cues: Vec<String>,
@@ -177,17 +202,11 @@ impl Show {
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         let freeze_time = timeline.freeze(stops).time;
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
-        let several = scene.ensemble.as_ref().map(|ensemble| Box::new(Several::new(scene, ensemble)));
-        // The clearance has more digits in the path's own coordinates.
-        let own = scene.motion.in_own_frame();
-        let choice = own.solver(scene.velocities);
-        let clearance = scene.alerts.map(|_| own.clearance_monitor(&choice));
-        let obstacles = scene.alerts.and_then(|_| own.obstacle_monitor(&choice));
-        let error = choice.clearance_error(scene.team());
-        let error = several.as_ref().map_or(error, |several| several.clearance_error.max(error));
-        let rounding = ROUNDING_OVERLAP * scene.team().longest_link() + error;
-        let Choice { solver, reason, .. } = choice;
-        let reason = several.as_ref().map_or(reason, |several| several.reason.clone());
+        let cast = Cast::new(scene);
+        let solver_reason = match &cast {
+            Cast::One(dancer) => dancer.reason.clone(),
+            Cast::Several(several) => several.reason(),
+        };
         let exact = !matches!(scene.motion.method(), Method::Paper(_));
         let (cues, missing_cues) = timed_cues(scene, &timeline);
         let cue_times = cues.iter().map(|cue| CueTime { time: cue.time, pauses: cue.pauses }).collect();
@@ -196,20 +215,14 @@ impl Show {
         frame.alerts.reserve(timeline.events().len() + 1);
         Ok(Self {
             clock: ShowClock::new(&playback, freeze_time, cue_times),
-            solver,
-            solver_reason: reason,
-            velocities: scene.velocities,
-            metres_per_second: scene.motion.travelled_at(1.0),
+            overlap_tolerance: exact.then(|| cast.overlap_tolerance(scene)),
+            cast,
+            solver_reason,
             timeline,
-            clearance,
-            obstacles,
             level,
-            overlap_tolerance: exact.then_some(rounding),
+            has_obstacles: !scene.ground().is_empty(),
             solved: None,
-            nearest_boards: None,
-            closest: None,
-            placement: *scene.motion.placement(),
-            several,
+            closest: Closest { boards: None, any: None },
             cues,
             missing_cues,
             commands: Vec::with_capacity(COMMANDS_PER_FRAME),
@@ -245,9 +258,9 @@ impl Show {
 
     /// Returns the number of pairs of boards tested so far: 0 for a scene without alerts.
     pub fn pairs_tested(&self) -> u64 {
-        match &self.several {
-            Some(several) => several.pairs_tested(),
-            None => self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs),
+        match &self.cast {
+            Cast::One(dancer) => dancer.pairs_tested(),
+            Cast::Several(several) => several.pairs_tested(),
         }
     }
 
@@ -310,11 +323,11 @@ impl Show {
         (frame.tick, frame.sim_time, frame.time_scale, frame.playback) = (tick, sim_time, time_scale, playback);
         (frame.epoch, frame.shows_played, frame.cue) = (epoch, shows_played, cues_passed as u32);
         self.solve(sim_time);
-        self.record_unforeseen_touch(self.nearest_boards);
-        if self.obstacles.is_some() {
-            self.record_unforeseen_touch(self.closest);
+        self.record_unforeseen_touch(self.closest.boards);
+        if self.has_obstacles {
+            self.record_unforeseen_touch(self.closest.any);
         }
-        self.update_state(jumped, self.closest);
+        self.update_state(jumped, self.closest.any);
         &self.frame
     }
 
@@ -326,42 +339,13 @@ impl Show {
             return;
         }
         self.solved = Some((sim_time, moves));
-        if let Some(several) = &mut self.several {
-            match several.solve(sim_time, moves, &mut self.frame.chain) {
-                Ok(Closest { boards, any }) => {
-                    (self.nearest_boards, self.closest) = (boards, any);
-                    self.frame.min_clearance = any.map_or(f64::NAN, |least| least.value);
-                }
-                Err(_) => self.frame.unsolved_frames += 1,
-            }
-            return;
-        }
-        match solve_at_or_just_before(self.solver.as_mut(), sim_time, &mut self.frame.chain) {
-            Ok(solved_at) => {
-                self.measure_clearance(solved_at);
-                self.placement.chain(&mut self.frame.chain);
+        match self.cast.solve(sim_time, moves, &mut self.frame.chain) {
+            Ok(closest) => {
+                self.closest = closest;
+                self.frame.min_clearance = closest.any.map_or(f64::NAN, |least| least.value);
             }
             Err(_) => self.frame.unsolved_frames += 1,
         }
-        if !moves && self.velocities == Velocities::Computed {
-            let Chain { speed, vx, vy, .. } = &mut self.frame.chain;
-            [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
-        }
-    }
-
-    fn measure_clearance(&mut self, solved_at: f64) {
-        let travelled = self.metres_per_second * solved_at;
-        let Some(clearance) = &mut self.clearance else { return };
-        let placed = |pair: PairClearance| placed(&self.placement, pair);
-        let boards = clearance.least_clearance(&self.frame.chain, travelled);
-        self.nearest_boards = boards.map(placed);
-        self.closest = self.nearest_boards;
-        if let Some(obstacles) = &mut self.obstacles {
-            let limit = boards.map_or(f64::INFINITY, |boards| boards.value);
-            let nearer = obstacles.nearest(&self.frame.chain, travelled, limit);
-            self.closest = nearer.map(placed).or(self.closest);
-        }
-        self.frame.min_clearance = self.closest.map_or(f64::NAN, |least| least.value);
     }
 
     /// Records a contact, or the touch of an obstacle, if boards overlap although none has happened: the searches
@@ -405,11 +389,6 @@ impl Show {
     }
 }
 
-/// Returns a pair on the stage of a pair in a path's own coordinates.
-fn placed(placement: &Placement, pair: PairClearance) -> PairClearance {
-    PairClearance { point_a: placement.point(pair.point_a), point_b: placement.point(pair.point_b), ..pair }
-}
-
 /// Returns the cues of a scene in the order of their times, and the names of the cues without a time.
 pub fn timed_cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
     let (mut cues, mut missing) = (Vec::new(), Vec::new());
@@ -425,25 +404,4 @@ pub fn timed_cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<S
     cues.sort_by(|a, b| a.time.total_cmp(&b.time));
     cues.iter_mut().zip(1..).for_each(|(cue, number)| cue.number = number);
     (cues, missing)
-}
-
-/// Solves at `time`, or at the latest earlier time with a solution. Returns that time.
-///
-/// Two cases need an earlier time, by at most 1e-4 of the time. The time of a lock multiplied by the speed can lie past
-/// the lock by the last digit. The paper's solver is ahead by one of its own time steps.
-///
-/// # Errors
-/// [`NoFollower`] if there is none so near. `chain` is then unspecified.
-pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<f64, NoFollower> {
-    let mut back = f64::EPSILON * time;
-    let mut at = time;
-    while let Err(none) = solver.solve(at, chain) {
-        at = time - back;
-        back *= 2.0;
-        // Also ends for NaN and for a time of 0.
-        if !(back > 0.0 && back <= 1e-4 * time) {
-            return Err(none);
-        }
-    }
-    Ok(at)
 }

@@ -28,7 +28,7 @@ use self::ros2::RawRos2;
 use self::stage::RawStage;
 pub use self::text::{SceneText, printable};
 use bench_dragon_messages::Roster;
-use bench_dragon_motion::ensemble::{Dragon, Ensemble};
+use bench_dragon_motion::ensemble::Ensemble;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::ground::{Ground, Obstacle};
 use bench_dragon_motion::model::Vector;
@@ -205,6 +205,11 @@ impl Scene {
         self.ensemble.as_ref().map_or(self.motion.team().handles(), Ensemble::handles)
     }
 
+    /// Returns the greatest error of a link in a frame besides rounding, metres, as [`Motion::link_tolerance`].
+    pub fn link_tolerance(&self) -> f64 {
+        self.ensemble.as_ref().map_or_else(|| self.motion.link_tolerance(), Ensemble::link_tolerance)
+    }
+
     /// Returns the obstacles, in stage coordinates.
     pub fn ground(&self) -> &Ground {
         self.ensemble.as_ref().map_or(self.motion.ground(), Ensemble::ground)
@@ -217,15 +222,7 @@ impl Scene {
 
     /// Returns the names of the benches and obstacles, for people.
     pub fn roster(&self) -> Roster {
-        let obstacles = self.ground().obstacles().iter().map(|obstacle| obstacle.name.clone()).collect();
-        let dragons = match &self.ensemble {
-            Some(ensemble) => {
-                let of = |dragon: &Dragon| (dragon.name.clone(), dragon.motion.team().benches as u32);
-                ensemble.dragons().iter().map(of).collect()
-            }
-            None => vec![(String::new(), self.team().benches as u32)],
-        };
-        Roster::new(dragons, obstacles)
+        self.ensemble.as_ref().map_or_else(|| self.motion.roster(), Ensemble::roster)
     }
 
     /// Returns a bench's name for people, counted from 1 within its dragon.

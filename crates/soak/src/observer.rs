@@ -3,12 +3,14 @@
 //! In: the events of a [`feed`](bench_dragon_client::feed). Out: an [`Observation`]. The hidden command
 //! `soak-subscriber` prints one a second, which the soak test reads.
 
+use std::ops::Range;
+
 use hdrhistogram::Histogram;
 
 use super::conformance::ConformanceCheck;
 use super::observation::{Latencies, Observation};
 use bench_dragon_client::feed::FeedEvent;
-use bench_dragon_messages::{FrameHeader, HandlePose, LoopStatus, Stage};
+use bench_dragon_messages::{FrameHeader, HandlePose, LoopStatus, Stage, StageDragon};
 use bench_dragon_publisher::live::statistics::Percentiles;
 
 /// The longest latency that is resolved: an hour.
@@ -40,11 +42,26 @@ impl Histograms {
     }
 }
 
+/// The links of one dragon.
+struct Links {
+    handles: Range<usize>,
+    /// Lengths of the head's link and of the other links, metres.
+    lengths: [f64; 2],
+}
+
+impl Links {
+    fn of(dragon: &StageDragon) -> Self {
+        let first = dragon.first_handle as usize;
+        let lengths = [dragon.head_length, dragon.body_length].map(|length| length - 2.0 * dragon.hole_inset);
+        Self { handles: first..first + dragon.benches as usize + 1, lengths }
+    }
+}
+
 /// Checks the messages that one subscriber receives.
 pub struct Observer {
     seen: Observation,
-    /// Lengths of the head's link and of the other links, metres.
-    links: Option<[f64; 2]>,
+    /// The links of each dragon.
+    links: Vec<Links>,
     /// The tolerance of links besides rounding, metres.
     link_tolerance: f64,
     /// The first frame of the present run.
@@ -67,7 +84,7 @@ impl Observer {
     pub fn new(link_tolerance: f64) -> Self {
         Self {
             seen: Observation::default(),
-            links: None,
+            links: Vec::new(),
             link_tolerance,
             first: FrameHeader::default(),
             previous: None,
@@ -94,10 +111,9 @@ impl Observer {
         }
     }
 
-    /// Takes the length of the links from the stage.
+    /// Takes the lengths of the links from the stage.
     fn stage(&mut self, stage: &Stage) {
-        let dragon = stage.first_dragon();
-        self.links = Some([dragon.head_length, dragon.body_length].map(|length| length - 2.0 * dragon.hole_inset));
+        self.links = stage.dragons.iter().map(Links::of).collect();
     }
 
     /// Stores a status, whose rate determines the phase.
@@ -173,17 +189,25 @@ impl Observer {
     }
 
     fn check_links(&mut self, handles: &[HandlePose]) {
-        let Some([head, body]) = self.links else { return };
+        if self.links.is_empty() {
+            return;
+        }
         let mut right = true;
-        for (link, pair) in handles.windows(2).enumerate() {
-            let length = (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y);
-            let expected = if link == 0 { head } else { body };
-            let radius = pair[1].x.hypot(pair[1].y);
-            let promised = self.link_tolerance + 1e-12 * expected + 4.0 * (radius.next_up() - radius);
-            let error = (length - expected).abs();
-            // NaN is a wrong length too.
-            right &= error <= promised;
-            self.seen.worst_link_error = self.seen.worst_link_error.max(error);
+        for Links { handles: own, lengths: [head, body] } in &self.links {
+            let Some(own) = handles.get(own.clone()) else {
+                right = false;
+                continue;
+            };
+            for (link, pair) in own.windows(2).enumerate() {
+                let length = (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y);
+                let expected = if link == 0 { head } else { body };
+                let radius = pair[1].x.hypot(pair[1].y);
+                let promised = self.link_tolerance + 1e-12 * expected + 4.0 * (radius.next_up() - radius);
+                let error = (length - expected).abs();
+                // NaN is a wrong length too.
+                right &= error <= promised;
+                self.seen.worst_link_error = self.seen.worst_link_error.max(error);
+            }
         }
         self.seen.links_checked += 1;
         self.seen.wrong_links += u64::from(!right);
@@ -202,7 +226,7 @@ impl Observer {
 mod tests {
     use super::*;
     use bench_dragon_client::feed::sequence::SequenceTracker;
-    use bench_dragon_messages::{List, StageDragon};
+    use bench_dragon_messages::List;
 
     const PERIOD_NS: u64 = 1_000_000;
 
@@ -234,7 +258,13 @@ mod tests {
     impl Received {
         fn new() -> Self {
             let mut received = Self::default();
-            let dragon = StageDragon { head_length: 3.5, body_length: 1.5, hole_inset: 0.25, ..StageDragon::default() };
+            let dragon = StageDragon {
+                benches: 2,
+                head_length: 3.5,
+                body_length: 1.5,
+                hole_inset: 0.25,
+                ..StageDragon::default()
+            };
             let stage = Stage { dragons: List::of([dragon]), ..Stage::default() };
             received.observer.handle(&FeedEvent::Stage { stage: &stage, segments: &[] }, 0);
             received
@@ -297,6 +327,22 @@ mod tests {
             let seen = received.observer.observation();
             assert_eq!((seen.links_checked, seen.wrong_links), (1, 1));
         }
+    }
+
+    #[test]
+    fn the_last_handle_of_a_dragon_leads_no_link() {
+        let mut received = Received::new();
+        let one = StageDragon { benches: 1, head_length: 3.0, body_length: 2.0, ..StageDragon::default() };
+        let dragons = List::of([one, StageDragon { first_handle: 2, ..one }]);
+        received.observer.handle(&FeedEvent::Stage { stage: &Stage { dragons, ..Stage::default() }, segments: &[] }, 0);
+        let at = |x: f64| HandlePose { x, ..HandlePose::default() };
+        let mut handles = [at(0.0), at(3.0), at(50.0), at(53.0)];
+        let frame = |sequence| FrameHeader { handles: 4, ..header(sequence, sequence) };
+        received.frame(frame(0), &handles);
+        assert_eq!(received.observer.observation().wrong_links, 0);
+        handles[3].x += 1e-9;
+        received.frame(frame(1), &handles);
+        assert_eq!(received.observer.observation().wrong_links, 1);
     }
 
     #[test]

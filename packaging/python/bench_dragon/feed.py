@@ -140,9 +140,10 @@ class Feed:
             sample.delete()
         return scene
 
-    def handle_indices(self, handles: int) -> Any:
-        """Returns the index of the handle of each pose of a `light` feed in a team of `handles`: shape (poses,)."""
-        return indices_of(self._services[self._poses], handles)
+    def handle_indices(self, *handles: int) -> Any:
+        """Returns the index of the handle of each pose of a `light` feed in a team of `handles`, or in several teams in
+        the order of the stage: shape (poses,)."""
+        return indices_of(self._services[self._poses], *handles)
 
     def publishers(self) -> int:
         """Returns the number of publishers of frames that are connected."""

@@ -33,10 +33,15 @@ def handles_of(sample: Any) -> Handles:
     return view
 
 
-def indices_of(poses32: Any, handles: int) -> npt.NDArray[np.int64]:
+def indices_of(poses32: Any, *handles: int) -> npt.NDArray[np.int64]:
     """Returns the index of the handle of each pose of the service `<name>/poses32`: shape (poses,).
 
-    `poses32` is the opened service, `handles` the number of handles of the team.
+    `poses32` is the opened service, `handles` the number of handles of the team, of several dragons that of each in the
+    order of the stage.
     """
     attributes = {attribute.key.to_string(): attribute.value.to_string() for attribute in poses32.attributes.values}
-    return np.append(np.arange(0, handles - 1, int(attributes["every"])), handles - 1)
+    parts, first = [], 0
+    for count in handles:
+        parts.append(np.append(np.arange(first, first + count - 1, int(attributes["every"])), first + count - 1))
+        first += count
+    return np.concatenate(parts)

@@ -168,7 +168,8 @@ class HandlePose32(Message):
 
     Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head
     first: one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the
-    index `i` is of the handle `i * every`, the last pose of the last handle.
+    index `i` is of the handle `i * every`, the last pose of the last handle. Several dragons follow one another, each
+    with its own head and tail.
     """
 
     LAYOUT = 1

@@ -15,7 +15,7 @@ use super::Ros2Arguments;
 /// Publishes until a signal comes.
 pub(super) fn ros2(common: &Common, arguments: &Ros2Arguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
-    let settings = common.scene.as_ref().map(|_| common.load_any_scene()).transpose()?;
+    let settings = common.scene.as_ref().map(|_| common.load_scene()).transpose()?;
     let settings = settings.map(|scene| scene.ros2.unwrap_or_default());
     let stop = stop_on_signals()?;
     if arguments.log_on_stdin {

@@ -243,7 +243,8 @@ fn other_changes(files: &[PathBuf]) -> Vec<Changed> {
     });
     changed.push(("a fast handle at another place".to_owned(), slower));
     if let Some(touched) = files.iter().map(|file| lines_of(file)).find(|lines| has_touch(lines)) {
-        changed.extend(false_results(&touched).into_iter().filter(|(name, _)| name.contains("obstacle")));
+        // The next bench may be there too: boards that share a handle overlap.
+        changed.extend(false_results(&touched).into_iter().filter(|(name, _)| name.contains("obstacle moved")));
     }
     changed
 }

@@ -112,3 +112,23 @@ fn options_change_when_frames_go_out_and_never_what_they_hold() {
         assert_frames(std::slice::from_ref(frame), std::slice::from_ref(original), 8.0);
     }
 }
+
+/// Two dragons, with the messages of their contact.
+#[test]
+fn a_show_of_two_is_played_byte_for_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, file) = (folder.path().join("coil.toml"), folder.path().join("show.mcap"));
+    let coil = include_str!("../../../config/coil.toml").replace("[publish]\n", "[publish]\nqueue = 3000\n");
+    std::fs::write(&scene, coil).unwrap();
+    let name = "replay_two";
+    let recorder = recorder(name, &file);
+    let mut run = program(name);
+    let publisher = Process::start(run.args(["--json", "--scene"]).arg(&scene).args(["run", "--start", "333"]));
+    wait_for_bytes(&file, 1_500_000);
+    stopped(publisher);
+    stopped(recorder);
+    let recorded = read(&file);
+    assert!(recorded.alerts.len() > 1, "the contact at 335.7 s has come");
+    let (summary, kept) = recorded_replay("replay_two_again", &file, &scene, &[]);
+    assert_same(&kept, &recorded, summary["skipped"].as_u64().unwrap());
+}

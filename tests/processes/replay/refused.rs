@@ -95,7 +95,7 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
     assert!(output.status.code() == Some(2) && sentence.contains("the name is"), "{sentence}");
 
     // Recordings with changed messages: the change, the sentence, and true if frames are sent before the sentence.
-    let changed: [(&str, Change, &str, bool); 15] = [
+    let changed: [(&str, Change, &str, bool); 16] = [
         ("no_handles", |it| Vec::from_iter((!is_frame(&it)).then_some(it)), "it has no topic handles", false),
         ("no_frames", |it| vec![with_other_topic(it, "/handles", "/x/y")], "it has no topic handles", false),
         (
@@ -117,7 +117,13 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
             false,
         ),
         ("type", |it| vec![typed(&it, |schema| schema.name += "2")], "HandlePoses2 (cdr, ros2msg), expected", false),
-        ("fields", |it| vec![typed(&it, with_other_field)], "has other fields than bench_dragon_msgs/msg/", false),
+        ("fields", |it| vec![typed(&it, with_other_field)], "does not know, this program reads FrameHeader/2", false),
+        (
+            "old_frames",
+            |it| vec![typed(&it, without_epoch)],
+            "has FrameHeader/1, this program reads FrameHeader/2",
+            false,
+        ),
         ("short", |it| vec![Message { data: Cow::Owned(it.data[..200].to_vec()), ..it }], "that cannot be read", false),
         ("big_endian", |it| vec![Message { data: Cow::Owned([&[0, 0], &it.data[2..]].concat()), ..it }], "read", false),
         ("state", |it| vec![with_bytes(&it, STATE, &[9])], "whose state this version does not know", false),
@@ -166,6 +172,12 @@ fn with_other_field(schema: &mut Schema<'_>) {
     let text = String::from_utf8(schema.data.to_vec()).unwrap();
     assert!(text.contains("float64 vx"));
     schema.data = Cow::Owned(text.replace("float64 vx", "float32 vx").into_bytes());
+}
+
+fn without_epoch(schema: &mut Schema<'_>) {
+    let text = String::from_utf8(schema.data.to_vec()).unwrap();
+    assert!(text.contains("\nuint32 epoch\n"));
+    schema.data = Cow::Owned(text.replace("\nuint32 epoch\n", "\n").into_bytes());
 }
 
 /// Changes the frames, except the first ones.

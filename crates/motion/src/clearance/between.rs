@@ -3,10 +3,16 @@
 //! In: the chain of all dragons on the stage, and the clearance of the nearest two boards found so far. Out: a nearer
 //! pair, if there is one. The show calls it if a scene has several dragons and alerts.
 //!
-//! The broad phase is that of [`super::search`]: every bench carries from frame to frame a lower bound of its distance to
-//! the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A bench is tested
-//! again only when its bound comes within the limit. The box about each dragon gives a wide bound to benches that are far
-//! from all others; among the others a grid finds the near ones.
+//! The broad phase is that of [`super::search`]: every bench carries from frame to frame a lower bound of its distance
+//! to the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A bench is
+//! tested again only when its bound comes within the limit. The box about each dragon gives a wide bound to benches
+//! that are far from all others; among the others a grid finds the near ones.
+//!
+//! Dragons that go side by side hardly approach each other, however fast they go. So a bench keeps a list of the
+//! boards near it, each with a distance and the places of the board's handles at that time as seen from the bench: with
+//! the front handle as the origin and the link as an axis. A point of a board is a linear function of the board's two
+//! handles. So two boards have approached by no more than [`corner_reach`] times the movement of the handles as seen
+//! from the bench. A board of the list is measured again only when this bound comes within the limit.
 
 use super::grid::Grid;
 use super::{Nearest, PairClearance, board, circle_radius, corner_reach};
@@ -16,8 +22,14 @@ use crate::model::team::Team;
 use crate::model::{Point, Vector};
 use crate::solve::Chain;
 
-/// Metres that a bound reaches beyond the limit at most, if others are near.
-const SKIN: f64 = 0.5;
+/// Metres beyond the limit up to which boards are listed.
+const SKIN: f64 = 1.0;
+
+/// The most boards in the list of a bench.
+const MOST_LISTED: usize = 12;
+
+/// Error of a place in single precision, as a share of it; twice as much, for the sum of the places.
+const SINGLE_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
 
 /// Metres of approach after which all bounds are computed again, so that their rounding stays within its allowance.
 const MOST_MOVED: f64 = 100.0;
@@ -63,6 +75,60 @@ impl Part {
     }
 }
 
+/// A board near a bench.
+#[derive(Debug, Clone, Copy, Default)]
+struct Listed {
+    bench: u32,
+    /// A lower bound of the distance of the boards at the time of the places, metres.
+    distance: f32,
+    /// The handles of the board as seen from the bench.
+    places: [[f32; 2]; 2],
+}
+
+/// A bench from which others are seen.
+#[derive(Debug, Clone, Copy)]
+struct Seat {
+    front: Vector,
+    axis: Vector,
+}
+
+impl Seat {
+    fn new(chain: &Chain, bench: usize) -> Self {
+        let front = Vector::new(chain.x[bench], chain.y[bench]);
+        let link = front - Vector::new(chain.x[bench + 1], chain.y[bench + 1]);
+        Self { front, axis: link / link.norm() }
+    }
+
+    /// Returns the handles of a bench as seen from here, metres along and across.
+    fn handles(&self, chain: &Chain, bench: usize) -> [[f64; 2]; 2] {
+        [bench, bench + 1].map(|handle| {
+            let from = Vector::new(chain.x[handle], chain.y[handle]) - self.front;
+            [self.axis.dot(&from), self.axis.perp(&from)]
+        })
+    }
+}
+
+impl Listed {
+    /// `reach` is the greatest approach of a point of a board per metre of its handles.
+    fn new(chain: &Chain, seat: &Seat, bench: usize, distance: f64, reach: f64) -> Self {
+        let places = seat.handles(chain, bench);
+        let rounding = SINGLE_ROUNDING * places.iter().flatten().map(|metres| metres.abs()).sum::<f64>();
+        let distance = (distance - (1.0 + reach) * rounding) as f32;
+        let places = places.map(|place| place.map(|metres| metres as f32));
+        Self { bench: bench as u32, distance: distance.next_down(), places }
+    }
+
+    /// Returns a lower bound of the distance now.
+    fn bound(&self, chain: &Chain, seat: &Seat, reach: f64) -> f64 {
+        let now = seat.handles(chain, self.bench as usize);
+        let moved = |k: usize| {
+            let [dx, dy] = [0, 1].map(|axis| now[k][axis] - f64::from(self.places[k][axis]));
+            dx * dx + dy * dy
+        };
+        f64::from(self.distance) - reach * moved(0).max(moved(1)).sqrt()
+    }
+}
+
 /// Finds the nearest two boards of different dragons. All memory is reserved by the constructor.
 #[derive(Debug, Clone)]
 pub struct BetweenMonitor {
@@ -71,6 +137,8 @@ pub struct BetweenMonitor {
     beyond: f64,
     /// Greatest approach of two boards per metre of displacement of their handles.
     reach: f64,
+    /// Greatest approach of the points of a board while it is a seat: its link may be off its length, metres.
+    link_slack: f64,
     /// The handles of the previous frame.
     x: Vec<f64>,
     y: Vec<f64>,
@@ -78,6 +146,11 @@ pub struct BetweenMonitor {
     closed: f64,
     /// By bench: a bound plus the value of `closed` when the bound was made; infinite where there is no bench.
     sums: Vec<f64>,
+    /// By bench: the same of the boards that are not in its list.
+    unlisted: Vec<f64>,
+    /// By bench: its list, and the number of boards in it.
+    listed: Vec<[Listed; MOST_LISTED]>,
+    counts: Vec<u8>,
     grid: Grid,
     /// By bench: its board in this frame, once the grid is filled, and the radius of the circle about it.
     boards: Vec<(Board, f64)>,
@@ -99,13 +172,18 @@ impl BetweenMonitor {
         let most =
             |of: fn(&Team, usize) -> f64| teams.iter().map(|team| of(team, 0).max(of(team, 1))).fold(0.0, f64::max);
         let shortest = teams.iter().map(Team::shortest_link).fold(f64::INFINITY, f64::min);
+        let reach = 2.0 * most(corner_reach) * (1.0 + 2.0 * link_error / shortest);
         Self {
             beyond: most(circle_radius) + link_error,
-            reach: 2.0 * most(corner_reach) * (1.0 + 2.0 * link_error / shortest),
+            link_slack: reach * link_error,
+            reach,
             x: vec![0.0; first],
             y: vec![0.0; first],
             closed: f64::INFINITY,
             sums: vec![f64::INFINITY; first],
+            unlisted: vec![f64::NEG_INFINITY; first],
+            listed: vec![[Listed::default(); MOST_LISTED]; first],
+            counts: vec![0; first],
             grid: Grid::new(first),
             boards: vec![(NO_BOARD, 0.0); first],
             last_pair: None,
@@ -138,11 +216,17 @@ impl BetweenMonitor {
                 }
                 for a in start..stop {
                     if within(self.sums[a], &nearest, self.closed) {
-                        if !filled {
-                            self.enclose_and_fill(chain, nearest.value);
-                            filled = true;
+                        // Lists that would soon be renewed are renewed together, since the grid is filled once for all.
+                        let early = if filled { 0.5 * SKIN } else { 1e-8 };
+                        if self.unlisted[a] <= nearest.value + self.closed + early {
+                            if !filled {
+                                self.enclose_and_fill(chain, nearest.value);
+                                filled = true;
+                            }
+                            self.unlisted[a] = self.list_later(chain, &mut nearest, k, a) + self.closed;
                         }
-                        self.sums[a] = self.against_later(&mut nearest, k, a) + self.closed;
+                        let listed = self.against_listed(chain, &mut nearest, k, a) + self.closed;
+                        self.sums[a] = listed.min(self.unlisted[a]);
                     }
                 }
             }
@@ -174,6 +258,7 @@ impl BetweenMonitor {
             self.closed = 0.0;
             for part in &self.parts[..self.parts.len().saturating_sub(1)] {
                 self.sums[part.benches()].fill(f64::NEG_INFINITY);
+                self.unlisted[part.benches()].fill(f64::NEG_INFINITY);
             }
         }
     }
@@ -194,42 +279,68 @@ impl BetweenMonitor {
         }
     }
 
-    /// Tests a bench of the dragon `k` against the boards of later dragons that can be within the limit. Returns a lower
-    /// bound of its distance to all of them.
-    fn against_later(&mut self, nearest: &mut Nearest, k: usize, a: usize) -> f64 {
+    /// Lists the boards of later dragons near a bench of the dragon `k`, and tests those that can be within the limit.
+    /// Returns a lower bound of its distance to all others.
+    fn list_later(&mut self, chain: &Chain, nearest: &mut Nearest, k: usize, a: usize) -> f64 {
+        self.counts[a] = 0;
         let (board_a, radius_a) = self.boards[a];
         let (x, y) = (board_a.centre.x, board_a.centre.y);
         let margin = ROUNDING.0 + ROUNDING.1 * (x.abs() + y.abs());
         let later = self.parts[k + 1..].iter().map(|part| part.distance(x, y));
         let apart = later.fold(f64::INFINITY, f64::min) - 2.0 * self.beyond - margin;
-        if apart > nearest.value {
+        if apart > nearest.value + SKIN {
             return apart;
         }
         let limit = if nearest.value.is_finite() { nearest.value.max(0.0) } else { self.sight() };
         let distance = 2.0 * self.beyond + limit + SKIN + margin;
-        let mut bound = limit + SKIN;
+        let mut unlisted = limit + SKIN;
         let first = self.parts[k + 1].first;
-        let Self { grid, boards, tested, .. } = self;
+        let (reach, seat) = (0.5 * self.reach, Seat::new(chain, a));
+        let Self { grid, boards, listed, counts, tested, .. } = self;
+        let (listed, count) = (&mut listed[a], &mut counts[a]);
         let mut visit = |b: usize| {
             let (board_b, radius_b) = boards[b];
             let apart = (board_b.centre - board_a.centre).norm() - radius_a - radius_b - margin;
-            if apart > nearest.value {
-                bound = bound.min(apart);
+            // The grid may have the same board twice.
+            if apart > limit + SKIN || listed[..usize::from(*count)].iter().any(|other| other.bench as usize == b) {
                 return;
             }
-            *tested += 1;
-            let separation = separation_board_board(&board_a, &board_b);
-            let value = if separation > nearest.value {
-                separation
+            let bound = if apart > nearest.value {
+                apart
             } else {
-                let value = signed_distance_board_board(&board_a, &board_b);
-                nearest.consider(value, (a, b), &board_a, &board_b);
-                value
+                *tested += 1;
+                measured(nearest, (a, b), &board_a, &board_b)
             };
-            bound = bound.min(value);
+            unlisted = unlisted.min(enlist(listed, count, Listed::new(chain, &seat, b, bound, reach)));
         };
         grid.visit_near((x, y), distance, first, &mut visit);
-        bound
+        unlisted
+    }
+
+    /// Tests the listed boards that can be within the limit. Returns a lower bound of the distances to all of the list.
+    fn against_listed(&mut self, chain: &Chain, nearest: &mut Nearest, k: usize, a: usize) -> f64 {
+        let mut least = f64::INFINITY;
+        let mut board_a = None;
+        let (reach, seat) = (0.5 * self.reach, Seat::new(chain, a));
+        let margin = ROUNDING.0 + ROUNDING.1 * (chain.x[a].abs() + chain.y[a].abs());
+        for place in 0..usize::from(self.counts[a]) {
+            let listed = self.listed[a][place];
+            let mut bound = listed.bound(chain, &seat, reach) - self.link_slack - margin;
+            if bound <= nearest.value + margin {
+                let b = listed.bench as usize;
+                let board_a = board_a.get_or_insert_with(|| self.parts[k].board(chain, a));
+                let board_b = self.parts[self.part_of(b)].board(chain, b);
+                self.tested += 1;
+                bound = measured(nearest, (a, b), board_a, &board_b);
+                self.listed[a][place] = Listed::new(chain, &seat, b, bound, reach);
+            }
+            least = least.min(bound);
+        }
+        least
+    }
+
+    fn part_of(&self, bench: usize) -> usize {
+        self.parts.partition_point(|part| part.first <= bench) - 1
     }
 
     /// Returns the metres across the boxes about all dragons: no two boards are further apart.
@@ -241,11 +352,36 @@ impl BetweenMonitor {
     }
 
     fn test(&mut self, chain: &Chain, nearest: &mut Nearest, (a, b): (usize, usize)) {
-        let part = |bench: usize| &self.parts[self.parts.partition_point(|part| part.first <= bench) - 1];
-        let (board_a, board_b) = (part(a).board(chain, a), part(b).board(chain, b));
+        let [board_a, board_b] = [a, b].map(|bench| self.parts[self.part_of(bench)].board(chain, bench));
         self.tested += 1;
         nearest.consider(signed_distance_board_board(&board_a, &board_b), (a, b), &board_a, &board_b);
     }
+}
+
+/// Tests two boards. Returns their distance if they are within the limit, or else a lower bound of it.
+fn measured(nearest: &mut Nearest, pair: (usize, usize), board_a: &Board, board_b: &Board) -> f64 {
+    let separation = separation_board_board(board_a, board_b);
+    if separation > nearest.value {
+        return separation;
+    }
+    let value = signed_distance_board_board(board_a, board_b);
+    nearest.consider(value, pair, board_a, board_b);
+    value
+}
+
+/// Puts a board in a list. In a full list it takes the place of the farthest board, if that is farther. Returns a lower
+/// bound of the distance of the board that is left out.
+fn enlist(list: &mut [Listed; MOST_LISTED], count: &mut u8, new: Listed) -> f64 {
+    if let Some(free) = list.get_mut(usize::from(*count)) {
+        (*free, *count) = (new, *count + 1);
+        return f64::INFINITY;
+    }
+    let farthest = list.iter_mut().max_by(|one, other| one.distance.total_cmp(&other.distance));
+    let left_out = match farthest {
+        Some(farthest) if farthest.distance > new.distance => std::mem::replace(farthest, new),
+        _ => new,
+    };
+    f64::from(left_out.distance)
 }
 
 /// Returns the nearest two boards of different dragons by testing all pairs, as the reference.

@@ -14,9 +14,11 @@ pub(super) struct Grid {
     last: Vec<u32>,
     before: Vec<u32>,
     places: Vec<(f64, f64)>,
-    /// Lists from one row of squares to the next.
-    row: u32,
 }
+
+/// Lists from one row of squares to the next, modulo their number: groups of points far from each other rarely share
+/// lists, and the squares of a row follow one another.
+const ROW: u32 = 0x9E37_79B1;
 
 impl Grid {
     /// Reserves the memory for points with numbers from 0 to `points - 1`.
@@ -27,7 +29,6 @@ impl Grid {
             last: vec![NONE; lists],
             before: vec![NONE; points],
             places: vec![(0.0, 0.0); points],
-            row: lists.isqrt() as u32 | 1,
         }
     }
 
@@ -73,7 +74,7 @@ impl Grid {
 
     #[inline]
     fn list(&self, column: i32, row: i32) -> usize {
-        let hash = (row as u32).wrapping_mul(self.row).wrapping_add(column as u32);
+        let hash = (row as u32).wrapping_mul(ROW).wrapping_add(column as u32);
         hash as usize & (self.last.len() - 1)
     }
 }

@@ -4,9 +4,11 @@ use std::cell::Cell;
 
 use super::bounds::{BLOCK, BoundTable, Neighbour};
 use super::*;
+use crate::model::Vector;
 use crate::model::curve::Side;
 use crate::model::description::PathDescription;
 use crate::model::path::tests::any_path;
+use crate::placement::Placement;
 use crate::solve::Velocities;
 use crate::solve::newton::Newton;
 use crate::solve::paper::PaperRules;
@@ -174,6 +176,55 @@ fn too_few_benches_have_no_clearance() {
             assert_eq!(monitor.least_clearance(&Chain::new(team.handles()), 0.0), None);
         }
     }
+}
+
+/// Returns the chain of dragons on one path, each turned by a share of a turn and at its own travel.
+fn chain_of(path: &Path, teams: &[Team], travels: &[f64], turns: &[f64]) -> Option<Chain> {
+    let mut all = Chain::new(teams.iter().map(Team::handles).sum());
+    let mut first = 0;
+    for ((team, travelled), turns) in teams.iter().zip(travels).zip(turns) {
+        let mut own = Chain::new(team.handles());
+        Newton::new(path.clone(), *team, 1.0, Velocities::Omitted).solve_at(*travelled, &mut own).ok()?;
+        Placement::new(Vector::zeros(), *turns, false).put(&own, first, &mut all);
+        first += team.handles();
+    }
+    Some(all)
+}
+
+/// Dragons that coil side by side at 60 Hz, then one that is faster, then jumps.
+#[test]
+fn between_dragons_the_same_as_all_pairs() {
+    let path = Path::spiral(1.7, 8.0);
+    for teams in [vec![team(60, 0.3), team(45, 0.3)], vec![team(20, 0.1), team(30, 1.2), team(25, 0.3)]] {
+        let turns: Vec<f64> = (0..teams.len()).map(|k| k as f64 / teams.len() as f64).collect();
+        let mut monitor = BetweenMonitor::new(&teams, 1e-9);
+        let slow = (0..300).map(|k| (100.0 + f64::from(k) / 60.0, 1.0));
+        let fast = (0..200).map(|k| (100.0 + f64::from(k) / 60.0, 1.7));
+        let jumps = (0..40).map(|k| (f64::from(k * 37 % 200), 1.0));
+        for (travelled, factor) in slow.chain(fast).chain(jumps) {
+            let travels: Vec<f64> = (0..teams.len()).map(|k| travelled * if k == 1 { factor } else { 1.0 }).collect();
+            let Some(chain) = chain_of(&path, &teams, &travels, &turns) else { continue };
+            let truth = nearest_between_all_pairs(&chain, &teams);
+            assert_eq!(monitor.nearest(&chain, f64::INFINITY), truth, "{travelled} {factor}");
+        }
+    }
+}
+
+#[test]
+fn of_dragons_side_by_side_few_boards_are_tested() {
+    let (path, teams) = (Path::spiral(1.7, 8.0), [team(60, 0.3); 2]);
+    let mut monitor = BetweenMonitor::new(&teams, 1e-9);
+    let mut tested = 0;
+    for k in 0..300 {
+        let travelled = 150.0 + f64::from(k) / 60.0;
+        let chain = chain_of(&path, &teams, &[travelled; 2], &[0.0, 0.5]).unwrap();
+        let before = monitor.pairs_tested();
+        monitor.nearest(&chain, f64::INFINITY).unwrap();
+        tested += if k > 0 { monitor.pairs_tested() - before } else { 0 };
+    }
+    println!("{} a frame", tested / 299);
+    // A test of all boards near each of 60 takes some 300.
+    assert!(tested < 300 * 60, "{} a frame", tested / 299);
 }
 
 /// Checks every bound that the table has for a chain. Returns the difference of the least distance and the least bound,

@@ -80,7 +80,10 @@ pub struct PublisherConfig {
 impl PublisherConfig {
     /// Returns the handles of the frames in single precision, if there are such frames.
     fn decimation(&self) -> Option<Decimation> {
-        self.single_precision.map(|SinglePrecision { every }| Decimation { handles: self.handles, every })
+        let SinglePrecision { every } = self.single_precision?;
+        let dragons: Vec<usize> = self.stage.stage.dragons.iter().map(|dragon| dragon.benches as usize + 1).collect();
+        let known = dragons.iter().sum::<usize>() == self.handles;
+        Some(Decimation::new(if known { dragons } else { vec![self.handles] }, every))
     }
 }
 
@@ -180,8 +183,8 @@ impl SharedMemoryPublisher {
         let whole = FrameService { service: "poses", poses: config.handles, every: None };
         let poses = FrameSender::open(&node, config, &whole)?;
         let open_32 = |decimation: Decimation| {
-            let every = Some(decimation.every);
-            let described = FrameService { service: "poses32", poses: decimation.poses(), every };
+            let every = Some(decimation.every());
+            let described = FrameService { service: "poses32", poses: decimation.handles().len(), every };
             Ok((FrameSender::open(&node, config, &described)?, decimation))
         };
         let poses_32 = config.decimation().map(open_32).transpose()?;
@@ -219,10 +222,12 @@ impl SharedMemoryPublisher {
         self.poses.send(header, handle_poses(chain))?;
         match &self.poses_32 {
             None => Ok(()),
-            Some((port, Decimation { every: 1, .. })) => port.send(header, handle_poses(chain).map(handle_pose_32)),
+            Some((port, decimation)) if decimation.every() == 1 => {
+                port.send(header, handle_poses(chain).map(handle_pose_32))
+            }
             Some((port, decimation)) => {
-                let pose = |index| handle_pose_32(handle_pose(chain, decimation.handle(index)));
-                port.send(header, (0..decimation.poses()).map(pose))
+                let pose = |handle: &usize| handle_pose_32(handle_pose(chain, *handle));
+                port.send(header, decimation.handles().iter().map(pose))
             }
         }
     }

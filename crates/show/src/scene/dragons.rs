@@ -92,11 +92,6 @@ impl RawSeveral {
                 "cues.travelled names no dragon, expected cues.at or cues.before in a show of several dragons";
             return Err(source.field_error(travelled, sentence));
         }
-        if let Some(every) = &self.publish.every {
-            let sentence =
-                "publish.every leaves out ends of dragons, expected no such field in a show of several dragons";
-            return Err(source.field_error(every, sentence));
-        }
         let ensemble = Ensemble::new(dragons);
         let motion = ensemble.dragons()[0].motion.clone();
         let Self { name, alerts, cues, publish, motion: ends, .. } = self;

@@ -13,7 +13,8 @@ pub(super) fn default_queue(config: &PublisherConfig) -> usize {
 /// Returns the bytes of a frame in all services of frames together.
 fn frame_bytes(config: &PublisherConfig) -> usize {
     let whole = size_of::<FrameHeader>() + config.handles * size_of::<HandlePose>();
-    let single = config.decimation().map(|it| size_of::<FrameHeader>() + it.poses() * size_of::<HandlePose32>());
+    let single =
+        config.decimation().map(|it| size_of::<FrameHeader>() + it.handles().len() * size_of::<HandlePose32>());
     whole + single.unwrap_or(0)
 }
 

@@ -1,0 +1,137 @@
+//! One dragon in play: from its own time to its chain on the stage, with the nearest of its boards.
+//!
+//! In: a motion and its own time. Out: the chain and its clearance. The show calls it, for its one dragon or for each
+//! of several.
+
+use std::ops::Range;
+
+use crate::scene::Scene;
+use bench_dragon_motion::Motion;
+use bench_dragon_motion::clearance::{ClearanceMonitor, ObstacleMonitor, PairClearance};
+use bench_dragon_motion::linkage::NoFollower;
+use bench_dragon_motion::placement::Placement;
+use bench_dragon_motion::solve::{Chain, Solver, Velocities};
+
+/// One dragon in play.
+pub(crate) struct Dancer {
+    /// Solves in the path's own coordinates, where the clearance has more digits.
+    solver: Box<dyn Solver>,
+    velocities: Velocities,
+    /// Travel of the head per second, metres; NaN if the method does not follow the path exactly.
+    metres_per_second: f64,
+    clearance: Option<ClearanceMonitor>,
+    obstacles: Option<ObstacleMonitor>,
+    placement: Placement,
+    /// The name of the solver and the reason for its choice.
+    pub reason: String,
+    /// Greatest error of a clearance, metres.
+    pub clearance_error: f64,
+}
+
+/// The nearest boards of a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Closest {
+    /// The nearest two boards that share no handle.
+    pub boards: Option<PairClearance>,
+    /// The same, or a board that is nearer to an obstacle.
+    pub any: Option<PairClearance>,
+}
+
+impl Dancer {
+    /// Creates the dragon of `motion` with what the scene computes.
+    pub(crate) fn new(scene: &Scene, motion: &Motion) -> Self {
+        let own = motion.in_own_frame();
+        let choice = own.solver(scene.velocities);
+        Self {
+            velocities: scene.velocities,
+            metres_per_second: motion.travelled_at(1.0),
+            clearance: scene.alerts.map(|_| own.clearance_monitor(&choice)),
+            obstacles: scene.alerts.and_then(|_| own.obstacle_monitor(&choice)),
+            placement: *motion.placement(),
+            clearance_error: choice.clearance_error(own.team()),
+            reason: choice.reason,
+            solver: choice.solver,
+        }
+    }
+
+    /// Returns the pairs of boards tested so far.
+    pub(crate) fn pairs_tested(&self) -> u64 {
+        self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
+    }
+
+    /// Fills `chain` on the stage at a time of the dragon's own, and measures its clearance.
+    pub(crate) fn solve(&mut self, time: f64, moves: bool, chain: &mut Chain) -> Result<Closest, NoFollower> {
+        let solved = self.solve_in_own_frame(time, chain);
+        if solved.is_ok() {
+            self.placement.chain(chain);
+        }
+        if !moves {
+            self.stand(chain, 0..chain.handles());
+        }
+        solved
+    }
+
+    /// The same for one of several, whose handles are those of `all` from `first` on. `own` holds its chain meanwhile.
+    pub(crate) fn solve_among(
+        &mut self,
+        (time, moves): (f64, bool),
+        own: &mut Chain,
+        first: usize,
+        all: &mut Chain,
+    ) -> Result<Closest, NoFollower> {
+        let closest = self.solve_in_own_frame(time, own)?;
+        self.placement.put(own, first, all);
+        if !moves {
+            self.stand(all, first..first + own.handles());
+        }
+        Ok(closest)
+    }
+
+    fn solve_in_own_frame(&mut self, time: f64, chain: &mut Chain) -> Result<Closest, NoFollower> {
+        let solved_at = solve_at_or_just_before(self.solver.as_mut(), time, chain)?;
+        Ok(self.measure(solved_at, chain))
+    }
+
+    fn stand(&self, chain: &mut Chain, handles: Range<usize>) {
+        if self.velocities == Velocities::Computed {
+            let Chain { speed, vx, vy, .. } = chain;
+            [speed, vx, vy].into_iter().for_each(|numbers| numbers[handles.clone()].fill(0.0));
+        }
+    }
+
+    fn measure(&mut self, solved_at: f64, chain: &Chain) -> Closest {
+        let Some(clearance) = &mut self.clearance else { return Closest { boards: None, any: None } };
+        let travelled = self.metres_per_second * solved_at;
+        let placed = |PairClearance { value, bench_a, bench_b, point_a, point_b }| {
+            let [point_a, point_b] = [point_a, point_b].map(|point| self.placement.point(point));
+            PairClearance { value, bench_a, bench_b, point_a, point_b }
+        };
+        let own = clearance.least_clearance(chain, travelled);
+        let boards = own.map(placed);
+        let limit = own.map_or(f64::INFINITY, |own| own.value);
+        let obstacles = self.obstacles.as_mut();
+        let nearer = obstacles.and_then(|monitor| monitor.nearest(chain, travelled, limit));
+        Closest { boards, any: nearer.map(placed).or(boards) }
+    }
+}
+
+/// Solves at `time`, or at the latest earlier time with a solution. Returns that time.
+///
+/// Two cases need an earlier time, by at most 1e-4 of the time. The time of a lock multiplied by the speed can lie past
+/// the lock by the last digit. The paper's solver is ahead by one of its own time steps.
+///
+/// # Errors
+/// [`NoFollower`] if there is none so near. `chain` is then unspecified.
+pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<f64, NoFollower> {
+    let mut back = f64::EPSILON * time;
+    let mut at = time;
+    while let Err(none) = solver.solve(at, chain) {
+        at = time - back;
+        back *= 2.0;
+        // Also ends for NaN and for a time of 0.
+        if !(back > 0.0 && back <= 1e-4 * time) {
+            return Err(none);
+        }
+    }
+    Ok(at)
+}

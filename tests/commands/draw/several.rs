@@ -1,0 +1,84 @@
+//! Pictures of several dragons: every look has the boards of all, and the ends of each.
+
+use super::*;
+
+/// The handles of `config/coil.toml`: those of gold, then those of jade.
+const HANDLES: [usize; 2] = [61, 61];
+
+/// Returns the numbers of all boards: a dragon's last handle leads none.
+fn numbers() -> Vec<usize> {
+    let gold = 0..HANDLES[0] - 1;
+    gold.chain(HANDLES[0]..HANDLES[0] + HANDLES[1] - 1).collect()
+}
+
+/// Returns the numbers of the elements called `bench-`.
+fn drawn_numbers(svg: &Document) -> Vec<usize> {
+    let ids = svg.descendants().filter_map(|node| node.attribute("id")?.strip_prefix("bench-"));
+    let mut numbers: Vec<usize> = ids.map(|number| number.parse().unwrap()).collect();
+    numbers.sort_unstable();
+    numbers
+}
+
+/// The boards of the plan are those of `solve`; the others are those of the plan.
+#[test]
+fn the_lantern_look_has_the_boards_of_all() {
+    let scene = scene_file("coil");
+    let plan = answer(&["--scene", &scene, "draw", "--at", "200"]);
+    let lanterns = answer(&["--scene", &scene, "draw", "--at", "200", "--look", "lanterns"]);
+    let (plan, lanterns) = (Document::parse(&plan).unwrap(), Document::parse(&lanterns).unwrap());
+    assert_eq!((drawn_numbers(&plan), drawn_numbers(&lanterns)), (numbers(), numbers()));
+    for bench in numbers() {
+        let corners = |svg: &Document| {
+            let node = with_id(svg, &format!("bench-{bench}")).unwrap();
+            node.attribute("points").unwrap().to_owned()
+        };
+        assert_eq!(corners(&plan), corners(&lanterns), "bench {bench}");
+    }
+    for end in ["head-gold", "tail-gold", "head-jade", "tail-jade"] {
+        assert!(with_id(&lanterns, end).is_some(), "{end}");
+    }
+    let count = |id: &str| with_id(&lanterns, id).unwrap().children().filter(Node::is_element).count();
+    let lamps = 3 * 59 + 4;
+    assert_eq!((count("lanterns"), count("halos"), count("dancers")), (2 * lamps, 2 * lamps, 120));
+}
+
+#[test]
+fn the_look_from_a_seat_has_the_boards_of_all() {
+    let scene = scene_file("coil");
+    let svg = answer(&["--scene", &scene, "draw", "--at", "300", "--look", "seat=0,60,6"]);
+    let svg = Document::parse(&svg).unwrap();
+    assert_eq!(drawn_numbers(&svg), numbers());
+    let used = |name: &str| svg.descendants().filter(|node| node.attribute("href") == Some(name)).count();
+    // A pearl before each head, and a dancer at each handle.
+    assert_eq!(used("#pearl"), 2);
+    assert_eq!(used("#dancer") + used("#dancer-2"), 122);
+}
+
+#[test]
+fn an_animation_has_the_boards_of_all_and_names_the_contact() {
+    let scene = scene_file("coil");
+    let arguments = ["--scene", &scene, "draw", "--from", "330", "--until", "contact", "--every", "1", "--animated"];
+    let svg = answer(&arguments);
+    assert!(svg.contains("bench 1 of gold and bench 1 of jade"), "the event that ends it");
+    let svg = Document::parse(&svg).unwrap();
+    assert_eq!(drawn_numbers(&svg), numbers());
+    for path in ["path-gold", "path-jade"] {
+        assert!(with_id(&svg, path).is_some(), "{path}");
+    }
+    // The last moment is that of a picture at the contact: the centre of every board.
+    let still = answer(&["--scene", &scene, "draw", "--at", "contact"]);
+    let still = Document::parse(&still).unwrap();
+    for bench in numbers() {
+        let node = |svg: &'_ Document| with_id(svg, &format!("bench-{bench}")).unwrap().range();
+        let (moving, standing) = (node(&svg), node(&still));
+        let numbers = |text: &str| -> Vec<f64> {
+            text.split([' ', ',', '(', ')']).filter_map(|number| number.parse().ok()).collect()
+        };
+        let moved = svg.input_text()[moving].to_owned();
+        let moved = numbers(moved.split("translate(").nth(1).unwrap().split(')').next().unwrap());
+        let points = still.input_text()[standing].to_owned();
+        let corners = numbers(points.split("points=\"").nth(1).unwrap().split('"').next().unwrap());
+        let middle = |axis: usize| (0..4).map(|corner| corners[2 * corner + axis]).sum::<f64>() / 4.0;
+        assert!((moved[0] - middle(0)).abs() < 0.02 && (moved[1] - middle(1)).abs() < 0.02, "bench {bench}: {moved:?}");
+    }
+}
