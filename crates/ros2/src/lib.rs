@@ -50,8 +50,6 @@ struct Ros2Config {
     name: String,
     /// Handles in a frame.
     handles: usize,
-    /// Frames per second.
-    rate: f64,
     /// The scene's settings.
     settings: Ros2Settings,
     /// True if there are alerts.

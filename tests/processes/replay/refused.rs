@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use bench_dragon::publisher::live::{FrameSource, Period};
+use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
 use bench_dragon::show::convert::Stamps;
@@ -193,15 +193,18 @@ fn with_a_handle_less(message: Message<'_>) -> Message<'_> {
     message
 }
 
-/// Returns simulated time and the first handle of each frame that the library plays, and the reason of an early end.
-fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64)>, ReadError> {
+/// Returns simulated time, the first handle, and the number of alerts and cues, of each frame that the library plays, and
+/// the reason of an early end.
+fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64, usize)>, ReadError> {
     let options = ReplayOptions { pace: Pace::Even(100.0), start: None, looping: false };
     let (mut replay, thread) = Prepared::open(file, options)?.begin()?;
     const STAMPS: Stamps = Stamps { run_id: 0, sequence: 0, stamp_ns: 0, deadline_ns: 0 };
     let mut frames = Vec::new();
     for tick in 0.. {
         match replay.frame(tick, STAMPS) {
-            Period::Frame(frame) => frames.push((frame.header.sim_time.to_bits(), frame.chain.x[0].to_bits())),
+            Period::Frame(Outgoing { header, chain, alerts, cues, .. }) => {
+                frames.push((header.sim_time.to_bits(), chain.x[0].to_bits(), alerts.len() + cues.len()));
+            }
             Period::Empty => std::thread::yield_now(),
             Period::Over => break,
         }
@@ -234,7 +237,8 @@ fn a_bag_of_another_recorder_is_played() {
     assert_eq!((&played["frames"], &played["end"]), (&frames.len().into(), &"recording".into()), "{played}");
 }
 
-/// `ros2 bag record --max-bag-duration` begins a new file at times; the latched stage is in the first.
+/// `ros2 bag record --max-bag-duration` begins a new file at times; the latched stage is in the first. Others repeat the
+/// alert that holds in each file.
 #[test]
 fn a_bag_of_several_files_is_played_as_one_recording() {
     let folder = tempfile::tempdir().unwrap();
@@ -246,9 +250,14 @@ fn a_bag_of_several_files_is_played_as_one_recording() {
     std::fs::create_dir(&bag).unwrap();
     for (part, name) in ["bag_9.mcap", "bag_10.mcap", "bag_11.mcap"].into_iter().enumerate() {
         let part_of = |message: &Message<'_>| (message.log_time - first) * 3 / (last - first + 1);
-        rewrite(&bytes, &bag.join(name), |it| if part_of(&it) == part as u64 { vec![it] } else { vec![] });
+        rewrite(&bytes, &bag.join(name), |it| match part_of(&it) == part as u64 {
+            true if it.channel.topic.ends_with("/alerts") => vec![it.clone(), it],
+            true => vec![it],
+            false => vec![],
+        });
     }
     let frames = contents(&file, None).unwrap();
+    assert!(frames.iter().any(|(_, _, events)| *events > 0));
     // Without metadata.yaml, which a killed recorder does not write.
     assert_eq!(contents(&bag, None).unwrap(), frames);
     let scene = scene(folder.path(), "school", 64, "");
