@@ -84,7 +84,7 @@ impl Barrier {
         }
         let size = metres.abs();
         let near: Vec<Side> = sides.into_iter().filter(|side| !is_clear(size, &[*side])).collect();
-        if !near.is_empty() && !(metres < 0.0 && is_clear(metres, &near)) {
+        if !(near.is_empty() || metres < 0.0 && is_clear(metres, &near)) {
             return false;
         }
         // Inside or outside: a point that is in the board, also where the board is moved out of the shape.
