@@ -27,8 +27,7 @@ use super::events::{bench_name, find_least_clearance, least_clearance, sentence}
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{
-    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, number, progress_bar,
-    search_timeline,
+    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, number, progress_bar, search_timeline,
 };
 
 /// Arguments of `check`.

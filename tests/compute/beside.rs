@@ -91,7 +91,7 @@ fn clearance(scene: &Scene, team: &chain::Team, pose: &chain::Pose, bench: usize
 }
 
 /// Compares the enclosures of a scene with a brute force at `samples` places, and has the certificate checked. Returns
-/// the number of obstacles, and that of those enclosed over the whole show.
+/// the number of obstacles that can be decided, and that of those enclosed over the whole show.
 fn compared(text: &str, samples: u32) -> (usize, usize) {
     let Enclosed { scene, found, enclosures, end, lines } = enclosed(text);
     let proved = check(&lines).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
@@ -105,19 +105,24 @@ fn compared(text: &str, samples: u32) -> (usize, usize) {
         .map(|k| end * f64::from(k) / f64::from(samples) * (1.0 - 1e-12))
         .map(|travelled| (travelled, chain.pose(travelled)))
         .collect();
-    let mut whole = 0;
+    let (mut whole, mut decidable) = (0, 0);
     for (number, obstacle) in obstacles.iter().enumerate() {
         let claim = &proved.obstacle_clearances[number];
+        let ordinary = found.iter().find(|found| found.obstacle == number).map_or(f64::NAN, |found| found.least.value);
+        let is_decidable = obstacle.shape.kind() == ShapeKind::Circle || ordinary > -obstacle.keep_out;
+        decidable += usize::from(is_decidable);
         let Some(ObstacleEnclosure { lo, hi, travelled, bench, until, .. }) = enclosures.obstacles[number] else {
             assert_eq!((claim.lo, claim.hi), (None, None), "{claim:?}\n{text}");
-            println!("nothing of {}: {:?}", obstacle.name, found.iter().find(|found| found.obstacle == number));
+            if is_decidable {
+                println!("nothing of {}: {ordinary}\n{text}", obstacle.name);
+            }
             continue;
         };
         whole += usize::from(until.is_none());
         // Where the proof stops before the end, a place beyond may be nearer.
         assert!(hi - lo <= 1e-9 && (lo <= hi || until.is_some()), "{lo} {hi}\n{text}");
         if let Some(until) = until {
-            println!("{} up to {until} of {end} m: {lo} {hi} at {travelled}, bench {bench}", obstacle.name);
+            println!("{} up to {until} of {end} m: {lo} {hi} at {travelled}, {ordinary}\n{text}", obstacle.name);
         }
         // A place beyond the last step that is shown proves nothing.
         assert!(claim.hi.is_some() || until.is_some(), "{claim:?}\n{text}");
@@ -131,11 +136,10 @@ fn compared(text: &str, samples: u32) -> (usize, usize) {
             assert!(least >= lo - ROUNDING, "{}: {least} after {at} m, {lo}\n{text}", obstacle.name);
         }
         if until.is_none() {
-            let ordinary = found.iter().find(|found| found.obstacle == number).unwrap().least.value;
             assert!(lo - 1e-11 <= ordinary && ordinary <= hi + 1e-11, "{lo} {ordinary} {hi}\n{text}");
         }
     }
-    (obstacles.len(), whole)
+    (decidable, whole)
 }
 
 #[test]
@@ -167,7 +171,7 @@ fn the_least_clearances_of_random_scenes_are_enclosed() {
         (obstacles, whole) = (obstacles + of_scene, whole + enclosed);
     }
     println!("{whole} of {obstacles} obstacles");
-    assert!(whole * 10 >= obstacles * 7, "{whole} of {obstacles}");
+    assert!(whole * 20 >= obstacles * 19, "{whole} of {obstacles}");
 }
 
 /// A certificate is refused without any one of its lines, of another scene, and with a stronger claim.

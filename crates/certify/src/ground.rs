@@ -13,6 +13,9 @@ use bench_dragon_motion::model::{self, Point};
 /// Rounding of a corner in the path's own coordinates, as a share of the coordinates.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
+/// Metres of an overlap with an outline that is no more than a touch.
+const DEEPEST: f64 = 1e-10;
+
 /// An obstacle in the path's own coordinates.
 pub(super) struct Barrier {
     obstacle: Obstacle,
@@ -81,13 +84,19 @@ impl Barrier {
         }
         let size = metres.abs();
         let near: Vec<Side> = sides.into_iter().filter(|side| !is_clear(size, &[*side])).collect();
-        if !near.is_empty() && !(metres < 0.0 && is_clear(metres, &near)) {
+        if !(near.is_empty() || metres < 0.0 && is_clear(metres, &near)) {
             return false;
         }
         // Inside or outside: a point that is in the board, also where the board is moved out of the shape.
         let pin = Board { centre: board.inner_point(), half_length: 0.0, half_width: 0.0, ..in_doubles };
         let is_inner = board.first_order.is_none_or(|(first, _)| first.holds_front_point(metres.min(0.0).abs()));
         shape.kind() == ShapeKind::Line || is_inner && shape.signed_distance(&pin) > *rounding
+    }
+
+    /// Returns true if a least clearance can be enclosed: of an overlap with a shape other than a circle it cannot.
+    pub fn is_decidable(&self, clearance: f64) -> bool {
+        let Obstacle { shape, keep_out, .. } = &self.obstacle;
+        shape.kind() == ShapeKind::Circle || clearance + keep_out > -DEEPEST
     }
 
     /// Returns an upper bound of the clearance of a board, metres.

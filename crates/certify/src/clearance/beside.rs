@@ -41,6 +41,10 @@ impl Descent<'_, '_> {
     /// Takes the places of the ordinary search, or the start if the show ends there.
     pub(super) fn begin_beside(&mut self, hints: &[TimedObstacleClearance], is_at_start: bool) {
         for TimedObstacleClearance { obstacle, least, .. } in hints {
+            // Steps in vain would use up the limit.
+            if !self.chain.barriers.get(*obstacle).is_some_and(|barrier| barrier.is_decidable(least.value)) {
+                continue;
+            }
             let places = match is_at_start {
                 true => self.after_start().map(|after| [self.at.clone(), after]),
                 false => self.inside(least.travelled).map(|point| [point.clone(), point]),
