@@ -8,6 +8,7 @@ pub mod bridge;
 mod commands;
 mod control;
 pub mod environment;
+mod gaps;
 mod matching;
 mod node;
 mod rate;

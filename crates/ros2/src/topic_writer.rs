@@ -3,22 +3,23 @@
 //! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
 //! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first; with
 //! Fast DDS also a volatile one, since RustDDS does not read the durability of a subscriber. So a message without
-//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. A
-//! subscriber that joins others still gets all that RustDDS keeps, the latest last. To end that, RustDDS would have to
-//! send a GAP to a new subscriber that is volatile; it does so only if the writer is volatile. A second, volatile writer
-//! is no remedy: a volatile subscriber matches both, and a transient-local one would report the second as incompatible.
-//! Messages to single readers are none either: RustDDS repairs them for every later subscriber.
+//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. From a
+//! subscriber that joins others older messages are withheld by a GAP of our own ([`gaps`](super::gaps)): RustDDS sends one
+//! only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches both, and a
+//! transient-local one would report the second as incompatible. Messages to single readers are none either: RustDDS
+//! repairs them for every later subscriber.
 //!
 //! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages for
 //! all subscribers of the topic, of a killed one for its lease: 20 s with Fast DDS. So a refused message is held and
 //! written again, and a writer that refuses for longer than a new subscriber takes is replaced.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node, Publisher};
 use rustdds::policy::{self, ResourceLimits};
-use rustdds::{QosPolicies, QosPolicyBuilder, TopicKind};
+use rustdds::{GUID, QosPolicies, QosPolicyBuilder, TopicKind};
 use serde::Serialize;
 
 use super::matching::Matches;
@@ -29,6 +30,8 @@ use bench_dragon_ros2_messages::{HasStamp, MessageType, Time};
 
 /// The longest time for which a writer may refuse: a new subscriber takes milliseconds to acknowledge.
 const REFUSAL_PATIENCE: Duration = Duration::from_millis(500);
+/// The time in which RustDDS matches a new publisher with the subscribers that it knows.
+const MATCHING_TIME: Duration = Duration::from_millis(100);
 /// RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
 /// An upper bound of a message's bytes besides its handles.
@@ -47,6 +50,8 @@ pub(super) struct TopicWriter<Message: Serialize> {
     reported: bool,
     /// The message that RustDDS has refused.
     refused: Option<Refused<Message>>,
+    /// The time at which the publisher was replaced.
+    replaced: Option<Instant>,
     /// The held message of a transient-local topic.
     latched: Option<Latched<Message>>,
 }
@@ -63,9 +68,11 @@ struct Latched<Message> {
     /// True if the latest message has been written.
     is_written: bool,
     /// Messages that the publisher has written.
-    written: u64,
+    written: u32,
     /// True if there is a subscriber.
     has_reader: bool,
+    /// The subscribers from which older messages have been withheld.
+    known: BTreeSet<GUID>,
     /// True if the message never changes.
     is_constant: bool,
 }
@@ -132,6 +139,7 @@ impl<Message: Serialize> TopicWriter<Message> {
 
     /// Replaces the publisher by one without history.
     fn replace(&mut self, node: &mut Node) {
+        self.replaced = Some(Instant::now());
         match node.create_publisher(&self.dds, None) {
             Ok(publisher) => self.publisher = publisher,
             Err(error) => log::warn!("ROS 2 topic {}: late subscribers get old messages first: {error}", self.topic),
@@ -155,21 +163,32 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
     fn service(&mut self, matches: &Matches, node: &mut Node) {
         self.end_refusal(node);
         let Some(latched) = &mut self.latched else { return };
-        let readers = matches.readers(self.publisher.guid());
-        latched.has_reader = readers.any();
+        let writer = self.publisher.guid();
+        let subscribers = matches.subscribers(writer);
+        if subscribers.is_empty() && self.replaced.is_some_and(|replaced| replaced.elapsed() < MATCHING_TIME) {
+            return;
+        }
+        latched.has_reader = !subscribers.is_empty();
         if !latched.has_reader {
-            // RustDDS sends a volatile subscriber of Fast DDS all that it keeps, which for an event is out of date.
+            // What RustDDS keeps is out of date for the next subscriber.
             if latched.written > 0 && !latched.is_constant {
+                latched.known.clear();
                 self.replace(node);
             }
             return;
         }
-        if latched.is_written || readers.transient_local == 0 {
+        for (reader, is_transient_local) in &subscribers {
+            if latched.known.insert(*reader) {
+                matches.withhold(writer, *reader, latched.written.saturating_sub(u32::from(*is_transient_local)));
+            }
+        }
+        if latched.is_written || !subscribers.values().any(|is_transient_local| *is_transient_local) {
             return;
         }
         let Some(latest) = latched.latest.clone() else { return };
-        // A volatile subscriber would take the held message for a new one. From a new publisher it gets later ones only.
-        if readers.volatile > 0 {
+        // A volatile subscriber would take the held message for a new one: it is withheld as that of a new publisher.
+        if !subscribers.values().all(|is_transient_local| *is_transient_local) {
+            latched.known.clear();
             self.replace(node);
         }
         // A subscriber that matches this publisher later requests the message when it does.
@@ -177,7 +196,7 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
     }
 
     fn is_read(&self, matches: &Matches) -> bool {
-        matches.readers(self.publisher.guid()).any()
+        !matches.subscribers(self.publisher.guid()).is_empty()
     }
 }
 
@@ -243,9 +262,16 @@ impl WriterFactory<'_> {
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
         let is_constant = matches!(topic, Topic::Stage | Topic::Path);
-        let nothing = Latched { latest: None, is_written: false, written: 0, has_reader: false, is_constant };
+        let nothing = Latched {
+            latest: None,
+            is_written: false,
+            written: 0,
+            has_reader: false,
+            known: BTreeSet::new(),
+            is_constant,
+        };
         let latched = (qos.durability == Durability::TransientLocal).then_some(nothing);
-        Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, refused: None, latched }))
+        Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, refused: None, replaced: None, latched }))
     }
 }
 
