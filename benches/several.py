@@ -47,7 +47,7 @@ start_turn = 8
 [dragons.motion]
 head_speed = 1.0
 """
-COLUMNS = ("cpu", "memory", "p50", "p99", "max")
+COLUMNS = ("cpu", "memory", "step", "p50", "p99", "max")
 
 
 def one_show(count):
@@ -108,6 +108,7 @@ def round_of(count, rate, arguments):
     lateness = {name: [one["wakeup_ns"][name] / 1000 for one in summaries] for name in ("p50", "p99", "max")}
     return {
         "cpu": cpu[:-1], "memory": memory, **lateness, "reader": cpu[-1],
+        "step": [one["step_ns"]["p99"] / 1000 for one in summaries],
         "skipped": sum(one["skipped"] for one in summaries), "periods": sum(one["skipped"] + one["frames"] for one in summaries),
         "missed": now_lost - lost, "received": now_received - received,
     }
@@ -129,7 +130,7 @@ def main():
         with open(arguments.scene, "w", encoding="utf-8") as file:
             file.write(one_show(arguments.one_show))
     print(f"{os.cpu_count()} CPUs; load before: {' '.join(f'{one:.2f}' for one in os.getloadavg())}")
-    heads = ("CPU each, %", "memory, MB", "late p50, us", "late p99, us", "late max, us")
+    heads = ("CPU each, %", "memory, MB", "step p99, us", "late p50, us", "late p99, us", "late max, us")
     print(f"{'Hz':>5} {'dragons':>7}" + "".join(f"{one:>22}" for one in heads) + f"{'skipped':>22}{'missed by the reader':>22}{'reader CPU, %':>15}")
     for rate in arguments.rates:
         rounds = {count: [] for count in arguments.counts}

@@ -7,8 +7,9 @@
     .venv/bin/python benches/stage_picture.py long      # pictures a second of a scene of 5,000 benches, and of it as a show
     .venv/bin/python benches/stage_picture.py renderers # the same boards by canvas and by WebGL, in stage_picture_renderers.html
     .venv/bin/python benches/stage_picture.py looks     # processor time and rate of the page, #show and #seat, in turn
+    .venv/bin/python benches/stage_picture.py before    # processor time of #show beside the #show before the lanterns, in turn
     .venv/bin/python benches/stage_picture.py film '#seat' 400 412 frames   # 25 pictures a second of show time, as PNG
-    .venv/bin/python benches/stage_picture.py pictures  # makes the pictures of docs/driving-a-stage-picture.md
+    .venv/bin/python benches/stage_picture.py pictures [NAME...]   # makes the pictures of the documents, or those
 
 Uses the release build, or the debug build if there is no other. Needs Debian's Chromium and Playwright, which tests/run
 installs. Everything runs on this machine, in turn in one run: the ratios are more reliable than the times.
@@ -22,6 +23,7 @@ import signal
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 
 from playwright.sync_api import sync_playwright
@@ -42,20 +44,21 @@ def started(*arguments):
 
 
 @contextlib.contextmanager
-def server():
-    with started("view", "--json", "--port", "0") as child:
+def server(*arguments):
+    with started("view", "--json", "--port", "0", *arguments) as child:
         yield json.loads(child.stdout.readline())["url"], child.pid
 
 
 @contextlib.contextmanager
-def pages(url, count, address="", **viewport):
-    """Pages, each in a separate Chromium."""
+def pages(url, count, address="", script="", **viewport):
+    """Pages, each in a separate Chromium, in which `script` runs first."""
     with contextlib.ExitStack() as stack:
         playwright = stack.enter_context(sync_playwright())
         opened = []
         for _ in range(count):
             chromium = stack.enter_context(playwright.chromium.launch(executable_path="/usr/bin/chromium"))
             opened.append(chromium.new_page(viewport=viewport))
+            opened[-1].add_init_script(script)
             opened[-1].goto(url + address)
         yield opened
 
@@ -147,23 +150,60 @@ def renderers():
         print(f"{renderer:6} {rate:5.1f} pictures/s, {cost:5.1f} ms of processor a picture")
 
 
+TEAMS = [("223 benches", ["--start", "300"]), ("5,000 benches", ["--scene", str(ROOT / "config" / "long.toml")])]
+
+
+def used_by(url, address, arguments, size, script):
+    """Returns pictures a second of a page, and milliseconds of processor a picture."""
+    with started("run", "--quiet", "--json", *arguments), pages(url, 1, address, script, **size) as [page]:
+        page.wait_for_timeout(4000)
+        first, before = picture(page), chromium_cpu()
+        page.wait_for_timeout(5000)
+        last, after = picture(page), chromium_cpu()
+    drawn = max(1, last["drawn"] - first["drawn"])
+    return 1000 * drawn / (last["now"] - first["now"]), (after - before) / drawn
+
+
+def compared(looks, size, turns, *serving, script=""):
+    """Measures pages, by their addresses, in turn, so that other work of the machine affects all alike."""
+    for name, arguments in TEAMS:
+        found = {look: [] for look in looks}
+        for _ in range(turns):
+            for look, address in looks.items():
+                with server(*serving) as (url, _):
+                    found[look].append(used_by(url, address, arguments, size, script))
+        medians = {look: [statistics.median(figures) for figures in zip(*turns)] for look, turns in found.items()}
+        for look, (rate, used) in medians.items():
+            print(f"{name}, {size['width']} x {size['height']}: {look:18} {rate:5.1f} pictures/s, {used:6.1f} ms of processor a picture")
+        yield medians
+
+
 def looks():
-    """In turn, so that other work of the machine affects all alike."""
-    size = {"width": 1280, "height": 720}
-    for name, arguments in [("223 benches", ["--start", "300"]), ("5,000 benches", ["--scene", str(ROOT / "config" / "long.toml")])]:
-        found = {"page": ("", []), "#show": ("#show", []), "#seat": ("#seat", [])}
-        for _ in range(3):
-            for address, turns in found.values():
-                with server() as (url, _), started("run", "--quiet", "--json", *arguments), pages(url, 1, address, **size) as [page]:
-                    page.wait_for_timeout(4000)
-                    first, before = picture(page), chromium_cpu()
-                    page.wait_for_timeout(5000)
-                    last, after = picture(page), chromium_cpu()
-                    drawn = max(1, last["drawn"] - first["drawn"])
-                    turns.append((1000 * drawn / (last["now"] - first["now"]), (after - before) / drawn))
-        for look, (_, turns) in found.items():
-            rate, used = (statistics.median(figures) for figures in zip(*turns))
-            print(f"{name}, 1280 x 720: {look:5} {rate:5.1f} pictures/s, {used:6.1f} ms of processor a picture")
+    list(compared({"page": "", "#show": "#show", "#seat": "#seat"}, {"width": 1280, "height": 720}, 3))
+
+
+# The last commit whose #show has no lanterns, and what its page lacks: the names, and a stage with one dragon's sizes.
+BEFORE = "b45e230~1"
+VIEW = "crates/outputs/src/view"
+OLD_STAGE = ("handle(message) {", 'handle(message) {\n    if (message.type === "stage") message = { ...message, ...message.dragons[0], name: "" };')
+
+
+# Both draw as many pictures a second: what a page costs besides its pictures is then the same share of each.
+EQUAL = "{ const next = requestAnimationFrame; window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 80); }"
+
+
+def before():
+    """Serves the page of an earlier commit, as it was, beside the present one."""
+    git = lambda *arguments: subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    with tempfile.TemporaryDirectory() as folder:
+        for file in git("ls-tree", "--name-only", BEFORE, f"{VIEW}/").split():
+            if not file.endswith(".rs"):
+                text = git("show", f"{BEFORE}:{file}")
+                pathlib.Path(folder, pathlib.Path(file).name).write_text(text.replace(*OLD_STAGE), encoding="utf-8")
+        pathlib.Path(folder, "publishers.js").write_text(f"export const publishers = {json.dumps([NAME])};\n", encoding="utf-8")
+        pages = {"#show": "#show", "#show before": "pages/index.html#show"}
+        for medians in compared(pages, {"width": 1920, "height": 1080}, 5, "--pages", folder, script=EQUAL):
+            print(f"    ratio {medians['#show'][1] / medians['#show before'][1]:.2f}")
 
 
 def film():
@@ -210,7 +250,10 @@ def long():
 def pictures():
     wide, phone = {"width": 1120, "height": 630}, {"width": 390, "height": 844}
     seconds_before = "picture.time !== null && picture.time >= 412.47 - {}"
+    coil, square = (["--scene", str(ROOT / "config" / f"{name}.toml")] for name in ("coil", "square"))
     wanted = [
+        ("coil", "325", "#show", wide, "picture.time > 333.5", *coil),
+        ("square", "95", "#light,view=-0.5,-0.5,33", wide, "picture.time > 104", *square),
         ("dark", "405", "#dark", wide, seconds_before.format(4.2)),
         ("light", "405", "#light", wide, "document.body.dataset.level === 'contact' && picture.shown.time >= 412.47"),
         ("phone", "405", "#light", phone, seconds_before.format(4.2)),
@@ -220,8 +263,10 @@ def pictures():
         ("seat-head", "372", "#seat=0.05,12,4", wide, "picture.time > 376"),
         ("show-contact", "405", "#show", wide, seconds_before.format(1.6)),
     ]
-    for name, start, address, viewport, when in wanted:
-        with server() as (url, _), started("run", "--quiet", "--json", "--start", start), pages(url, 1, address, **viewport) as [page]:
+    for name, start, address, viewport, when, *scene in wanted:
+        if sys.argv[2:] and name not in sys.argv[2:]:
+            continue
+        with server() as (url, _), started(*scene, "run", "--quiet", "--json", "--start", start), pages(url, 1, address, **viewport) as [page]:
             deadline = time.monotonic() + 120
             while not page.evaluate(when):
                 assert time.monotonic() < deadline, f"{name}: not within two minutes"
@@ -232,4 +277,4 @@ def pictures():
 
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    {"cost": cost, "latency": latency, "long": long, "renderers": renderers, "looks": looks, "film": film, "pictures": pictures}[sys.argv[1]]()
+    {"cost": cost, "latency": latency, "long": long, "renderers": renderers, "looks": looks, "before": before, "film": film, "pictures": pictures}[sys.argv[1]]()

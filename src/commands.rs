@@ -289,21 +289,13 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 
-/// Refuses a scene with obstacles, whose clearance no proof knows.
-pub fn expect_empty_ground(scene: &Scene) -> Result<(), CommandError> {
-    if scene.ground().is_empty() {
-        return Ok(());
-    }
-    let sentence = "the scene has obstacles, whose clearance no proof knows yet: expected a scene without [stage]";
-    Err(CommandError::BadInput(sentence.to_owned()))
-}
-
-/// Refuses a scene of several dragons, whose motions no proof knows.
+/// Refuses a scene of several dragons, whose clearance no proof knows.
 pub fn expect_one_dragon(scene: &Scene) -> Result<(), CommandError> {
     if scene.ensemble.is_none() {
         return Ok(());
     }
-    let sentence = "the scene has several dragons, which no proof knows yet: expected a scene of one, with [team]";
+    let sentence =
+        "the scene has several dragons, whose clearance no proof knows yet: expected a scene of one, with [team]";
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 

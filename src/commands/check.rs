@@ -5,8 +5,8 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{
-    CertificateLine, CertifyError, ClearanceEnclosure, MOST_CLEARANCE_STEPS, certify_least_clearance,
-    enclose_least_clearance,
+    CertificateLine, CertifyError, ClearanceEnclosure, ClearanceEnclosures, ClearanceHints, MOST_CLEARANCE_STEPS,
+    ObstacleEnclosure, certify_least_clearance, enclose_least_clearance,
 };
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
@@ -27,8 +27,7 @@ use super::events::{bench_name, find_least_clearance, least_clearance, sentence}
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{
-    CommandError, Common, Output, expect_empty_ground, expect_exact_motion, expect_one_dragon, figure, number,
-    progress_bar, search_timeline,
+    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, number, progress_bar, search_timeline,
 };
 
 /// Arguments of `check`.
@@ -38,8 +37,8 @@ pub struct CheckArguments {
     /// print what it proves
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
-    /// Prove the least clearance of the show: enclose it within a nanometre, rounding included. Seconds to minutes;
-    /// with --json, print that alone
+    /// Prove the least clearance of the show and that of each obstacle: enclose them within a nanometre, rounding
+    /// included. Seconds to minutes; with --json, print that alone
     #[arg(long)]
     prove: bool,
     /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage
@@ -73,6 +72,19 @@ struct ClearanceLine {
     bench_b: Option<usize>,
 }
 
+/// A line of `check --prove --json` for an obstacle.
+#[derive(Serialize)]
+struct ProvedObstacleLine<'a> {
+    obstacle: &'a str,
+    least_clearance: f64,
+    least_clearance_lo: Option<f64>,
+    least_clearance_hi: Option<f64>,
+    least_clearance_status: &'static str,
+    proved_until: Option<f64>,
+    time: Option<f64>,
+    bench: Option<usize>,
+}
+
 /// Validates the scene and prints what it does.
 pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
@@ -80,7 +92,6 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if arguments.prove {
         expect_one_dragon(&scene)?;
         expect_exact_motion(&scene)?;
-        expect_empty_ground(&scene)?;
     }
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
@@ -91,8 +102,14 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     if arguments.prove && common.json {
         let (found, freeze) = find_least_clearance(&scene, &timeline, common);
-        let enclosure = enclosed(&scene, &text.text, (found, freeze), arguments.certify.as_deref(), common)?;
-        output.json(&clearance_line(&scene, found, enclosure))?;
+        let beside = obstacle_clearances(&scene, freeze, common);
+        let hints = (found, beside.as_slice(), freeze);
+        let ClearanceEnclosures { boards, obstacles } =
+            enclosed(&scene, &text.text, hints, arguments.certify.as_deref(), common)?;
+        output.json(&clearance_line(&scene, found, boards))?;
+        for found in &beside {
+            output.json(&obstacle_line(&scene, found, enclosure_of(&obstacles, found)))?;
+        }
         return output.finish();
     }
     if common.json {
@@ -180,12 +197,22 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     let (found, freeze) = find_least_clearance(&scene, &timeline, common);
     output.line(&format!("  {}", least_clearance(&scene, found)))?;
-    for least in obstacle_clearances(&scene, freeze, common) {
-        output.line(&format!("  {}", obstacle_sentence(&scene, &timeline, &least)))?;
+    let beside = obstacle_clearances(&scene, freeze, common);
+    let enclosures = match arguments.prove {
+        true => {
+            let hints = (found, beside.as_slice(), freeze);
+            Some(enclosed(&scene, &text.text, hints, arguments.certify.as_deref(), common)?)
+        }
+        false => None,
+    };
+    if let Some(ClearanceEnclosures { boards, .. }) = &enclosures {
+        output.line(&format!("  {}", proof_sentence(&scene, *boards)))?;
     }
-    if arguments.prove {
-        let enclosure = enclosed(&scene, &text.text, (found, freeze), arguments.certify.as_deref(), common)?;
-        output.line(&format!("  {}", proof_sentence(&scene, enclosure)))?;
+    for least in &beside {
+        output.line(&format!("  {}", obstacle_sentence(&scene, &timeline, least)))?;
+        if let Some(ClearanceEnclosures { obstacles, .. }) = &enclosures {
+            output.line(&format!("  {}", obstacle_proof(&scene, enclosure_of(obstacles, least))))?;
+        }
     }
     if let Some(covered) = covered {
         output.line(&format!("  {}", covered.sentence()))?;
@@ -319,35 +346,83 @@ impl CheckArguments {
     }
 }
 
-/// Encloses the least clearance between two numbers, if it can be proved. Writes the certificate to `file`.
+/// Encloses the least clearances between two numbers each, if they can be proved. Writes the certificate to `file`.
 fn enclosed(
     scene: &Scene,
     text: &str,
-    (found, freeze): (Option<TimedClearance>, &TimedEvent),
+    (found, obstacles, freeze): (Option<TimedClearance>, &[TimedObstacleClearance], &TimedEvent),
     file: Option<&Path>,
     common: &Common,
-) -> Result<Option<ClearanceEnclosure>, CommandError> {
+) -> Result<ClearanceEnclosures, CommandError> {
     expect_exact_motion(scene)?;
     let certificate = file.map(CertificateFile::create).transpose()?;
-    let Some(TimedClearance { least, .. }) = found else {
+    if found.is_none() && obstacles.is_empty() {
         let sentence = "no certificate is written: the search found no least clearance";
-        return if file.is_some() { Err(CommandError::Failed(sentence.to_owned())) } else { Ok(None) };
-    };
+        let nothing = ClearanceEnclosures { boards: None, obstacles: Vec::new() };
+        return if file.is_some() { Err(CommandError::Failed(sentence.to_owned())) } else { Ok(nothing) };
+    }
+    let least = found.map(|found| found.least);
+    let hints = ClearanceHints { boards: least.as_ref(), obstacles };
     let bar = progress_bar(1000, common).with_message("proving the least clearance");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let most_steps = MOST_CLEARANCE_STEPS;
     let Some(mut certificate) = certificate else {
-        let enclosure = enclose_least_clearance(&scene.motion, freeze, &least, most_steps, &mut progress);
+        let enclosures = enclose_least_clearance(&scene.motion, freeze, hints, most_steps, &mut progress);
         bar.finish_and_clear();
-        return Ok(enclosure);
+        return Ok(enclosures);
     };
     let mut write = |line: &CertificateLine| certificate.write(line);
     let motion = &scene.motion;
-    let enclosure = certify_least_clearance(motion, freeze, &least, text, most_steps, &mut write, &mut progress);
+    let enclosures = certify_least_clearance(motion, freeze, hints, text, most_steps, &mut write, &mut progress);
     bar.finish_and_clear();
-    let enclosure = enclosure.map_err(|CertifyError::Write(error)| error)?;
+    let enclosures = enclosures.map_err(|CertifyError::Write(error)| error)?;
     certificate.finish()?;
-    Ok(enclosure)
+    Ok(enclosures)
+}
+
+/// Returns the enclosure of the obstacle of a found clearance.
+fn enclosure_of(enclosures: &[Option<ObstacleEnclosure>], found: &TimedObstacleClearance) -> Option<ObstacleEnclosure> {
+    enclosures.get(found.obstacle).copied().flatten()
+}
+
+/// Returns a sentence for people on the proof of the least clearance of an obstacle.
+fn obstacle_proof(scene: &Scene, enclosure: Option<ObstacleEnclosure>) -> String {
+    let Some(ObstacleEnclosure { lo, hi, until, travelled, .. }) = enclosure else {
+        return "Nothing of it could be proved.".to_owned();
+    };
+    match until {
+        None => format!("Proved: it is between {lo} m and {hi} m."),
+        Some(until) => {
+            let [until, at] = [until, travelled].map(|travelled| scene.motion.time_at(travelled));
+            format!(
+                "Proved: up to t = {} s it is not less than {lo} m; at t = {at} s it is at most {hi} m. Not decided \
+                 beyond.",
+                until.next_down().max(0.0)
+            )
+        }
+    }
+}
+
+fn obstacle_line<'a>(
+    scene: &'a Scene,
+    found: &TimedObstacleClearance,
+    enclosure: Option<ObstacleEnclosure>,
+) -> ProvedObstacleLine<'a> {
+    let until = enclosure.and_then(|enclosure| enclosure.until);
+    ProvedObstacleLine {
+        obstacle: &scene.ground().obstacles()[found.obstacle].name,
+        least_clearance: found.least.value,
+        least_clearance_lo: enclosure.map(|enclosure| enclosure.lo),
+        least_clearance_hi: enclosure.map(|enclosure| enclosure.hi),
+        least_clearance_status: match enclosure {
+            Some(ObstacleEnclosure { until: None, .. }) => "proved",
+            Some(_) => "given_up",
+            None => "searched",
+        },
+        proved_until: until.map(|until| scene.motion.time_at(until).next_down().max(0.0)),
+        time: enclosure.map(|enclosure| scene.motion.time_at(enclosure.travelled)),
+        bench: enclosure.map(|enclosure| enclosure.bench),
+    }
 }
 
 /// Returns a sentence for people on the proof of the least clearance.

@@ -11,9 +11,7 @@ use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
-use super::{
-    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, progress_bar, search_timeline,
-};
+use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -54,15 +52,20 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
         Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),
         None => None,
     };
-    let proof = |kind: EventKind, obstacle: Option<usize>| {
+    let outcome_of = |kind: EventKind, obstacle: Option<usize>, dragons: &[usize]| {
         let outcomes = proved.as_ref()?.iter();
-        Some(&outcomes.into_iter().find(|outcome| (outcome.event, outcome.obstacle) == (kind, obstacle))?.status)
+        let is_it = |outcome: &&CertifiedEvent| {
+            (outcome.event, outcome.obstacle, outcome.dragons.as_slice()) == (kind, obstacle, dragons)
+        };
+        outcomes.into_iter().find(is_it)
     };
+    let proof = |kind, obstacle| Some(&outcome_of(kind, obstacle, &[])?.status);
     let number = |event: &Event| {
-        let named = scene.motion.obstacle_of(event)?;
-        scene.motion.ground().obstacles().iter().position(|obstacle| obstacle.name == named.name)
+        let named = scene.obstacle_of(event)?;
+        scene.ground().obstacles().iter().position(|obstacle| obstacle.name == named.name)
     };
-    let status = |event: &Event| proof(event.kind, number(event));
+    let outcome = |event: &Event| outcome_of(event.kind, number(event), &dragons_of(&scene, event));
+    let status = |event: &Event| Some(&outcome(event)?.status);
     let mut output = Output::standard();
     for timed in &timeline.all() {
         if common.json {
@@ -101,6 +104,14 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 }
             }
         }
+        if scene.ensemble.is_some() {
+            let all = timeline.all();
+            let told: Vec<_> = all.iter().filter_map(|timed| outcome(&timed.event)).collect();
+            for other in proved.iter().flatten().filter(|other| !told.contains(other)) {
+                output.line(&format!("Of {}:", subject(&scene, other)))?;
+                output.line(&proof_sentence(other.event, &other.status))?;
+            }
+        }
         for (number, obstacle) in scene.motion.ground().obstacles().iter().enumerate() {
             if let Some(status @ (Status::None { .. } | Status::Undecided { .. })) =
                 proof(EventKind::Obstacle, Some(number))
@@ -114,6 +125,26 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     output.finish()
 }
 
+/// Returns the dragons that an event of a show of several is about, in their order; an empty list for one dragon.
+fn dragons_of(scene: &Scene, event: &Event) -> Vec<usize> {
+    let Some(ensemble) = &scene.ensemble else { return Vec::new() };
+    let numbers = event.bench_a.into_iter().chain(event.bench_b);
+    let mut dragons: Vec<usize> = numbers.filter_map(|number| Some(ensemble.owner(number as usize)?.0)).collect();
+    dragons.sort_unstable();
+    dragons.dedup();
+    dragons
+}
+
+/// Returns what a result of a show of several dragons is about: the kind of event, and the names.
+fn subject(scene: &Scene, outcome: &CertifiedEvent) -> String {
+    let dragons = scene.ensemble.as_ref().map_or(&[][..], |ensemble| ensemble.dragons());
+    let names: Vec<&str> =
+        outcome.dragons.iter().filter_map(|dragon| Some(dragons.get(*dragon)?.name.as_str())).collect();
+    let obstacle = outcome.obstacle.and_then(|number| scene.ground().obstacles().get(number));
+    let at = obstacle.map_or(String::new(), |obstacle| format!(" and {}", obstacle_label(obstacle)));
+    format!("{}{at}, {}", names.join(" and "), outcome.event.name().replace('_', " "))
+}
+
 /// Writes the certificate of a scene's events, and returns what it proves.
 fn certified(
     scene: &Scene,
@@ -122,13 +153,15 @@ fn certified(
     file: &Path,
     common: &Common,
 ) -> Result<Vec<CertifiedEvent>, CommandError> {
-    expect_one_dragon(scene)?;
     expect_exact_motion(scene)?;
     let mut certificate = CertificateFile::create(file)?;
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| certificate.write(line);
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let outcomes = certify::certify(&scene.motion, timeline, text, MOST_STEPS, &mut write, &mut progress);
+    let outcomes = match &scene.ensemble {
+        Some(ensemble) => certify::certify_several(ensemble, text, MOST_STEPS, &mut write, &mut progress),
+        None => certify::certify(&scene.motion, timeline, text, MOST_STEPS, &mut write, &mut progress),
+    };
     bar.finish_and_clear();
     let outcomes = outcomes.map_err(|CertifyError::Write(error)| error)?;
     certificate.finish()?;

@@ -10,7 +10,7 @@ use bench_dragon::certify::plan::{
     least_pitch,
 };
 use bench_dragon::certify::speed::MOST_HANDLES;
-use bench_dragon::show::scene::{Accepted, Scene};
+use bench_dragon::show::scene::Accepted;
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
@@ -93,7 +93,6 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let scene = text.parse()?;
-    expect_no_obstacles(&scene)?;
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let found = if let Some(file) = file {
@@ -162,7 +161,6 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
     Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let scene = text.parse()?;
-    expect_no_obstacles(&scene)?;
     expect_exact_motion(&scene)?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
@@ -202,15 +200,6 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
         )
     })?;
     output.finish()
-}
-
-/// Refuses a scene with obstacles: a plan knows only the boards.
-fn expect_no_obstacles(scene: &Scene) -> Result<(), CommandError> {
-    if scene.motion.ground().is_empty() {
-        return Ok(());
-    }
-    let sentence = "`plan` knows no obstacles, but the scene has some: expected a scene without the table [stage]";
-    Err(CommandError::BadInput(sentence.to_owned()))
 }
 
 impl From<PlanError> for CommandError {

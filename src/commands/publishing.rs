@@ -51,23 +51,33 @@ pub fn publish(
     let announce = move |announcement: &Announcement| {
         print.iter().zip(announced(announcement, &stage)).for_each(|(print, line)| print(line));
     };
-    let mut manager = ServiceManager::of_this_process();
-    let is_managed = manager.is_some();
-    let Hooks { opened, mut sample, ended, .. } = hooks;
-    let sampled = move |of: &Sample| {
-        manager.iter_mut().for_each(ServiceManager::frame);
-        sample(of);
-    };
-    let stopped = move |counts| {
-        if is_managed {
-            service_manager::stopping();
-        }
-        ended(counts);
-    };
-    let hooks = Hooks { opened, announce: Box::new(announce), sample: Box::new(sampled), ended: Box::new(stopped) };
+    let hooks = managed(Hooks { announce: Box::new(announce), ..hooks });
     let published = publishing.run(&SystemClock, source, transports, doors, stop, hooks);
     lines.into_iter().for_each(Lines::finish);
     Ok(published?)
+}
+
+/// Returns `hooks` that also report to the service manager, if one has started this process.
+fn managed(hooks: Hooks) -> Hooks {
+    let Some(mut manager) = ServiceManager::of_this_process() else { return hooks };
+    let Hooks { opened, announce, mut sample, mut alive, ended } = hooks;
+    let mut is_ready = false;
+    let sampled = move |of: &Sample| {
+        if !is_ready {
+            is_ready = true;
+            service_manager::ready();
+        }
+        sample(of);
+    };
+    let living = move || {
+        manager.alive();
+        alive();
+    };
+    let stopped = move |counts| {
+        service_manager::stopping();
+        ended(counts);
+    };
+    Hooks { opened, announce, sample: Box::new(sampled), alive: Box::new(living), ended: Box::new(stopped) }
 }
 
 /// Returns the line of an alert, with the countdown in wall time, or of a cue.

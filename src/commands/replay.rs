@@ -115,6 +115,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         opened: Box::new(print_start),
         announce: Box::new(|_| ()),
         sample: Box::new(|_| ()),
+        alive: Box::new(|| ()),
         ended: Box::new(|_| ()),
     };
     let mut published = publish(common, &stage.stage, &publishing, &mut frames, (transports, doors), &stop, hooks)?;

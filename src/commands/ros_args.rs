@@ -5,6 +5,8 @@
 //! before the command line is parsed, and by the commands that publish over ROS 2.
 
 use std::ffi::OsString;
+use std::fs::File;
+use std::io::Read;
 
 use bench_dragon::ros2_messages::settings::{Ros2Settings, StampClock, Topic};
 
@@ -12,6 +14,8 @@ use super::CommandError;
 
 /// The start of these arguments.
 const BEGIN: &str = "--ros-args";
+/// The most bytes of a file of parameters.
+const MOST_BYTES: u64 = 1 << 16;
 /// The commands that understand these arguments.
 const COMMANDS: [&str; 2] = ["run", "replay"];
 
@@ -40,7 +44,9 @@ impl NodeNames {
 /// # Errors
 /// Bad input: an argument that is not understood, or a command that understands none.
 pub fn translated(arguments: impl IntoIterator<Item = OsString>) -> Result<(Vec<OsString>, NodeNames), CommandError> {
-    let (mut own, mut names) = (Vec::new(), NodeNames::default());
+    let (mut own, mut names): (Vec<OsString>, _) = (Vec::new(), NodeNames::default());
+    // Files of parameters, and the place of their options: a file speaks of nodes, whose names may follow it.
+    let (mut files, mut place) = (Vec::new(), 0);
     let mut arguments = arguments.into_iter();
     while let Some(argument) = arguments.next() {
         // What follows belongs to no option.
@@ -61,17 +67,101 @@ pub fn translated(arguments: impl IntoIterator<Item = OsString>) -> Result<(Vec<
             let flag = flag.to_string_lossy().into_owned();
             let value = match &*flag {
                 BEGIN => continue,
-                "-r" | "--remap" | "-p" | "--param" | "--log-level" => section.next(),
+                "-r" | "--remap" | "-p" | "--param" | "--log-level" | "--params-file" => section.next(),
                 _ => return Err(not_understood(&flag)),
             };
             let Some(value) = value.map(|value| value.to_string_lossy().into_owned()) else {
                 return Err(not_understood(&flag));
             };
-            own.extend(translate(&flag, &value, &mut names)?.map(OsString::from));
+            if flag == "--params-file" {
+                files.push(value);
+            } else {
+                own.extend(translate(&flag, &value, &mut names)?.map(OsString::from));
+            }
         }
+        place = own.len();
     }
     own.extend(arguments);
+    let node = format!("/{}", names.applied_to(&name_option(&own)));
+    for file in files {
+        for (line, parameter) in parameters(&file, &node)? {
+            let option = translate("-p", &parameter, &mut names).map_err(|_| {
+                let sentence =
+                    format!("{file}, line {line}: {parameter} is not understood, expected rate, scene or use_sim_time");
+                CommandError::BadInput(sentence)
+            })?;
+            if let Some(option) = option {
+                own.insert(place, OsString::from(option));
+                place += 1;
+            }
+        }
+    }
     Ok((own, names))
+}
+
+/// Returns the value of `--name`, or its default.
+fn name_option(own: &[OsString]) -> String {
+    let own: Vec<_> = own.iter().map(|argument| argument.to_string_lossy()).collect();
+    let joined = own.iter().find_map(|argument| argument.strip_prefix("--name="));
+    let next = || own.iter().zip(own.iter().skip(1)).find(|(option, _)| *option == "--name").map(|(_, name)| &**name);
+    joined.or_else(next).unwrap_or("bench_dragon").to_owned()
+}
+
+/// Returns the parameters of a node in a file as launch_ros writes it, each with its line, as `NAME:=VALUE`.
+///
+/// # Errors
+/// Bad input: no file, another form of YAML, no parameters of the node.
+fn parameters(file: &str, node: &str) -> Result<Vec<(usize, String)>, CommandError> {
+    let bad = |sentence: String| CommandError::BadInput(format!("{BEGIN} --params-file: {file}{sentence}"));
+    let text = read(file).map_err(|error| bad(format!(": {error}, expected a file of parameters (YAML)")))?;
+    let (mut is_own, mut depth, mut found) = (None, 0, Vec::new());
+    for (line, content) in text.lines().enumerate().map(|(at, content)| (at + 1, content.trim_end())) {
+        let entry = content.trim_start();
+        if entry.is_empty() || entry.starts_with('#') || content == "---" {
+            continue;
+        }
+        let indent = content.len() - entry.len();
+        let (key, value) = entry.split_once(':').unwrap_or(("", ""));
+        let (key, value) = (unquoted(key), unquoted(value.trim()));
+        depth = match (indent, depth, value) {
+            (0, _, "") if !key.is_empty() => {
+                let is_here = key == "/**" || format!("/{}", key.trim_start_matches('/')) == node;
+                is_own = Some(is_own.unwrap_or(false) || is_here);
+                if is_here { 1 } else { 3 }
+            }
+            (1.., 1, "") if key == "ros__parameters" => 2,
+            (1.., 2, value) if !key.is_empty() && !value.is_empty() => {
+                found.push((line, format!("{key}:={value}")));
+                2
+            }
+            // The parameters of another node.
+            (1.., 3, _) => 3,
+            _ => {
+                let sentence = "expected NODE, ros__parameters and NAME: VALUE, a line each";
+                return Err(bad(format!(", line {line}, {sentence}")));
+            }
+        };
+    }
+    if is_own == Some(true) { Ok(found) } else { Err(bad(format!(" has no parameters of {node}, and none of /**"))) }
+}
+
+/// Reads a regular file of [`MOST_BYTES`] at most.
+fn read(path: &str) -> std::io::Result<String> {
+    let mut text = String::new();
+    let file = File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(std::io::Error::other("this is no regular file"));
+    }
+    if file.take(MOST_BYTES + 1).read_to_string(&mut text)? as u64 > MOST_BYTES {
+        return Err(std::io::Error::other(format!("it has more than {MOST_BYTES} bytes")));
+    }
+    Ok(text)
+}
+
+/// Returns a scalar of YAML without its quotes.
+fn unquoted(text: &str) -> &str {
+    let inner = |quote| text.strip_prefix(quote)?.strip_suffix(quote);
+    inner('"').or_else(|| inner('\'')).unwrap_or(text)
 }
 
 /// Returns the program's own option for a flag and its value, or sets a name of the node.
@@ -107,7 +197,8 @@ fn translate(flag: &str, value: &str, names: &mut NodeNames) -> Result<Option<St
 fn not_understood(argument: &str) -> CommandError {
     CommandError::BadInput(format!(
         "{BEGIN}: {argument} is not understood, expected -r __ns:=/NAMESPACE, -r __node:=NAME, -p scene:=FILE, \
-         -p rate:=HZ, -p use_sim_time:=true or false, --log-level debug, info, warn, error or fatal, or -- at the end"
+         -p rate:=HZ, -p use_sim_time:=true or false, --params-file FILE, \
+         --log-level debug, info, warn, error or fatal, or -- at the end"
     ))
 }
 
@@ -177,6 +268,44 @@ mod tests {
         assert_eq!(of("p check -- --ros-args").unwrap().0, "p check -- --ros-args");
     }
 
+    /// A file as launch_ros 0.26 writes it.
+    #[test]
+    fn a_file_of_parameters_is_that_of_its_node() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("launch_params_1").display().to_string();
+        let of_file = |text: &str, arguments: &str| {
+            std::fs::write(&file, text).unwrap();
+            of(&arguments.replace("FILE", &file)).map(|(own, _)| own)
+        };
+        let launched = "p run --ros-args -r __node:=gold -r __ns:=/hall --params-file FILE -- --quiet";
+        let text = "/hall/gold:\n  ros__parameters:\n    rate: 20.0\n    scene: 'a: b.toml'\n    use_sim_time: false\n";
+        let own = "p run --rate=20.0 --scene=a: b.toml --use-sim-time=false --quiet";
+        assert_eq!(of_file(text, launched).unwrap(), own);
+        // The names may follow, comments and other nodes stand in the file, and a later parameter counts last.
+        let text =
+            "# Both.\n---\nother:\n  ros__parameters:\n    depth: {x: 1}\n/**:\n  ros__parameters:\n\n    rate: 30\n";
+        assert_eq!(of_file(text, "p run --ros-args --params-file FILE").unwrap(), "p run --rate=30");
+        let text = "b:\n  ros__parameters:\n    rate: 7\n";
+        assert_eq!(of_file(text, "p run --name b --ros-args --params-file FILE").unwrap(), "p run --name b --rate=7");
+        for (text, expected) in [
+            ("", "has no parameters of /hall/gold"),
+            ("other:\n  ros__parameters:\n    rate: 1\n", "has no parameters of /hall/gold"),
+            ("/**:\n  ros__parameters:\n    colour: red\n", "line 3: colour:=red is not understood"),
+            ("/**:\n  ros__parameters:\n    rate: [1,\n      2]\n", "line 4, expected NODE, ros__parameters"),
+            ("/**: {ros__parameters: {rate: 1}}\n", "line 1, expected NODE"),
+            ("  rate: 1\n", "line 1, expected NODE"),
+            ("/**:\n  rate: 1\n", "line 2, expected NODE"),
+            ("/**:\n  ros__parameters:\n    rate:\n", "line 3, expected NODE"),
+            ("rate\n", "line 1, expected NODE"),
+            (&"#".repeat(70_000), "more than 65536 bytes"),
+        ] {
+            let sentence = of_file(text, launched).unwrap_err();
+            assert!(sentence.contains(expected) && sentence.contains("launch_params_1"), "{expected}: {sentence}");
+        }
+        assert!(of("p run --ros-args --params-file /nowhere").unwrap_err().contains("/nowhere: No such file"));
+        assert!(of("p run --ros-args --params-file /dev/zero").unwrap_err().contains("no regular file"));
+    }
+
     #[test]
     fn what_is_not_understood_is_named_with_what_is() {
         for (text, named) in [
@@ -187,7 +316,6 @@ mod tests {
             ("-p speed:=2", "-p speed:=2"),
             ("-p use_sim_time:=maybe", "use_sim_time:=maybe"),
             ("-p rate", "-p rate"),
-            ("--params-file /tmp/file", "--params-file"),
             ("--log-level loud", "--log-level loud"),
             ("--log-level rcl:=debug", "rcl:=debug"),
             ("--enclave /x", "--enclave"),

@@ -166,6 +166,7 @@ impl RunSession<'_> {
             opened: Box::new(|transports| self.print_start(transports)),
             announce: Box::new(|_| ()),
             sample: Box::new(|sample| histograms.iter_mut().for_each(|log| log.record(sample))),
+            alive: Box::new(|| ()),
             ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
         };
         let ends = (transports, doors);

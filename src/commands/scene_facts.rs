@@ -3,60 +3,94 @@
 
 use std::time::{Duration, Instant};
 
-use bench_dragon::motion::solve::{Chain, Velocities};
-use bench_dragon::motion::timeline::TimedClearance;
+use bench_dragon::motion::timeline::{TimedEvent, Timeline};
 use bench_dragon::outputs::view::{ClearanceCurve, LeastOfShow, SceneFacts};
-use bench_dragon::show::scene::{AtEnd, Scene};
+use bench_dragon::show::scene::{AlertRules, AtEnd, Scene};
+use bench_dragon::show::{Playback, Show};
 
-/// Points of the curve at equal distances.
+/// Points of the curve at equal distances, and further ones on each side of the least clearance between two of these.
 const POINTS: u32 = 600;
-/// Points on each side of the least clearance, each at half the distance of the one before.
-const POINTS_AT_LEAST: u32 = 12;
+/// See [`POINTS`].
+const POINTS_AT_LEAST: u32 = 24;
 /// The time after which no curve is shown: a page does not wait for a team of a million benches.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Returns the facts about the scene with this text; `None` for a text that is no scene.
 pub fn scene_facts(text: &str) -> Option<SceneFacts> {
-    let scene = Scene::parse(text, "the scene of the show", "show").ok()?;
+    let mut scene = Scene::parse_any(text, "the scene of the show", "show").ok()?;
     let loop_stand = (scene.at_end == AtEnd::Loop).then_some(scene.end_hold);
+    // Frames have a clearance only with alerts, and a cue may let a show wait.
+    scene.alerts.get_or_insert(AlertRules { approach_time: 0.0, approach_clearance: 0.0 });
+    scene.cues.clear();
     Some(SceneFacts { loop_stand, clearance: clearance(&scene) })
 }
 
-/// Returns the clearance over the show. `None` for fewer than three benches, where a search gave up, or where it takes too
-/// long.
+/// Returns the clearance over the show: of boards, and of boards and obstacles. `None` for fewer than three benches on empty
+/// ground, where a search gave up, or where it takes too long.
 fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
-    let timeline = scene.motion.timeline(&mut |_| ());
-    let freeze = timeline.freeze(scene.stops_at_contact());
-    let TimedClearance { least, time, searched_until } =
-        scene.motion.least_clearance(&timeline, freeze, &mut |_| ())?;
-    if searched_until.is_some() {
-        return None;
-    }
-    let least = LeastOfShow { time, clearance: least.value, bench_a: least.bench_a, bench_b: least.bench_b };
-    let mut choice = scene.motion.solver(Velocities::Omitted);
-    let mut monitor = scene.motion.clearance_monitor(&choice);
-    let mut chain = Chain::new(scene.team().handles());
-    let mut points = vec![[least.time, least.clearance]];
-    let began = Instant::now();
-    for time in times(freeze.time, least.time) {
-        if began.elapsed() > PATIENCE {
-            return None;
-        }
-        choice.solver.solve(time, &mut chain).ok()?;
-        let nearest = monitor.least_clearance(&chain, scene.motion.travelled_at(time))?;
-        points.push([time, nearest.value]);
-    }
+    let timeline = scene.timeline(&mut |_| ());
+    let freeze = *timeline.freeze(scene.stops_at_contact());
+    let least = least(scene, &timeline, &freeze)?;
+    let patience = Instant::now() + PATIENCE;
+    let step = freeze.time / f64::from(POINTS);
+    let mut points = frames(scene, &timeline, 0.0, step, POINTS, patience)?;
+    let fine = step / f64::from(POINTS_AT_LEAST);
+    points.extend(frames(scene, &timeline, (least.time - step).max(0.0), fine, 2 * POINTS_AT_LEAST, patience)?);
+    points.push([least.time, least.clearance]);
     points.sort_by(|one, other| one[0].total_cmp(&other[0]));
     Some(ClearanceCurve { points, least })
 }
 
-/// Returns the times of the points: even ones up to the end of the show, and closer ones around the least clearance.
-fn times(end: f64, least: f64) -> impl Iterator<Item = f64> {
-    let step = end / f64::from(POINTS);
-    let even = (0..=POINTS).map(move |k| f64::from(k) * step).map(move |time| time.min(end));
-    let close = (0..POINTS_AT_LEAST).map(move |k| step / f64::from(1 << k));
-    let around = close.flat_map(move |away| [least - away, least + away]);
-    even.chain(around.filter(move |time| (0.0..=end).contains(time)))
+/// Returns the least clearance of the show; `None` if a search gave up.
+fn least(scene: &Scene, timeline: &Timeline, freeze: &TimedEvent) -> Option<LeastOfShow> {
+    let mut silent = |_| ();
+    let (boards, obstacles) = match &scene.ensemble {
+        Some(all) => (all.least_clearance(freeze, &mut silent), all.obstacle_clearances(freeze, &mut silent)),
+        None => {
+            let motion = &scene.motion;
+            let boards = motion.least_clearance(timeline, freeze, &mut silent);
+            (boards, motion.obstacle_clearances(freeze, &mut silent))
+        }
+    };
+    let is_whole = boards.is_none_or(|found| found.searched_until.is_none())
+        && obstacles.iter().all(|found| found.searched_until.is_none());
+    let of_boards = boards.map(|found| LeastOfShow {
+        time: found.time,
+        clearance: found.least.value,
+        bench_a: found.least.bench_a,
+        bench_b: found.least.bench_b,
+    });
+    let of_obstacles = obstacles.iter().map(|found| LeastOfShow {
+        time: found.time,
+        clearance: found.least.value,
+        bench_a: found.least.bench,
+        // Obstacles follow the handles.
+        bench_b: (scene.handles() + found.obstacle) as u32,
+    });
+    let all = of_boards.into_iter().chain(of_obstacles).filter(|_| is_whole);
+    all.min_by(|one, other| one.clearance.total_cmp(&other.clearance))
+}
+
+/// Returns the times and the clearances of `count` + 1 frames of the show, `step` simulated seconds apart.
+fn frames(
+    scene: &Scene,
+    timeline: &Timeline,
+    start: f64,
+    step: f64,
+    count: u32,
+    patience: Instant,
+) -> Option<Vec<[f64; 2]>> {
+    let playback = Playback { start, rate: 1.0 / step, at_end: AtEnd::Hold, ..Playback::of(scene) };
+    let mut show = Show::new(scene, timeline.clone(), playback).ok()?;
+    let mut points = Vec::with_capacity(count as usize + 1);
+    for tick in 0..=u64::from(count) {
+        let frame = show.frame(tick);
+        points.push([frame.sim_time, frame.min_clearance]);
+        if Instant::now() > patience {
+            return None;
+        }
+    }
+    Some(points)
 }
 
 #[cfg(test)]
@@ -76,6 +110,26 @@ mod tests {
         // Boards 0.3 m wide on turns 0.55 m apart, less what straight boards take of a bend.
         assert!(points.iter().all(|&[_, metres]| (-1e-9..0.25).contains(&metres)));
         assert!(points[0][1] > 0.15, "far from a contact at the start: {:?}", points[0]);
+    }
+
+    #[test]
+    fn the_curve_of_two_dragons_ends_at_their_contact() {
+        let facts = scene_facts(include_str!("../../config/coil.toml")).unwrap();
+        let ClearanceCurve { points, least } = facts.clearance.unwrap();
+        assert!((least.time - 335.726813723).abs() < 1e-8 && least.clearance.abs() < 1e-9, "{least:?}");
+        // The head of jade has the number 61.
+        assert_eq!((least.bench_a, least.bench_b), (0, 61));
+        assert!(points.iter().all(|&[_, metres]| (-1e-9..1.2).contains(&metres)));
+    }
+
+    #[test]
+    fn the_curve_of_the_square_has_its_obstacles() {
+        let facts = scene_facts(include_str!("../../config/square.toml")).unwrap();
+        let ClearanceCurve { points, least } = facts.clearance.unwrap();
+        // The northern spectators are the fourth obstacle; 21 handles come before.
+        assert_eq!((least.bench_a, least.bench_b), (0, 24), "{least:?}");
+        assert!((0.0..0.2).contains(&least.clearance), "it just fits: {least:?}");
+        assert!(points.iter().all(|&[_, metres]| metres > least.clearance - 1e-12));
     }
 
     #[test]

@@ -4,11 +4,10 @@
 mod ros2;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::atomic::Ordering;
 
-use bench_dragon::client::feed::{Delivery, FeedEvent};
-use bench_dragon::client::polling::{Handler, poll_until};
+use bench_dragon::client::feed::Delivery;
+use bench_dragon::client::polling::poll_until;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::outputs::send::network::{NetworkError, Outlet, Route, destination};
 use bench_dragon::outputs::send::osc::Addresses;
@@ -47,7 +46,7 @@ struct PsnArguments {
     /// The address of this machine's interface to send by; without it, the machine's routes decide
     #[arg(long, value_name = "IP")]
     interface: Option<Ipv4Addr>,
-    /// Which handles of each publisher, counted from 1: all, head, tail, 1,2,9 or head,20-40
+    /// Which handles of each dragon, counted from 1: all, head, tail, 1,2,9 or head,20-40
     #[arg(long, value_name = "WHICH", default_value = "all")]
     trackers: Selection,
     /// The stage's axes for the desk's x, y and z: x, y (into the depth) and up, in any order, with a minus to reverse
@@ -60,10 +59,10 @@ struct PsnArguments {
     /// Frames per second at most, up to 250; a slower publisher sets its own
     #[arg(long, value_name = "HZ", default_value_t = USUAL_RATE, value_parser = rate::<250>)]
     rate: f64,
-    /// The tracker number of the head, of the first publisher if there are several
+    /// The tracker number of the head, of the first dragon if there are several
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     first_id: u16,
-    /// Distance between the tracker numbers of several publishers' heads
+    /// Distance between the tracker numbers of the heads of several publishers, or of several dragons of one
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u16).range(1..))]
     id_step: u16,
     /// The name under which desks list this sender; without it, the publisher's, or bench-dragon for several
@@ -166,7 +165,7 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
         }
     };
     let mut sender = PsnSender::new(options, outlet, &mut notify);
-    poll_one_dragon(&stop, names, &mut sender)?;
+    poll_until(&stop, names, Delivery::Newest, &mut sender)?;
     let summary = sender.finish();
     printed?;
     let mut output = Output::standard();
@@ -185,7 +184,7 @@ fn psn(common: &Common, arguments: &PsnArguments) -> Result<(), CommandError> {
 fn numbers(names: &[String], arguments: &PsnArguments) -> Result<Vec<Numbers>, CommandError> {
     let PsnArguments { first_id, id_step, .. } = *arguments;
     if names.len() == 1 {
-        return Ok(vec![Numbers::from(first_id)]);
+        return Ok(vec![Numbers::from(first_id, id_step)]);
     }
     Numbers::of_several(names, first_id, id_step).ok_or_else(|| {
         CommandError::BadInput(format!(
@@ -224,7 +223,7 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
             number(*rate)
         )
     })?;
-    poll_one_dragon(&stop, &common.names, &mut senders)?;
+    poll_until(&stop, &common.names, Delivery::Newest, &mut senders)?;
     let summary = senders.finish();
     let mut output = Output::standard();
     if common.json {
@@ -236,57 +235,6 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
         ))?;
     }
     output.finish()
-}
-
-/// A handler of shows of one dragon. At the first show of several it stops.
-struct OneDragon<'a, H> {
-    handler: &'a mut H,
-    stop: &'a AtomicBool,
-    names: &'a [String],
-    /// By publisher: true if its show is known to have one dragon. Other events wait for that.
-    known: Vec<bool>,
-    /// The reason to stop.
-    refused: Option<String>,
-}
-
-impl<H: Handler> Handler for OneDragon<'_, H> {
-    fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
-        let Some(known) = self.known.get_mut(publisher) else { return };
-        match &event {
-            FeedEvent::Stage { stage, .. } => *known = stage.dragons.len() <= 1,
-            FeedEvent::Gone => *known = false,
-            _ => {}
-        }
-        if let FeedEvent::Stage { stage, .. } = &event
-            && !*known
-        {
-            let name = self.names.get(publisher).map_or("", String::as_str);
-            let dragons = stage.dragons.len();
-            self.refused = Some(format!("\"{name}\" has {dragons} dragons, which this command does not know"));
-            self.stop.store(true, Ordering::Relaxed);
-        }
-        if self.refused.is_none() && (*known || !matches!(event, FeedEvent::Frame { .. })) {
-            self.handler.handle(publisher, event);
-        }
-    }
-
-    fn clock(&mut self, publisher: usize, shares_clock: bool) {
-        self.handler.clock(publisher, shares_clock);
-    }
-
-    fn polled(&mut self, now: Instant) {
-        self.handler.polled(now);
-    }
-}
-
-/// Polls shows of one dragon.
-///
-/// # Errors
-/// As [`poll_until`]; and a show of several dragons.
-fn poll_one_dragon(stop: &AtomicBool, names: &[String], handler: &mut impl Handler) -> Result<(), CommandError> {
-    let mut one = OneDragon { handler, stop, names, known: vec![false; names.len()], refused: None };
-    poll_until(stop, names, Delivery::Newest, &mut one)?;
-    one.refused.map_or(Ok(()), |sentence| Err(CommandError::Failed(sentence)))
 }
 
 fn notice_line(name: &str, notice: &Notice) -> String {

@@ -1,8 +1,8 @@
 //! Messages to the service manager that started this program (systemd, `Type=notify`): ready with the first frame, alive
-//! while the loop publishes, stopping. Without `NOTIFY_SOCKET` in the environment nothing is sent.
+//! while the loop turns, stopping. Without `NOTIFY_SOCKET` in the environment nothing is sent.
 //!
-//! Called on the statistics thread, which gets a sample of every frame: the loop's thread does no system call for it, and a
-//! loop that hangs sends no sample.
+//! Called on the statistics thread, which sees the loop turn: the loop's thread does no system call for it. The loop turns
+//! about ten times a second, also between the frames of a slow scene and while a show is paused or held.
 
 use std::time::{Duration, Instant};
 
@@ -12,8 +12,7 @@ use sd_notify::NotifyState;
 pub struct ServiceManager {
     /// Half the time after which the manager takes a silent program for dead, if it watches.
     interval: Option<Duration>,
-    is_ready: bool,
-    last_sign: Instant,
+    last_sign: Option<Instant>,
 }
 
 impl ServiceManager {
@@ -21,20 +20,22 @@ impl ServiceManager {
     pub fn of_this_process() -> Option<Self> {
         std::env::var_os("NOTIFY_SOCKET")?;
         let interval = sd_notify::watchdog_enabled().map(|timeout| timeout / 2);
-        Some(Self { interval, is_ready: false, last_sign: Instant::now() })
+        Some(Self { interval, last_sign: None })
     }
 
-    /// Reports that the loop has published a frame.
-    pub fn frame(&mut self) {
-        if !self.is_ready {
-            self.is_ready = true;
-            self.last_sign = Instant::now();
-            send(&[NotifyState::Ready, NotifyState::Watchdog]);
-        } else if self.interval.is_some_and(|interval| self.last_sign.elapsed() >= interval) {
-            self.last_sign = Instant::now();
+    /// Reports that the loop lives, if the manager waits for a sign.
+    pub fn alive(&mut self) {
+        let Some(interval) = self.interval else { return };
+        if self.last_sign.is_none_or(|sign| sign.elapsed() >= interval) {
+            self.last_sign = Some(Instant::now());
             send(&[NotifyState::Watchdog]);
         }
     }
+}
+
+/// Reports that the first frame is published.
+pub fn ready() {
+    send(&[NotifyState::Ready]);
 }
 
 /// Reports that the loop has ended and the program shuts down.

@@ -93,6 +93,7 @@ pub fn watch(common: &Common, arguments: &WatchArguments) -> Result<(), CommandE
         name: common.name(),
         time_scale: 1.0,
         stage: Box::default(),
+        unnamed: None,
         drawn: Vec::new(),
         answer: None,
     };
@@ -147,6 +148,8 @@ struct Screen<'a> {
     time_scale: f64,
     /// The names; empty before the stage has come.
     stage: Box<Stage>,
+    /// The latest alert that came before the stage of its run.
+    unnamed: Option<CollisionAlert>,
     /// The lines of the last report on the terminal, which the next report replaces.
     drawn: Vec<String>,
     /// The playback state after the last key: the last line of the report.
@@ -220,9 +223,17 @@ impl Screen<'_> {
             FeedEvent::Started { run_id } => format!("A publisher of \"{name}\" is running (run {run_id:016x})."),
             FeedEvent::Gone => format!("The publisher of \"{name}\" has ended; waiting for the next."),
             FeedEvent::Silent => format!("The publisher of \"{name}\" is running but sends nothing."),
+            FeedEvent::Alert(alert) if alert.run_id != self.stage.run_id => {
+                self.unnamed = Some(**alert);
+                return Ok(());
+            }
             FeedEvent::Alert(alert) => self.alert_line(alert),
+            FeedEvent::Stage { stage, .. } => match self.unnamed.take().filter(|alert| alert.run_id == stage.run_id) {
+                Some(alert) => self.alert_line(&alert),
+                None => return Ok(()),
+            },
             FeedEvent::Cue(cue) => format!("{:>10.3} s  {}", cue.sim_time, cue_sentence(cue)),
-            FeedEvent::Frame { .. } | FeedEvent::Stage { .. } | FeedEvent::Scene { .. } => return Ok(()),
+            FeedEvent::Frame { .. } | FeedEvent::Scene { .. } => return Ok(()),
             FeedEvent::Status(_) | FeedEvent::Chase(_) => return Ok(()),
         };
         if self.display == Display::Terminal && matches!(event, FeedEvent::Started { .. } | FeedEvent::Gone) {

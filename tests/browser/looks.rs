@@ -1,6 +1,7 @@
 //! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show look.
 //!
-//! The tests are in `tests/python/stage_transport.py`, `stage_show.py`, `stage_seat.py` and `stage_dragons.py`. No test asserts a speed.
+//! The tests are in `tests/python/stage_transport.py`, `stage_show.py`, `stage_seat.py`,
+//! `stage_dragons.py` and `stage_ground.py`. No test asserts a speed.
 
 use crate::harness::{can_run, python_modules};
 use crate::view::run_scenario;
@@ -41,6 +42,11 @@ fn seat_shows_the_dragon() {
 }
 
 #[test]
+fn slow_computer_shows_stills() {
+    run_scenario("tests/python/stage_seat.py", "slow_computer_shows_stills");
+}
+
+#[test]
 fn cameras_are_kept() {
     run_scenario("tests/python/stage_seat.py", "cameras_are_kept");
 }
@@ -65,4 +71,14 @@ fn labels_of_two_dragons_point_at_their_boards() {
 #[test]
 fn each_dragon_has_its_light() {
     of_several("each_has_its_light");
+}
+
+#[test]
+fn obstacles_are_drawn() {
+    run_scenario("tests/python/stage_ground.py", "obstacles_are_drawn");
+}
+
+#[test]
+fn a_board_meets_an_obstacle() {
+    run_scenario("tests/python/stage_ground.py", "a_board_meets_an_obstacle");
 }

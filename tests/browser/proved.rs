@@ -86,7 +86,12 @@ fn what_is_no_certificate_is_refused_with_a_sentence() {
         json!({"type": "certificate", "format": format, "version": "0.1.0", "scene": scene}).to_string() + "\n"
     };
     let text_of_scene = include_str!("../../config/school.toml");
+    let at_scene = scene.to_str().unwrap().to_owned();
+    let of_speed = folder.path().join("speed.jsonl");
+    let plan = ["plan", "speed", "--max-handle-speed", "20", "--certify", of_speed.to_str().unwrap()];
+    done(&[&["--scene", &at_scene], &plan[..]].concat());
     let refused = [
+        (of_speed, "it is a certificate of another question, expected one of events (events --certify)"),
         (folder.path().join("nowhere"), "No such file or directory"),
         (folder.path().to_owned(), "Is a directory"),
         (scene, "expected a certificate as events --certify writes it"),

@@ -48,6 +48,41 @@ fn program(arguments: &[&str]) -> (String, String, Option<i32>) {
     (text(output.stdout), text(output.stderr), output.status.code())
 }
 
+/// The events of each of several dragons and the contact of two are proved, verified, and named by their dragons.
+#[test]
+fn the_program_proves_the_contact_of_two_dragons() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("proof.jsonl");
+    let dragon = |name: &str, origin: &str, delay: f64| {
+        format!(
+            "[[dragons]]\nname = \"{name}\"\nplacement = {{ {origin} }}\ndelay = {delay:?}\n[dragons.team]\n\
+             benches = 3\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n[dragons.path]\n\
+             kind = \"pieces\"\npieces = [{{ kind = \"line\", length = 50.0 }}]\n[dragons.motion]\nhead_speed = 1.0\n"
+        )
+    };
+    let text = dragon("gold", "origin = [-20.0, 0.0]", 0.0)
+        + &dragon("jade", "origin = [20.0, 0.2], rotation_turns = 0.5", 4.0);
+    let scene = folder.path().join("two.toml");
+    std::fs::write(&scene, &text).unwrap();
+    let (file, scene) = (file.to_str().unwrap(), scene.to_str().unwrap());
+    let (lines, errors, code) = program(&["--scene", scene, "--json", "events", "--certify", file]);
+    assert_eq!((errors.as_str(), code), ("", Some(0)));
+    let contact: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+    // Gold is 4 s under way when jade begins; the fronts of their boards are 0.275 m ahead.
+    let truth = 4.0 + (40.0 - 4.0 - 0.55) / 2.0;
+    let [lo, hi] = ["time_lo", "time_hi"].map(|key| contact[key].as_f64().unwrap());
+    assert!(contact["event"] == "contact" && lo <= truth && truth <= hi && hi - lo < 1e-9, "{contact}");
+    let (said, _, code) = program(&["verify", file]);
+    assert!(code == Some(0) && said.contains("gold and jade, contact: proved between 21.72499"), "{said}");
+    assert!(said.contains("jade, path end: proved between 5"), "{said}");
+    let (said, _, code) = program(&["--scene", scene, "events", "--certify", file]);
+    assert!(code == Some(0) && said.contains("Of gold, contact:\n           Proved."), "{said}");
+    let (_, said, code) = program(&["view", "--port", "0", "--certificate", file]);
+    assert!(code == Some(2) && said.contains("certificate of several dragons"), "{said}");
+    let (_, said, code) = program(&["--scene", scene, "check", "--prove"]);
+    assert!(code == Some(2) && said.contains("several dragons, whose clearance no proof knows"), "{said}");
+}
+
 /// A certificate is made, checked, refused after a change of one digit, and printed for its own scene only.
 #[test]
 fn the_program_makes_and_checks_certificates() {

@@ -1,7 +1,6 @@
 //! `[stage]`: first touches and least clearances against shapely, and a sentence for each wrong table.
 
 use std::io::Write;
-use std::path::Path;
 use std::process::{Command, Output};
 
 use tempfile::NamedTempFile;
@@ -137,15 +136,27 @@ fn a_wrong_stage_is_refused_in_one_sentence() {
 }
 
 #[test]
-fn what_no_proof_knows_is_refused() {
+fn the_least_clearance_of_an_obstacle_is_proved_and_verified() {
     let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    let text = std::fs::read_to_string(&scene).unwrap().replace("start_turn = 16", "start_turn = 5");
+    let text = text.replace("benches = 223", "benches = 5");
+    std::fs::write(&scene, text).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("certificate");
     let file = file.to_str().unwrap();
-    for arguments in [vec!["check", "--prove"], vec!["check", "--prove", "--certify", file]] {
-        assert!(refusal(&scene, &arguments).contains("no proof knows yet"), "{arguments:?}");
-    }
-    assert!(!Path::new(file).exists());
+    let printed = run(&scene, &["check", "--prove", "--certify", file, "--json"]);
+    assert!(printed.status.success(), "{printed:?}");
+    let lines = String::from_utf8(printed.stdout).unwrap();
+    let line: serde_json::Value = serde_json::from_str(lines.lines().nth(1).unwrap()).unwrap();
+    let number = |field: &str| line[field].as_f64().unwrap();
+    let (lo, hi) = (number("least_clearance_lo"), number("least_clearance_hi"));
+    assert!(line["obstacle"] == "lamp" && line["least_clearance_status"] == "proved", "{lines}");
+    assert!(hi - lo <= 1e-9 && lo <= number("least_clearance") && number("least_clearance") <= hi + 1e-12, "{lines}");
+    let mut verify = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let verified = verify.args(["verify", file]).output().unwrap();
+    assert!(verified.status.success(), "{verified:?}");
+    let text = String::from_utf8(verified.stdout).unwrap();
+    assert!(text.contains("least clearance of obstacle 1"), "{text}");
 }
 
 #[test]
@@ -163,12 +174,16 @@ fn the_first_touch_of_an_obstacle_is_proved_and_verified() {
     assert!(text.contains("obstacle"), "{text}");
 }
 
+/// A plan is about boards alone: obstacles do not change it.
 #[test]
-fn plans_refuse_obstacles_in_one_sentence() {
-    let scene = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
-    for arguments in [["plan", "pitch", "--reach-radius=4.5"], ["plan", "speed", "--max-handle-speed=2"]] {
-        assert!(refusal(&scene, &arguments).contains("`plan` knows no obstacles"), "{arguments:?}");
-    }
+fn plans_are_those_without_obstacles() {
+    let staged = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
+    let mut plain = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let arguments = ["plan", "pitch", "--reach-radius=4.5", "--json"];
+    let plain = plain.args(arguments).output().unwrap();
+    let planned = run(&staged, &arguments);
+    assert!(planned.status.success() && planned.stdout == plain.stdout, "{planned:?} {plain:?}");
+    assert!(run(&staged, &["plan", "speed", "--max-handle-speed=2"]).status.success());
 }
 
 #[test]
@@ -213,7 +228,7 @@ fn a_team_that_starts_on_an_obstacle_or_outside_the_boundary_meets_it_at_once_wi
 #[test]
 fn a_picture_has_every_obstacle_at_its_place_with_its_keep_out() {
     let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
-    let output = program.args(["--scene", "config/square.toml", "draw", "--at", "46"]).output().unwrap();
+    let output = program.args(["--scene", "tests/compute/ground.toml", "draw", "--at", "46"]).output().unwrap();
     let svg = text(&output.stdout);
     let picture = roxmltree::Document::parse(&svg).unwrap();
     let group = |id: &str| picture.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
@@ -231,6 +246,12 @@ fn a_picture_has_every_obstacle_at_its_place_with_its_keep_out() {
     assert_eq!(outline("boundary"), "M-30 -20L30 -20L30 25L-30 25Z");
     let wide: Vec<_> = group("keep-outs").children().filter_map(|node| node.attribute("stroke-width")).collect();
     assert_eq!(wide, ["3", "3", "2", "2"]);
+    // Dashes around each side of a keep-out: 1 circle, 2 + 1 sides of the spectators, 5 of the house, 4 of the boundary.
+    let rims = group("keep-out-rims");
+    assert!(rims.attribute("stroke-dasharray").is_some());
+    assert_eq!(rims.children().filter(roxmltree::Node::is_element).count(), 13);
+    let of_lamp = rims.children().find(roxmltree::Node::is_element).unwrap().attribute("d").unwrap();
+    assert_eq!(of_lamp, "M3.1 3.5A0.9 0.9 0 0 1 4.9 3.5A0.9 0.9 0 0 1 3.1 3.5Z");
     assert!(picture.descendants().any(|node| node.attribute("id") == Some("obstacle-names")));
     let without = Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["draw", "--at", "46"]).output().unwrap();
     assert!(!text(&without.stdout).contains("ground\""), "a scene without obstacles has no ground");

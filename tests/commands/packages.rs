@@ -94,9 +94,16 @@ fn the_debian_package_lists_files_that_exist() {
 #[test]
 fn versions_are_one_and_the_program_prints_them() {
     let version = env!("CARGO_PKG_VERSION");
-    assert!(read("packaging/debian/changelog").starts_with(&format!("bench-dragon ({version}-1) ")));
+    let manifest: toml::Value = toml::from_str(&read("Cargo.toml")).unwrap();
+    let maintainer = manifest["package"]["metadata"]["deb"]["maintainer"].as_str().unwrap();
+    let (name, address) = maintainer.strip_suffix('>').unwrap().split_once(" <").unwrap();
+    let changelog = read("packaging/debian/changelog");
+    assert!(changelog.starts_with(&format!("bench-dragon ({version}-1) ")));
+    assert!(changelog.contains(&format!("\n -- {maintainer}  ")));
     for file in ["packaging/ros2/bench_dragon/package.xml", "msgs/package.xml"] {
         assert!(read(file).contains(&format!("<version>{version}</version>")), "{file}");
+        let maintainer = format!("<maintainer email=\"{address}\">{name}</maintainer>");
+        assert!(read(file).contains(&maintainer), "{file} has another maintainer");
     }
     let lock: toml::Value = toml::from_str(&read("Cargo.lock")).unwrap();
     let iceoryx2 = lock["package"].as_array().unwrap().iter().find(|it| it["name"].as_str() == Some("iceoryx2"));
@@ -119,6 +126,12 @@ fn versions_are_one_and_the_program_prints_them() {
     assert_eq!(lines[..2], [format!("bench-dragon {version}"), format!("iceoryx2 {iceoryx2}")]);
     let layouts = lines[2].strip_prefix("layouts ").unwrap().split(", ").map(str::to_owned);
     assert_eq!(layouts.collect::<BTreeSet<_>>(), expected);
+    let changes = read("CHANGELOG.md");
+    let changes = changes.lines().filter_map(|line| line.strip_prefix("### ")).flat_map(|line| line.split(", "));
+    let changes = BTreeSet::from_iter(changes);
+    for layout in expected.iter().filter(|layout| !layout.ends_with("/1")) {
+        assert!(changes.contains(layout.as_str()), "CHANGELOG.md has no section for {layout}");
+    }
 }
 
 /// ROS 2 is not on this machine: the launch file is compiled, and its names are looked up.
@@ -147,14 +160,25 @@ fn the_ros_2_package_installs_what_its_launch_file_names() {
     assert_eq!(mode & 0o111, 0o111, "publisher is not executable");
 }
 
-#[test]
-fn packages_install_on_a_clean_debian() {
-    if std::env::var_os("BENCH_DRAGON_LONG").is_none() || !can_run(root("install Debian into a folder")) {
-        return;
-    }
+/// Runs a script of `tests/packages` with a new folder, which needs minutes and the tools of `packaging/build`.
+fn run_in_the_long_run(script: &str, arguments: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
-    let mut script = Command::new("tests/packages/debian.sh");
-    script.current_dir(ROOT).arg(folder.path().join("debian"));
+    let mut script = Command::new(script);
+    script.current_dir(ROOT).arg(folder.path().join("made")).args(arguments);
     let output = Process::start(&mut script).output_within(3600);
     assert!(output.status.success(), "{}\n{}", text(&output.stdout), text(&output.stderr));
+}
+
+#[test]
+fn two_checkouts_give_the_same_sources_and_sbom() {
+    if std::env::var_os("BENCH_DRAGON_LONG").is_some() {
+        run_in_the_long_run("tests/packages/alike.sh", &["sbom", "ros2"]);
+    }
+}
+
+#[test]
+fn packages_install_on_a_clean_debian() {
+    if std::env::var_os("BENCH_DRAGON_LONG").is_some() && can_run(root("install Debian into a folder")) {
+        run_in_the_long_run("tests/packages/debian.sh", &[]);
+    }
 }

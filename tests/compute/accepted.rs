@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
-use bench_dragon::certify::{CertificateLine, certify, certify_least_clearance};
+use bench_dragon::certify::{CertificateLine, ClearanceHints, certify, certify_least_clearance};
 use bench_dragon::proof::{Proved, Status, Until, verify};
 use bench_dragon::show::scene::Scene;
 use fastrand::Rng;
@@ -75,11 +75,13 @@ fn tight_route(random: &mut Rng) -> String {
 
 /// Returns a scene of one of all families.
 fn scene(index: usize, random: &mut Rng) -> String {
-    if index.is_multiple_of(8) {
-        let family = random.usize(..scenes::FAMILIES.len());
-        return scenes::random_scene(family, &mut scenes::Random(random.u64(..)));
+    let last = scenes::FAMILIES.len() - 1;
+    match index % 8 {
+        0 => scenes::random_scene(random.usize(..last), &mut scenes::Random(random.u64(..))),
+        // Routes with spirals.
+        4 => scenes::random_scene(last, &mut scenes::Random(random.u64(..))),
+        _ => tight_route(random),
     }
-    tight_route(random)
 }
 
 /// Most lines of a certificate that are left out, one at a time.
@@ -133,9 +135,11 @@ fn clearance_certified(text: &str) -> Option<Until> {
     let freeze = timeline.freeze(scene.stops_at_contact());
     let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ())?.least;
     let mut enclosed = None;
+    let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
     let proved = accepted(text, |write| {
+        let most = MOST_STEPS / 4;
         enclosed =
-            certify_least_clearance(&scene.motion, freeze, &hint, text, MOST_STEPS / 4, write, &mut |_| ()).unwrap();
+            certify_least_clearance(&scene.motion, freeze, hints, text, most, write, &mut |_| ()).unwrap().boards;
     });
     let claim = proved.least_clearance.unwrap();
     if let (Some(lo), Some(hi), Some(enclosed)) = (claim.lo, claim.hi, enclosed) {
@@ -276,7 +280,10 @@ fn changed_certificates_of_other_questions_are_refused() {
     let freeze = timeline.freeze(scene.stops_at_contact());
     let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ()).unwrap().least;
     let clearance = written(|write| {
-        certify_least_clearance(&scene.motion, freeze, &hint, &route, MOST_STEPS, write, &mut |_| ()).unwrap().unwrap();
+        let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
+        let motion = &scene.motion;
+        let found = certify_least_clearance(motion, freeze, hints, &route, MOST_STEPS, write, &mut |_| ()).unwrap();
+        found.boards.unwrap();
     });
     let speed = written(|write| {
         certify_greatest_speed(&scene, &timeline, 2.0, &route, 50_000, write, &mut |_| ()).unwrap().unwrap();

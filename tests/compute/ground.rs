@@ -14,7 +14,7 @@ use bench_dragon::show::scene::{OnContact, Scene};
 use bench_dragon::show::{Playback, Show};
 use proptest::prelude::*;
 
-const SQUARE: &str = include_str!("../../config/square.toml");
+const SQUARE: &str = include_str!("ground.toml");
 
 fn scene(text: &str) -> Scene {
     Scene::parse(text, "test.toml", "test").unwrap()

@@ -2,7 +2,7 @@
 //! `tests/compute/oracle`, with distances by parry2d.
 
 use bench_dragon::certify::plan::{LeastPitch, Overlap, least_pitch};
-use bench_dragon::certify::{ClearanceEnclosure, enclose_least_clearance};
+use bench_dragon::certify::{ClearanceEnclosure, ClearanceHints, enclose_least_clearance};
 use bench_dragon::show::scene::Scene;
 
 use crate::oracle::{chain, scenes};
@@ -44,7 +44,8 @@ fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclos
     let timeline = scene.motion.timeline(&mut |_| ());
     let freeze = timeline.freeze(scene.stops_at_contact());
     let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ())?.least;
-    let enclosure = enclose_least_clearance(&scene.motion, freeze, &hint, most_steps, &mut |_| ())?;
+    let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
+    let enclosure = enclose_least_clearance(&scene.motion, freeze, hints, most_steps, &mut |_| ()).boards?;
     let ClearanceEnclosure { lo, hi, travelled, bench_a, bench_b, until, .. } = enclosure;
     println!("{:?} {enclosure:?}", freeze.event.kind);
     assert!(lo <= hi && hi - lo <= 1e-9, "{enclosure:?}");

@@ -3,7 +3,9 @@
 
 mod accepted;
 mod accuracy;
+mod beside;
 mod certificates;
+mod certified_pairs;
 mod display;
 mod events;
 mod greatest_speed;

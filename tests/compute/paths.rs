@@ -196,10 +196,17 @@ fn the_greatest_speed_of_the_turnaround_is_that_of_dense_sampling() {
     assert!(plan.time.fract() > 1e-3);
 }
 
+/// Returns a route of short lines.
+fn pieces(count: usize) -> String {
+    format!("kind = \"pieces\"\n{}", "[[path.pieces]]\nkind = \"line\"\nlength = 0.5\n".repeat(count))
+}
+
 #[test]
 fn wrong_paths_are_refused_in_one_sentence() {
     let turn = "kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2";
     let arc = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nradius = 2";
+    let spiral = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"spiral\"\npitch = 0.5\nradius = 2\nside = \"left\"\n\
+                  direction = \"in\"\nturns = 1";
     for (path, words) in [
         (turn.to_owned(), "path.lead_in and path.start_turn are both missing"),
         (format!("{turn}\nlead_in = 1\nstart_turn = 5"), "both given"),
@@ -214,6 +221,18 @@ fn wrong_paths_are_refused_in_one_sentence() {
             "kind = \"pieces\"\n[[path.pieces]]\nkind = \"line\"\nlength = 3\nradius = 1".to_owned(),
             "a line has a length",
         ),
+        (spiral.replace("side = \"left\"\n", ""), "a spiral has a pitch, a radius"),
+        (format!("{spiral}\nlength = 3"), "a spiral has a pitch, a radius"),
+        (spiral.replace("\"in\"", "\"inward\""), "direction"),
+        (spiral.replace("0.5", "0"), "path.pieces.pitch is 0"),
+        (spiral.replace("radius = 2", "radius = 0"), "path.pieces.radius is 0"),
+        (spiral.replace("radius = 2", "radius = -2"), "path.pieces.radius is -2"),
+        (spiral.replace("turns = 1", "turns = -1"), "path.pieces.turns is -1"),
+        (spiral.replace("turns = 1", "turns = 4"), "path.pieces.turns is 4, which leads to the centre"),
+        (spiral.replace("turns = 1", "turns = 5"), "expected less than 4.000 turns"),
+        (spiral.replace("turns = 1", "length = 26"), "path.pieces.length is 26, which leads to the centre"),
+        (format!("{arc}\nside = \"left\"\nturns = 0.2\npitch = 1"), "an arc has a radius, a side"),
+        (pieces(4097), "path.pieces has 4097 pieces, expected from 1 to 4096"),
     ] {
         let text = format!(
             "[team]\nbenches = 9\nhead_length = 3.41\nbody_length = 2.20\nwidth = 0.30\nhole_inset = 0.275\n\

@@ -141,3 +141,70 @@ fn the_segments_of_a_stage_join() {
         assert!(corner.min(TAU - corner) < 1e-12, "{from:?} {to:?}");
     }
 }
+
+/// Spirals of a route come with their turns or their length, with their bend in the stage message, and without a
+/// corner.
+#[test]
+fn the_spirals_of_a_route_join_and_say_where_they_lie() {
+    let spiral = |direction: &str, side: &str, extent: &str| {
+        format!(
+            "[[path.pieces]]\nkind = \"spiral\"\npitch = 1.7\nradius = 6.0\ndirection = \"{direction}\"\nside = \"{side}\"\n\
+             {extent}\n"
+        )
+    };
+    // Metres of r = a theta between two radii.
+    let metres = |from: f64, to: f64| {
+        let length = |radius: f64| {
+            let theta = TAU * radius / 1.7;
+            1.7 / TAU / 2.0 * (theta * theta.hypot(1.0) + theta.asinh())
+        };
+        (length(to) - length(from)).abs()
+    };
+    let line = "[[path.pieces]]\nkind = \"line\"\nlength = 5.0\n";
+    let extents = [(6.0 - 1.7 * 2.5, "turns = 2.5".to_owned()), (1.75, format!("length = {:?}", metres(6.0, 1.75)))];
+    for (inner, extent) in extents {
+        let route = format!(
+            "kind = \"pieces\"\n{line}{}{line}{}{line}",
+            spiral("in", "left", &extent),
+            spiral("out", "right", "turns = 1.0")
+        );
+        let StageMessage { stage, segments } = stage_of(&route);
+        let kinds: Vec<u32> = segments.iter().map(|segment| segment.kind).collect();
+        let (line, spirals) = (SEGMENT_LINE, [SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL]);
+        assert_eq!(kinds, [line, spirals[0], line, spirals[1], line]);
+        let dragon = stage.first_dragon();
+        assert!(dragon.pitch == 1.7 && dragon.start_turn.is_nan());
+        let [inward, outward] = [segments[1], segments[3]];
+        assert!(inward.curvature > 0.0 && outward.curvature < 0.0, "to the left, to the right");
+        assert!((inward.length - metres(6.0, inner)).abs() < 1e-12 && (inward.x - 5.0).abs() < 1e-15);
+        assert!((outward.length - metres(6.0, 7.7)).abs() < 1e-12);
+        assert!((1.7 / TAU * inward.theta_last - inner).abs() < 1e-12);
+        // The direction turns by the angle about the centre and by the change of atan(theta).
+        let turned = TAU * 2.5 + inward.theta_first.atan() - inward.theta_last.atan();
+        assert!((segments[2].heading - turned).sin().abs() < 1e-12, "{}", segments[2].heading);
+        let theta = outward.theta_first;
+        let curvature = TAU / 1.7 * (2.0 + theta * theta) / (1.0 + theta * theta).powf(1.5);
+        assert!((outward.curvature + curvature).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_route_has_up_to_4096_pieces() {
+    let bend = "[[path.pieces]]\nkind = \"arc\"\nradius = 5.0\nturns = 0.125\nside = ";
+    let path = format!("kind = \"pieces\"\n{}", format!("{bend}\"left\"\n{bend}\"right\"\n").repeat(2048));
+    // One bench, which touches nothing: the search for contacts on 16 km takes long.
+    let text = format!("{}{path}\n[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n", TEAM.replace("= 20", "= 1"));
+    let scene = Scene::parse(&text, "test", "test").unwrap();
+    let length = 4096.0 * 5.0 * TAU / 8.0;
+    assert!((scene.motion.path().length() - length).abs() < 1e-9);
+    let timeline = scene.motion.timeline(&mut |_| ());
+    assert_eq!((timeline.events().len(), timeline.searched_until()), (1, None), "{timeline:?}");
+    assert!((timeline.end().time - length).abs() < 1e-9);
+    let show = Show::new(&scene, timeline, Playback::of(&scene)).unwrap();
+    let message = stage(1, 2, [0; 32], &scene.motion, &show);
+    assert_eq!(message.segments.len(), 4096);
+    // Each pair of bends is the same step along one straight line.
+    let (from, to) = (message.segments[0], message.segments[4094]);
+    let step = (message.segments[2].x - from.x, message.segments[2].y - from.y);
+    assert!((to.x - 2047.0 * step.0).hypot(to.y - 2047.0 * step.1) < 1e-9, "{to:?}");
+}

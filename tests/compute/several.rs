@@ -13,7 +13,7 @@ use bench_dragon::show::{Playback, Show};
 use fastrand::Rng;
 
 /// A dragon of `benches` benches with head and body boards of 2.2 m.
-fn dragon(name: &str, benches: usize, placement: &str, speed: f64, delay: f64, path: &str) -> String {
+pub fn dragon(name: &str, benches: usize, placement: &str, speed: f64, delay: f64, path: &str) -> String {
     format!(
         "[[dragons]]\nname = \"{name}\"\nplacement = {placement}\ndelay = {delay:?}\n[dragons.team]\n\
          benches = {benches}\n\
@@ -22,7 +22,7 @@ fn dragon(name: &str, benches: usize, placement: &str, speed: f64, delay: f64, p
     )
 }
 
-fn line(length: f64) -> String {
+pub fn line(length: f64) -> String {
     format!("kind = \"pieces\"\npieces = [{{ kind = \"line\", length = {length:?} }}]")
 }
 
@@ -101,7 +101,7 @@ fn least_gap(boards: &[(usize, Corners)]) -> (f64, (usize, usize)) {
 
 /// The first contact up to a time by small steps: no step is longer than the gap over a speed that no board reaches, or
 /// than 20 microseconds.
-fn brute_force(ensemble: &Ensemble, until: f64) -> Option<(f64, (usize, usize))> {
+pub fn brute_force(ensemble: &Ensemble, until: f64) -> Option<(f64, (usize, usize))> {
     let fastest: f64 = 5.0 * ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).sum::<f64>();
     let (mut time, mut before) = (0.0, 0.0);
     while time < until {
@@ -142,7 +142,7 @@ fn any_path(rng: &mut Rng) -> String {
     format!("kind = \"pieces\"\npieces = [{}]", pieces.join(", "))
 }
 
-fn any_dragon(rng: &mut Rng, name: &str) -> String {
+pub fn any_dragon(rng: &mut Rng, name: &str) -> String {
     let (x, y) = (between(rng, -12.0, 12.0), between(rng, -12.0, 12.0));
     let (turns, mirror) = (between(rng, -0.5, 0.5), rng.bool());
     let placement = format!("{{ origin = [{x:?}, {y:?}], rotation_turns = {turns:?}, mirror = {mirror} }}");

@@ -15,6 +15,7 @@ use std::f64::consts::{PI, TAU};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
+use bench_dragon::motion::model::spiral::Direction;
 use bench_dragon::motion::model::team::Team;
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::reference::Reference;
@@ -236,6 +237,36 @@ fn solvers_agree_with_50_digits_up_to_the_lock() {
         let (position, speed) = errors(solver.as_mut(), late);
         println!("{who}: position {position:.1e} m, speed {speed:.1e}");
         assert!(position < 1e-9 && speed < 1e-9, "{who}: {position:e} m, {speed:e}");
+    }
+}
+
+/// A route with spirals of all four kinds: tests/truth/spiral_route.py has its numbers.
+fn spiral_route() -> Subject {
+    use Direction::{Inward, Outward};
+    use Side::{Left, Right};
+    let spiral = |side, direction, pitch, radius, turns| RouteStep::Spiral { side, direction, pitch, radius, turns };
+    let steps = vec![
+        RouteStep::Line { length: 15.0 },
+        spiral(Left, Inward, 1.7, 12.0, 4.0),
+        RouteStep::Arc { side: Right, radius: 2.6, turns: 0.45 },
+        spiral(Left, Outward, 1.3, 5.0, 1.5),
+        spiral(Right, Inward, 0.9, 4.5, 2.0),
+        RouteStep::Line { length: 6.0 },
+        spiral(Right, Outward, 2.1, 3.0, 1.25),
+        RouteStep::Line { length: 20.0 },
+    ];
+    Subject::new(PathDescription::Route { heading_turns: 0.0, steps }, Team { benches: 25, ..paper_team() }, 1.0)
+}
+
+#[test]
+fn solvers_agree_with_50_digits_on_a_route_of_spirals() {
+    let (subject, rows) = (spiral_route(), table(include_str!("../truth/spiral_route.csv")));
+    let mut solvers = subject.solvers();
+    assert!(solvers.len() >= 3, "newton and tables");
+    for (who, solver) in &mut solvers {
+        let (position, speed) = errors(solver.as_mut(), rows.iter());
+        println!("{who}: position {position:.1e} m, speed {speed:.1e}");
+        assert!(position < 4e-13 && speed < 4e-13, "{who}: {position:e} m, {speed:e}");
     }
 }
 

@@ -65,7 +65,7 @@ fn number(random: &mut Rng, low: f64, high: f64) -> f64 {
 }
 
 /// Returns a scene of a short team on a short route, with obstacles about it.
-fn random_scene(random: &mut Rng) -> String {
+pub fn random_scene(random: &mut Rng) -> String {
     let (benches, width) = (1 + random.usize(..5), number(random, 0.1, 0.4));
     let start = [number(random, -3.0, 3.0), number(random, -3.0, 3.0)];
     let mut text = format!(

@@ -1,7 +1,7 @@
 // A Fast DDS process that subscribes to topics and calls services as rmw_fastrtps does, with payloads as bytes.
 //
 //   peer subscribe TOPIC TYPE [--best-effort] [--transient-local] [--depth N] [--seconds S] [--samples N]
-//        [--linger S] [--joins N]
+//        [--linger S] [--joins N] [--lease S]
 //   peer call SERVICE REQUEST_TYPE RESPONSE_TYPE HEX [--timeout S] [--clients N] [--heartbeat S]
 //
 // Both take --domain D. TOPIC and SERVICE are names on the wire without their prefixes: "rt/", or "rq/" and "rr/".
@@ -105,6 +105,7 @@ struct Options {
   double timeout = 10.0;
   // The default of Fast DDS.
   double heartbeat = 3.0;
+  double lease = 20.0;
 
   Options(int first, int count, char** arguments) {
     for (int i = first; i < count; i++) {
@@ -126,6 +127,7 @@ struct Options {
         else if (option == "--linger") linger = value;
         else if (option == "--timeout") timeout = value;
         else if (option == "--heartbeat") heartbeat = value;
+        else if (option == "--lease") lease = value;
         else fail("unexpected argument " + option);
       }
     }
@@ -192,8 +194,10 @@ private:
 class Peer {
 public:
   Peer(const Options& options, Events& events) : options(options), events(events) {
-    participant = DomainParticipantFactory::get_instance()->create_participant(
-        options.domain, PARTICIPANT_QOS_DEFAULT, &events, StatusMask::none());
+    DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
+    qos.wire_protocol().builtin.discovery_config.leaseDuration = options.lease;
+    participant = DomainParticipantFactory::get_instance()->create_participant(options.domain, qos, &events,
+                                                                               StatusMask::none());
     if (!participant) fail("no participant");
     publisher = participant->create_publisher(PUBLISHER_QOS_DEFAULT);
     subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);

@@ -54,6 +54,7 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
         sinks,
         announce: Box::new(move |announcement| announced.borrow_mut().announcement(announcement)),
         record: Box::new(move |sample| sampled.borrow_mut().sample(sample)),
+        alive: Box::new(|| ()),
     };
     let collector = Rc::new(RefCell::new(Collector::new(inbox, run, plan.begin_ns)));
 

@@ -12,6 +12,7 @@ mod light;
 mod live;
 mod log;
 mod metrics;
+mod outputs_of_dragons;
 mod placed;
 mod python_module;
 mod readers;

@@ -32,6 +32,48 @@ fn a_program_of_global_variables_reads_every_service() {
     assert!(text(&output.stderr).is_empty(), "{}", text(&output.stderr));
 }
 
+/// Prints the number of segments of the stage, the greatest gap between two, and the bytes of the scene.
+const STAGE_OF_A_LONG_ROUTE: &str = "
+import json, math, sys
+from bench_dragon import subscribe
+feed = subscribe(sys.argv[1], seconds=120)
+stage, scene = None, None
+for frame in feed:
+    stage, scene = stage or feed.stage(), scene or feed.scene()
+    if stage and scene:
+        break
+path = stage[1]
+gaps = [math.hypot(b.x - a.x - a.length * math.cos(a.heading), b.y - a.y - a.length * math.sin(a.heading))
+        for a, b in zip(path, path[1:]) if a.kind == 0]
+print(json.dumps({'segments': len(path), 'lines': len(gaps), 'gap': max(gaps), 'scene': len(scene[1])}))
+";
+
+#[test]
+fn a_route_of_4096_pieces_is_one_message() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let line = "[[path.pieces]]\nkind = \"line\"\nlength = 2.0\n";
+    let arc = "[[path.pieces]]\nkind = \"arc\"\nradius = 5.0\nturns = 0.1\nside = ";
+    let pieces = format!("{line}{arc}\"left\"\n{line}{arc}\"right\"\n").repeat(1024);
+    let scene = format!(
+        "name = \"long\"\n[team]\nbenches = 1\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n\
+         [path]\nkind = \"pieces\"\n{pieces}[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n"
+    );
+    let file = scene_file("pieces_4096", &[]);
+    std::fs::write(&file, &scene).unwrap();
+    let mut run = program("pieces_4096");
+    let publisher = Process::start(run.arg("--scene").arg(&file).args(["run", "--json", "--duration", "300"]));
+    let mut peer = python();
+    let output = Process::start(peer.args(["-c", STAGE_OF_A_LONG_ROUTE, &unique("pieces_4096")])).output_within(240);
+    let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
+    assert_eq!((found["segments"].as_u64(), found["lines"].as_u64()), (Some(4096), Some(2048)), "{found}");
+    assert!(found["gap"].as_f64().unwrap() < 1e-9, "{found}");
+    assert_eq!(found["scene"].as_u64(), Some(scene.len() as u64));
+    publisher.signal(SIGINT);
+    assert!(publisher.output_within(60).status.success());
+}
+
 #[test]
 fn its_type_hints_are_strict() {
     if !can_run(python_modules(&["mypy", "numpy"])) {

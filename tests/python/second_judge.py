@@ -23,7 +23,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from flint import arb, ctx
+from flint import acb, arb, ctx
 
 ctx.prec = 192
 PI = arb.pi()
@@ -31,7 +31,9 @@ EVENTS = ("contact", "stall", "lock", "path_end")
 # Lines of the certificates of each question, beside the first: any other line is refused.
 LINES = {
     "events": ("step", "result", "reached", *EVENTS),
-    "least_clearance": ("step", "near", "contact", "path_end", "least_clearance"),
+    "least_clearance": (
+        "step", "near", "near_obstacle", "contact", "path_end", "least_clearance", "obstacle_clearance"
+    ),
     "greatest_speed": ("speeds", "fast", "greatest_speed"),
     "least_pitch": ("reach", "overlap", "head_locks", "far", "step", "least_pitch"),
 }
@@ -150,6 +152,32 @@ class Spiral(Segment):
         return super().back(c, metres * self.scale(c) / self.scale(c + metres / self.scale(c)))
 
 
+class PlacedSpiral(Spiral):
+    """A spiral about any centre from a point in a direction, its centre on one side. Complex numbers in place of
+    vectors: along it, the tangent is the unit vector from the centre times (sense + i side theta) / sqrt(1 + theta^2)."""
+
+    def __init__(self, a, inward, begin, end, point, direction, left):
+        super().__init__(a, inward, begin, end)
+        self.side = 1 if left else -1
+        self.outward = acb(*direction) / self.along(begin)
+        self.centre = acb(*point) - a * begin * self.outward
+
+    def along(self, c):
+        return acb(self.sense, self.side * c) / (1 + c * c).sqrt()
+
+    def spoke(self, c):
+        sin, cos = (self.side * self.sense * (c - self.begin)).sin_cos()
+        return self.outward * acb(cos, sin)
+
+    def point(self, c):
+        point = self.centre + self.a * c * self.spoke(c)
+        return point.real, point.imag
+
+    def tangent(self, c):
+        tangent = self.spoke(c) * self.along(c)
+        return tangent.real, tangent.imag
+
+
 class Scene:
     def __init__(self, text):
         file = tomllib.loads(text)
@@ -202,13 +230,25 @@ class Scene:
         for piece in path["pieces"]:
             if piece["kind"] == "line":
                 segment = Line(point, direction, arb(0), number(piece, "length"))
+            elif piece["kind"] == "spiral":
+                segment = self.piece_of_spiral(piece, number, point, direction)
             else:
                 radius = number(piece, "radius")
                 angle = 2 * PI * number(piece, "turns") if "turns" in piece else number(piece, "length") / radius
                 segment = Arc(point, direction, radius, piece["side"] == "left", angle)
             point, direction = segment.point(segment.end), segment.tangent(segment.end)
-            self.length += segment.metres(segment.end)
+            self.length += segment.metres(segment.end) - segment.metres(segment.begin)
             self.segments.append(segment)
+
+    def piece_of_spiral(self, piece, number, point, direction):
+        a, inward = number(piece, "pitch") / (2 * PI), piece["direction"] == "in"
+        begin = number(piece, "radius") / a
+        spiral = PlacedSpiral(a, inward, begin, None, point, direction, piece["side"] == "left")
+        if "turns" in piece:
+            spiral.end = begin + spiral.sense * 2 * PI * number(piece, "turns")
+        else:
+            spiral.end = self.inverse(spiral, spiral.metres(begin) + number(piece, "length"))
+        return spiral
 
     @staticmethod
     def inverse(curve, metres):
@@ -666,6 +706,30 @@ class Judge:
             require(nearest <= claim["hi"], f"benches {i} and {j} are {float(nearest)} m apart, not {claim['hi']} m")
         self.counts["clearances"] += 1
 
+    def obstacle_clearance(self, claim, near, until, number):
+        """Checks that no board is nearer to an obstacle than claimed, and that one is as near."""
+        scene, lo, hi = self.scene, claim["lo"], claim["hi"]
+        shape = scene.obstacles[claim["obstacle"]]
+        time = float((scene.travelled(read_place(near["at"][0])) / scene.speed).mid()) if near else until
+        around = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+        # A board that overlaps the shape has no distance here.
+        times = around if lo is not None and shape.distance + lo > 0 else []
+        for at in times:
+            wider = Obstacle(shape.kind, shape.points, shape.distance + arb(lo))
+            try:
+                avoided = [wider.is_avoided(board) for board in scene.boards(self.at(at))]
+            except Undecided:
+                self.counts["undecided"] += 1
+                continue
+            self.counts["places"] += 1
+            self.counts["obstacles"] += len(avoided)
+            require(all(avoided), f"a board is nearer to obstacle {claim['obstacle']} than {lo} m at t = {at} s")
+        if hi is not None:
+            bench = claim["bench"]
+            board = scene.boards(scene.chain(read_place(near["at"][0]), bench + 2))[bench]
+            wider = Obstacle(shape.kind, shape.points, shape.distance + arb(hi))
+            require(wider.is_reached(board), f"bench {bench} is not within {hi} m of obstacle {claim['obstacle']}")
+
     def ratios(self, places):
         """Returns the speeds of all handles, with the head's as 1."""
         ratios = [arb(1)]
@@ -794,7 +858,9 @@ def judged(lines, places, seed):
     if about == "events":
         judged_events(judge, lines, places)
         return judge.counts
-    claim = lines[-1]
+    beside = [line for line in lines if line["type"] == "obstacle_clearance"]
+    require(len(beside) == (len(judge.scene.obstacles) if about == "least_clearance" else 0), "a result is missing")
+    claim = lines[-1 - len(beside)]
     require(claim["type"] == about, f"the last line is a {claim['type']}")
     if about == "least_pitch":
         judge.least_pitch(claim, lines, places)
@@ -811,6 +877,10 @@ def judged(lines, places, seed):
             require((i, j) == (claim["bench_a"], claim["bench_b"]) and overlap(boards[i], boards[j]), "no contact")
             until = float((scene.travelled(read_place(until)) / scene.speed).mid())
         judge.least_clearance(claim, found.get("near"), until * (1 - 1e-9), places)
+        near = {line["obstacle"]: line for line in lines if line["type"] == "near_obstacle"}
+        for result in beside:
+            until = result["time_until"] if result["until"] == "time" else float((scene.length / scene.speed).mid())
+            judge.obstacle_clearance(result, near.get(result["obstacle"]), until * (1 - 1e-9), places)
     steps = [line for line in lines if line["type"] in ("step", "speeds")]
     for line in judge.random.sample(steps, min(places, len(steps))):
         judge.span(line)

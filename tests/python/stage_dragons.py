@@ -117,12 +117,27 @@ def approach(page):
     until(page, f"{expected}.every((one) => picture.labels.some(({{text}}) => text === one))", f"the words {expected}")
     alert = page.get_by_role("alert").inner_text()
     assert "bench 1 (the head) of gold and bench 1 (the head) of jade" in alert, alert
+    long_name_is_cut(page)
     assert "approaching" in row(page, "gold") and "approaching" in row(page, "jade"), words(page)
     command("seek", 335.6)
     command("resume")
     until(page, "document.body.dataset.level === 'contact'", "the contact")
     until(page, "document.getElementById('now').textContent === 'Bench 1 of gold and bench 1 of jade touch'", "what touches")
     assert "contact" in row(page, "gold") and "contact" in row(page, "jade"), words(page)
+
+
+def long_name_is_cut(page):
+    """In a low window, where the state and the name share a line, a long name leaves the state free."""
+    size = page.viewport_size
+    page.set_viewport_size({"width": 1120, "height": 630})
+    state, name = page.evaluate("""() => {
+        const name = document.getElementById("name"), range = document.createRange();
+        name.textContent = "a show with a long name · a_publisher_with_a_long_name_too";
+        range.selectNodeContents(document.getElementById("state"));
+        return [range.getBoundingClientRect().right, name.getBoundingClientRect().left];
+    }""")
+    assert state <= name, f"the state ends at {state}, the name begins at {name}"
+    page.set_viewport_size(size)
 
 
 def labels_of_two_point_at_their_boards():

@@ -94,6 +94,48 @@ def near_and_far(pixels, handles, pixel):
     assert dark < 0.05, f"the air above {100 * dark:.0f} % of the benches is as lit"
 
 
+# Pictures of a given cost, on a clock of its own: 60 passes a second between pictures. Returns for each second whether the
+# look is a still, and the pictures drawn.
+PACED = """async (cost) => {
+    const { Pace } = await import("/pace.js"), pace = new Pace(), seconds = [];
+    let now = 0, drawn = 0;
+    while (seconds.length < cost.length) {
+        if (pace.begin(now)) {
+            pace.drawn(now);
+            drawn++;
+            now += cost[seconds.length];
+        } else now += 1000 / 60;
+        if (now >= 1000 * (seconds.length + 1)) {
+            seconds.push([pace.isStill, drawn]);
+            drawn = 0;
+        }
+    }
+    return seconds;
+}"""
+
+
+def slow_computer_shows_stills():
+    """Below ten pictures a second the seat is a still that is renewed every four seconds, and says so."""
+    with server() as url, publisher("--start", "300"), browser() as (page, complaints):
+        page.goto(f"{url}#seat")
+        drawn(page)
+        slow = page.evaluate(PACED, [120] * 60)
+        assert slow[0] == [False, 9] and all(still for still, _ in slow[10:]), slow
+        assert 10 <= sum(count for _, count in slow[20:]) <= 11, slow
+        assert not any(still for still, _ in page.evaluate(PACED, [80] * 60)), "twelve pictures a second are no still"
+        # A computer that is only busy for a while moves again.
+        again = page.evaluate(PACED, [150] * 20 + [30] * 60)
+        assert again[19][0] and not again[79][0] and again[79][1] > 20, again
+        page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 60})
+        until(page, "document.getElementById('seat-note').textContent.includes('A still, renewed every 4 s')", "a still", 100)
+        count = "[picture.drawn, picture.passes, performance.now()]"
+        before = page.evaluate(count)
+        until(page, f"picture.passes > {before[1] + 20} && picture.drawn > {before[0] + 1}", "two renewals", 100)
+        after = page.evaluate(count)
+        assert after[0] - before[0] <= (after[2] - before[2]) / 4000 + 1, (before, after)
+        assert not complaints, complaints
+
+
 def cameras_are_kept():
     """Shift and a digit keep the camera, on this browser; the digit takes it, on the page and in the seat that hands may
     change."""
@@ -134,4 +176,4 @@ def cameras_are_kept():
 
 
 if __name__ == "__main__":
-    play(seat_shows_the_dragon, cameras_are_kept)
+    play(seat_shows_the_dragon, slow_computer_shows_stills, cameras_are_kept)

@@ -7,7 +7,9 @@ use crate::harness;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
+use bench_dragon::soak::resources::child_of;
 use harness::{Process, can_run, json_lines, long, program, scene_file, summary, text, unique, wait_until};
 use nix::sys::signal::Signal;
 use serde_json::Value;
@@ -70,13 +72,6 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
 fn ended(publisher: Process) -> Value {
     publisher.signal(Signal::SIGINT);
     summary(&publisher.output_within(60))
-}
-
-/// Returns the lines of a peer of one type.
-fn lines(peer: Process, kind: &str, seconds: u64) -> Vec<Value> {
-    let output = peer.output_within(seconds);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    json_lines(&output).into_iter().filter(|line| kind.is_empty() || line["type"] == kind).collect()
 }
 
 /// A Fast DDS client sends its first request before RustDDS knows it, in half of all cases. Fast DDS repeats the request
@@ -238,7 +233,46 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     let ages: Vec<u64> = ages.collect();
     let old = ages.iter().filter(|age| **age > 300).count();
     assert!(old <= joins as usize / 3 && ages.iter().all(|age| *age < 1300), "ms: {ages:?}");
+    // Beside a subscriber that stays, RustDDS keeps some alerts. They are withheld from a new subscriber, unless a busy
+    // machine is too late.
+    let mut stays = Process::start(&mut subscriber(name, "alerts", &["--transient-local", "--seconds", "900"]));
+    let received = stays.lines();
+    (0..4).for_each(|_| drop(received.until("sample", 60)));
+    for further in [&[][..], &kept] {
+        let before = |(made, alerts): &(u64, Vec<u64>)| alerts.iter().filter(|alert| **alert < *made).count();
+        let counts: Vec<usize> = joined(name, joins, further).iter().map(before).collect();
+        let with_old = counts.iter().filter(|count| **count > 1).count();
+        assert!(with_old <= joins as usize / 3, "alerts of before each: {counts:?}");
+    }
     drop(watch);
+    ended(publisher);
+}
+
+/// The publisher counts a killed subscriber for its lease, here a day, and RustDDS then refuses to write more than the
+/// memory of a topic holds: 64 MB, here some 330 messages.
+#[test]
+fn a_killed_subscriber_stops_no_other() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "killed_lease";
+    let changes =
+        [("benches = 223", "benches = 5000"), ("start_turn = 16", "start_turn = 60"), ("[alerts]", "#[alerts]")];
+    let scene = scene_file(name, &changes);
+    let of_scene = std::fs::read_to_string(&scene).unwrap();
+    let lines: String =
+        of_scene.lines().filter(|line| !line.starts_with("approach_")).map(|line| format!("{line}\n")).collect();
+    std::fs::write(&scene, format!("{lines}\n[publish.ros2]\ntopics = [\"handles\"]\n")).unwrap();
+    let scene = scene.to_str().unwrap();
+    let publisher = publisher(name, &["--scene", scene, "run", "--json", "--duration", "600"]);
+    let mut killed = Process::start(&mut subscriber(name, "handles", &["--seconds", "600", "--lease", "86400"]));
+    killed.lines().until("sample", 120);
+    killed.signal(Signal::SIGKILL);
+    let mut other =
+        Process::start(&mut subscriber(name, "handles", &["--seconds", "180", "--linger", "0", "--samples", "500"]));
+    let printed = other.lines().rest(240);
+    let end: Value = serde_json::from_str(printed.last().unwrap()).unwrap();
+    assert!(end["samples"].as_u64() >= Some(500), "{end}");
     ended(publisher);
 }
 
@@ -249,55 +283,80 @@ fn memory(process: u32) -> f64 {
     line.trim().trim_end_matches(" kB").parse::<f64>().unwrap() / 1024.0
 }
 
+/// The end of one subscriber.
+#[derive(PartialEq)]
+enum Visit {
+    /// It received its messages, and left or was killed.
+    Served,
+    /// It discovered no publisher within a minute, as beside many other participants happens to Fast DDS at times: it
+    /// says nothing of ours.
+    Undiscovered,
+}
+
+/// A subscriber comes, gets its messages, and leaves; of eight, four are killed at their first message.
+fn visit(name: &str, index: usize) -> Visit {
+    let (topic, durability) = [
+        ("handles", ""),
+        ("alerts", "--transient-local"),
+        ("handles", "--best-effort"),
+        ("stage", "--transient-local"),
+    ][index % 4];
+    let samples = if topic == "handles" { "20" } else { "1" };
+    let arguments = ["--seconds", "60", "--linger", "0", "--samples", samples, durability];
+    let arguments = arguments.iter().copied().filter(|argument| !argument.is_empty()).collect::<Vec<_>>();
+    let mut process = Process::start(&mut subscriber(name, topic, &arguments));
+    let printed = process.lines();
+    let first = printed.all_until_one(|line| line.contains("sample") || line.contains("end"), "sample or end", 120);
+    let mut lines: Vec<Value> = first.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    if index / 4 % 2 == 1 && lines.iter().any(|line| line["type"] == "sample") {
+        process.signal(Signal::SIGKILL);
+        return Visit::Served;
+    }
+    lines.extend(printed.rest(120).iter().map(|line| serde_json::from_str::<Value>(line).unwrap()));
+    // None if it ended in another way: Fast DDS dies at times when a participant leaves.
+    let end = lines.iter().find(|line| line["type"] == "end");
+    if end.is_some_and(|end| end["samples"] == 0 && end["writers"] == 0) {
+        return Visit::Undiscovered;
+    }
+    let received = lines.iter().filter(|line| line["type"] == "sample").count();
+    assert!(received >= samples.parse().unwrap(), "{topic}: {lines:?}");
+    Visit::Served
+}
+
 /// Half of the subscribers are killed, the others leave. A subscriber that spins, as one of Fast DDS does that is sent an
 /// empty change, would never end.
 #[test]
-#[ignore = "beside many other participants a Fast DDS process at times discovers none for a minute: run it alone"]
 fn subscribers_that_come_and_go_cost_no_memory_and_none_is_left_without_messages() {
     if !can_run(peer_program().map(drop)) {
         return;
     }
     let name = "come_and_go";
     let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "300", "--loop", "--duration", "100000"]);
+    let process = child_of(publisher.id()).unwrap();
     let (rounds, beside) = if long() { (250, 4) } else { (6, 4) };
-    let come_and_go = |index: usize| {
-        let (topic, durability) = [
-            ("handles", ""),
-            ("alerts", "--transient-local"),
-            ("handles", "--best-effort"),
-            ("stage", "--transient-local"),
-        ][index % 4];
-        let samples = if topic == "handles" { "20" } else { "1" };
-        let arguments = ["--seconds", "60", "--linger", "0", "--samples", samples, durability];
-        let arguments = arguments.iter().copied().filter(|argument| !argument.is_empty()).collect::<Vec<_>>();
-        let mut process = Process::start(&mut subscriber(name, topic, &arguments));
-        let printed = process.lines();
-        let is_killed = index / 4 % 2 == 1;
-        if is_killed {
-            printed.until("sample", 60);
-            process.signal(Signal::SIGKILL);
-        }
-        let rest = printed.rest(90);
-        let end = rest.iter().find(|line| line.contains("\"end\""));
-        let count = |line: &String| serde_json::from_str::<Value>(line).unwrap()["samples"].as_u64().unwrap();
-        assert!(is_killed || end.is_some_and(|line| count(line) >= samples.parse().unwrap()), "{topic}: {rest:?}");
-    };
+    let undiscovered = AtomicUsize::new(0);
     let mut memories = Vec::new();
     for round in 0..rounds {
         std::thread::scope(|threads| {
             for index in 0..beside {
-                threads.spawn(move || come_and_go(beside * round + index));
+                let undiscovered = &undiscovered;
+                threads.spawn(move || {
+                    if visit(name, beside * round + index) == Visit::Undiscovered {
+                        undiscovered.fetch_add(1, Ordering::Relaxed);
+                    }
+                });
             }
         });
-        memories.push(memory(publisher.id()));
+        memories.push(memory(process));
     }
-    println!("{} subscribers, MB: {memories:.1?}", rounds * beside);
+    let undiscovered = undiscovered.into_inner();
+    println!("{} subscribers, {undiscovered} discovered nothing, MB: {memories:.1?}", rounds * beside);
+    assert!(undiscovered <= rounds * beside / 4, "{undiscovered} of {}", rounds * beside);
     // Messages for killed subscribers are kept until their lease ends: a high-water mark within the first rounds.
     let (first, last) = (memories[rounds / 3], memories[rounds - 1]);
     assert!(last < first + 10.0, "{memories:.1?}");
-    // The publisher still serves, and ends.
-    let end =
-        lines(Process::start(&mut subscriber(name, "handles", &["--samples", "20", "--seconds", "60"])), "end", 90);
-    assert!(end[0]["samples"].as_u64() >= Some(20), "{end:?}");
+    // The same process still serves, and ends.
+    assert_eq!(child_of(publisher.id()), Some(process));
+    assert!(visit(name, 0) == Visit::Served || visit(name, 0) == Visit::Served);
     ended(publisher);
 }

@@ -1,6 +1,6 @@
 //! Lemmas 2, 3 and 5 of `docs/proofs.md`: boards that are apart over a step, and boards that have a point in common.
 
-use super::capsule::Capsule;
+use super::capsule::{Capsule, Frame};
 use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared, plus};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
@@ -102,6 +102,16 @@ impl MovingBoard {
     /// Returns the disc that holds the board at every moment of the step: its middle and its radius.
     pub fn disc(&self) -> ([f64; 2], f64) {
         (self.centre, self.radius)
+    }
+
+    /// Returns the board on the stage.
+    pub fn placed(&self, shape: &Shape, frame: &Frame) -> Self {
+        shape.board(frame.capsule(&self.front), frame.capsule(&self.rear), self.link)
+    }
+
+    /// Returns the middle of the front handle's capsule.
+    pub fn front_point(&self) -> [f64; 2] {
+        self.front.point.map(Interval::middle)
     }
 
     /// Returns the board between the middles of its capsules.

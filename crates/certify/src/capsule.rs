@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::interval::{Interval, Vector, dot, minus, norm, norm_squared, scaled};
-use super::path::{ExactPath, Place};
+use super::interval::{Interval, Vector, dot, minus, norm, norm_squared, plus, scaled};
+use super::path::{ExactPath, Place, of_turns};
+use bench_dragon_motion::placement::Placement;
 
 /// All places from the first to the second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -115,4 +116,38 @@ impl Spanned {
 /// Returns a capsule moved back along its own tangent, for handles on one straight line.
 pub(super) fn moved_back(capsule: &Capsule, metres: Interval) -> Capsule {
     Capsule { point: minus(capsule.point, scaled(capsule.tangent, metres)), ..*capsule }
+}
+
+/// The place of a path on the stage.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    origin: Vector,
+    cosine: Interval,
+    sine: Interval,
+    mirrored: bool,
+}
+
+/// Rounding of a placement's origin, as a share of its size.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+impl Frame {
+    pub fn new(placement: &Placement) -> Self {
+        let origin = placement.origin();
+        // The origin may be rounded: it holds the start of a route.
+        let slack = Interval::within(ROUNDING * (1.0 + origin.x.abs() + origin.y.abs()));
+        let turn = of_turns(Interval::point(placement.rotation_turns()));
+        let [cosine, sine] = turn.map(|part| part + Interval::within(ROUNDING));
+        let origin = [origin.x, origin.y].map(|part| Interval::point(part) + slack);
+        Self { origin, cosine, sine, mirrored: placement.is_mirrored() }
+    }
+
+    fn turned(&self, [x, y]: Vector) -> Vector {
+        let y = if self.mirrored { -y } else { y };
+        [self.cosine * x - self.sine * y, self.sine * x + self.cosine * y]
+    }
+
+    pub fn capsule(&self, capsule: &Capsule) -> Capsule {
+        let (point, tangent) = (plus(self.turned(capsule.point), self.origin), self.turned(capsule.tangent));
+        Capsule { point, tangent, ..*capsule }
+    }
 }

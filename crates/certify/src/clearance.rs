@@ -1,7 +1,8 @@
-//! Enclosure of the least clearance of a show: steps of the head that prove the lower bound, and one place that proves
-//! the upper bound. Lemma 6 of `docs/proofs.md`.
+//! Enclosure of the least clearance of a show, and of that of each obstacle: steps of the head that prove the lower
+//! bounds, and one place for each that proves the upper bound. Lemmas 6 and 11 of `docs/proofs.md`.
 
 mod apart;
+mod beside;
 mod certificate;
 
 use std::io;
@@ -11,6 +12,7 @@ use super::capsule::Span;
 use super::first_order::When;
 use super::first_order_step::{FirstOrderStep, StepPoints, step_points};
 use super::grid::GridPoint;
+use super::ground;
 use super::interval::Interval;
 use super::lines::{CertificateLine, Links, Step};
 use super::path::{ExactPath, Place};
@@ -20,10 +22,14 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::contact::LeastClearance;
 use bench_dragon_motion::event::Event;
-use bench_dragon_motion::timeline::TimedEvent;
+use bench_dragon_motion::timeline::{TimedEvent, TimedObstacleClearance};
+use beside::{Beside, UpperBeside};
 
 /// Width of the enclosure in metres, with room for the rounding of both ends.
 const WIDTH: f64 = 0.9e-9;
+
+/// Metres by which a new upper bound must be lower than the one before.
+const LOWER: f64 = 1e-3 * WIDTH;
 
 /// Factors of the step length after a step that is shown, after one that is not, and after further ones that are not.
 /// Steps close to the longest cost more attempts, and make the certificate shorter.
@@ -66,47 +72,82 @@ pub struct ClearanceEnclosure {
     pub steps: u64,
 }
 
-/// Encloses the least clearance of all pairs of boards that share no handle, from the start until the show ends at
-/// `show_end`. The enclosure is a nanometre wide, unless the search gives up after `most_steps`. `hint` is the result of
-/// the ordinary search; it only suggests where to search. `progress` receives the share that is done, from 0 to 1.
-/// Returns `None` if not even the hint can be shown.
+/// An enclosure of the least clearance of an obstacle over a show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObstacleEnclosure {
+    /// The obstacle's number on the stage, the boundary last.
+    pub obstacle: usize,
+    /// Lower bound in metres, for all boards, from the start up to `until`.
+    pub lo: f64,
+    /// Upper bound in metres: the bench's clearance is no more at one place of the show.
+    pub hi: f64,
+    /// Travel of the head at that place in metres, approximate.
+    pub travelled: f64,
+    /// The bench, counted from 0.
+    pub bench: usize,
+    /// Travel in metres up to which `lo` is proved, if not up to the show's end.
+    pub until: Option<f64>,
+}
+
+/// The least clearances that the ordinary search has found. They only suggest where to search.
+#[derive(Debug, Clone, Copy)]
+pub struct ClearanceHints<'h> {
+    /// That of two boards; `None` to enclose only those of the obstacles.
+    pub boards: Option<&'h LeastClearance>,
+    /// Those of the obstacles.
+    pub obstacles: &'h [TimedObstacleClearance],
+}
+
+/// The enclosures of a show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClearanceEnclosures {
+    /// That of two boards; `None` if not even the hint can be shown.
+    pub boards: Option<ClearanceEnclosure>,
+    /// By obstacle; `None` if nothing of it can be shown.
+    pub obstacles: Vec<Option<ObstacleEnclosure>>,
+}
+
+/// Encloses the least clearance of all pairs of boards that share no handle, and that of each obstacle, from the start
+/// until the show ends at `show_end`. The enclosures are a nanometre wide, unless the search gives up after
+/// `most_steps`. `progress` receives the share that is done, from 0 to 1.
 pub fn enclose_least_clearance(
     motion: &Motion,
     show_end: &TimedEvent,
-    hint: &LeastClearance,
+    hints: ClearanceHints<'_>,
     most_steps: u64,
     progress: &mut dyn FnMut(f64),
-) -> Option<ClearanceEnclosure> {
-    Descent::new(chain_of(motion), show_end.event.travelled, most_steps, None).run(motion, show_end, hint, progress)
+) -> ClearanceEnclosures {
+    Descent::new(chain_of(motion), show_end.event.travelled, most_steps, None).run(motion, show_end, hints, progress)
 }
 
-/// Encloses the least clearance as [`enclose_least_clearance`] does, and writes a certificate. `scene` is the text of the
-/// motion's scene. The certificate of a show that ends with a lock ends a nanometre of travel before the lock.
+/// Encloses the least clearances as [`enclose_least_clearance`] does, and writes a certificate. `scene` is the text of
+/// the motion's scene. The certificate of a show that ends with a lock ends a nanometre of travel before the lock.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
 pub fn certify_least_clearance(
     motion: &Motion,
     show_end: &TimedEvent,
-    hint: &LeastClearance,
+    hints: ClearanceHints<'_>,
     scene: &str,
     most_steps: u64,
     write: Write<'_>,
     progress: &mut dyn FnMut(f64),
-) -> Result<Option<ClearanceEnclosure>, CertifyError> {
+) -> Result<ClearanceEnclosures, CertifyError> {
     certificate::first_line(&mut *write, scene)?;
     let end = show_end.event.travelled;
     let mut descent = Descent::new(chain_of(motion), end, most_steps, Some(write));
-    let enclosure = descent.run(motion, show_end, hint, progress);
+    let enclosures = descent.run(motion, show_end, hints, progress);
     descent.write_result(motion.head_speed())?;
-    Ok(enclosure)
+    Ok(enclosures)
 }
 
 /// A function that receives each line of a certificate.
 pub type Write<'w> = &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>;
 
 fn chain_of(motion: &Motion) -> Chain<'_> {
-    Chain::new(motion.path(), ExactPath::new(motion.description()), motion.team())
+    let chain = Chain::new(motion.path(), ExactPath::new(motion.description()), motion.team());
+    Chain { barriers: ground::barriers(motion), ..chain }
 }
 
 /// An upper bound of the clearance of two boards, and its place.
@@ -141,6 +182,10 @@ pub(super) struct Descent<'a, 'w> {
     upper: Option<Upper>,
     /// A fixed lower bound to prove, in metres.
     floor: Option<f64>,
+    /// By obstacle: what is known of its clearance.
+    beside: Vec<Beside>,
+    /// True if the steps have come to the end of the show.
+    is_complete: bool,
 }
 
 /// The end of the show, as a certificate states it.
@@ -154,7 +199,13 @@ enum Finish {
 /// A step that was not shown completely.
 struct Refused {
     obstacle: Obstacle,
-    nearer: Option<Upper>,
+    nearer: Option<Nearer>,
+}
+
+/// A lower upper bound, found where a step is refused.
+enum Nearer {
+    Boards(Upper),
+    Obstacle(usize, UpperBeside),
 }
 
 impl<'a, 'w> Descent<'a, 'w> {
@@ -162,6 +213,7 @@ impl<'a, 'w> Descent<'a, 'w> {
     pub fn new(chain: Chain<'a>, end: f64, most_steps: u64, write: Option<Write<'w>>) -> Self {
         let step = 0.25 * chain.team.shortest_link();
         let at = GridPoint::at(Place(0, 0.0, 0.0), 0.0);
+        let beside = vec![Beside::default(); chain.barriers.len()];
         let mut descent = Self {
             chain,
             write,
@@ -177,6 +229,8 @@ impl<'a, 'w> Descent<'a, 'w> {
             end,
             upper: None,
             floor: None,
+            beside,
+            is_complete: false,
         };
         let before = -LEAST * (1.0 + descent.chain.path.length());
         descent.at =
@@ -184,31 +238,46 @@ impl<'a, 'w> Descent<'a, 'w> {
         descent
     }
 
-    /// Encloses the least clearance of a show.
+    /// Encloses the least clearances of a show.
     fn run(
         &mut self,
         motion: &Motion,
         show_end: &TimedEvent,
-        hint: &LeastClearance,
+        ClearanceHints { boards: hint, obstacles }: ClearanceHints<'_>,
         progress: &mut dyn FnMut(f64),
-    ) -> Option<ClearanceEnclosure> {
+    ) -> ClearanceEnclosures {
         let (path, event) = (motion.path(), &show_end.event);
         let slack = END_SLACK * (1.0 + path.length());
-        match event.kind {
-            EventKind::Contact if event.travelled > 0.0 => self.touch(event, progress),
-            EventKind::Contact => self.at_start(hint),
+        self.end = match event.kind {
+            EventKind::Contact | EventKind::Obstacle | EventKind::PathEnd => (event.travelled - slack).max(0.0),
+            EventKind::Stall | EventKind::Lock => event.travelled - slack.max(BEFORE_LOCK[0]),
+        };
+        let is_at_start = event.travelled == 0.0;
+        self.begin_beside(obstacles, is_at_start);
+        let boards = match event.kind {
+            EventKind::Contact | EventKind::Obstacle if is_at_start => self.at_start(hint),
+            EventKind::Contact => self.touch(event, progress),
+            // The end is taken as found. The steps go beyond it.
+            EventKind::Obstacle => {
+                let (path, end) = (path.length(), event.travelled);
+                let target = self.beside(end, 1.0, |travelled| travelled.lo >= end && travelled.hi <= path);
+                target.and_then(|target| self.least(hint, &target, progress))
+            }
             EventKind::PathEnd => {
-                self.end = event.travelled - slack;
                 let target = path_end(&self.chain.exact, path);
-                self.least(hint, &target, progress)
+                let enclosed = self.least(hint, &target, progress);
+                self.finish = self.is_complete.then_some(Finish::PathEnd);
+                enclosed
             }
-            // The commands refuse a scene with obstacles.
-            EventKind::Obstacle => None,
             EventKind::Stall | EventKind::Lock => {
-                self.end = event.travelled - slack.max(BEFORE_LOCK[0]);
-                (self.end > 0.0).then(|| self.least_until_lock(event, hint, progress))?
+                if self.end > 0.0 {
+                    self.least_until_lock(event, hint, progress)
+                } else {
+                    None
+                }
             }
-        }
+        };
+        ClearanceEnclosures { boards, obstacles: self.enclosed_beside() }
     }
 
     /// Returns the nearest grid point on one side of a place for which `holds` is proved.
@@ -222,12 +291,12 @@ impl<'a, 'w> Descent<'a, 'w> {
     /// Encloses the least clearance from the start to `target`.
     fn least(
         &mut self,
-        hint: &LeastClearance,
+        hint: Option<&LeastClearance>,
         target: &GridPoint,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
         let until = self.descend(hint, target, progress)?;
-        self.finish = until.is_none().then_some(Finish::PathEnd);
+        self.is_complete = until.is_none();
         Some(self.enclosed(self.upper?, until))
     }
 
@@ -235,7 +304,7 @@ impl<'a, 'w> Descent<'a, 'w> {
     fn least_until_lock(
         &mut self,
         lock: &Event,
-        hint: &LeastClearance,
+        hint: Option<&LeastClearance>,
         progress: &mut dyn FnMut(f64),
     ) -> Option<ClearanceEnclosure> {
         let target = self.grid_point(self.end);
@@ -248,6 +317,7 @@ impl<'a, 'w> Descent<'a, 'w> {
             let _ = self.at.travelled < target.travelled && self.go_to(&target, progress).is_some();
             self.stays_to_lock(lock)
         });
+        self.is_complete = is_shown;
         let until = (!is_shown).then(|| self.travelled());
         Some(self.enclosed(self.upper?, until))
     }
@@ -255,17 +325,23 @@ impl<'a, 'w> Descent<'a, 'w> {
     /// Goes to `target`. Returns the travel that it reached if it stopped before; `None` if the hint cannot be shown.
     fn descend(
         &mut self,
-        hint: &LeastClearance,
+        hint: Option<&LeastClearance>,
         target: &GridPoint,
         progress: &mut dyn FnMut(f64),
     ) -> Option<Option<f64>> {
-        let end = self.end;
-        let inside = |travelled: Interval| travelled.lo >= 0.0 && travelled.hi <= end;
-        let side = if hint.travelled < 0.5 * end { 1.0 } else { -1.0 };
-        let point = self.beside(hint.travelled.clamp(0.0, end), side, inside)?;
-        let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
-        self.upper = Some(self.upper_between(point.clone(), point, benches)?);
+        if let Some(hint) = hint {
+            let point = self.inside(hint.travelled)?;
+            let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
+            self.upper = Some(self.upper_between(point.clone(), point, benches)?);
+        }
         Some(self.go_to(target, progress))
+    }
+
+    /// Returns the nearest grid point that is surely inside the show.
+    fn inside(&self, travelled: f64) -> Option<GridPoint> {
+        let end = self.end;
+        let side = if travelled < 0.5 * end { 1.0 } else { -1.0 };
+        self.beside(travelled.clamp(0.0, end), side, |travelled| travelled.lo >= 0.0 && travelled.hi <= end)
     }
 
     /// Returns the metres of travel up to which the search has come.
@@ -294,19 +370,27 @@ impl<'a, 'w> Descent<'a, 'w> {
     }
 
     /// Encloses the least clearance of a show that ends at its start.
-    fn at_start(&mut self, hint: &LeastClearance) -> Option<ClearanceEnclosure> {
-        let after = self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)?;
-        let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
-        self.upper = Some(self.upper_between(self.at.clone(), after.clone(), benches)?);
+    fn at_start(&mut self, hint: Option<&LeastClearance>) -> Option<ClearanceEnclosure> {
+        let after = self.after_start()?;
+        if let Some(hint) = hint {
+            let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
+            self.upper = Some(self.upper_between(self.at.clone(), after.clone(), benches)?);
+        }
         let until = self.go_to(&after, &mut |_| ());
+        self.is_complete = until.is_none();
         Some(self.enclosed(self.upper?, until))
+    }
+
+    /// Returns the first grid point that is surely not before the start.
+    fn after_start(&self) -> Option<GridPoint> {
+        self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)
     }
 
     /// Encloses the least clearance of a show that ends at its first contact. It is 0 if boards are apart at the start,
     /// overlap shortly after the contact, and handles move continuously between the two.
     fn touch(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Option<ClearanceEnclosure> {
         let benches = [event.bench_a?, event.bench_b?].map(|bench| bench as usize);
-        let after = self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)?;
+        let after = self.after_start()?;
         self.floor = Some(0.0);
         let mut until = self.go_to(&after, progress);
         self.floor = None;
@@ -321,6 +405,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         // Without the steps to it, this place shows no upper bound: no step that tests boards comes so far.
         let touch = Upper { value: 0.0, travelled: event.travelled, head: [overlapping.head; 2], benches };
         until = until.or_else(|| self.go_to(&overlapping, progress));
+        self.is_complete = until.is_none();
         if until.is_none() {
             self.write(&contact);
             self.finish = Some(Finish::Contact(benches));
@@ -371,8 +456,12 @@ impl<'a, 'w> Descent<'a, 'w> {
                     progress((self.at.travelled / self.end).max(steps).clamp(0.0, 1.0));
                     false
                 }
-                Err(Refused { nearer: Some(nearer), .. }) => {
+                Err(Refused { nearer: Some(Nearer::Boards(nearer)), .. }) => {
                     self.upper = Some(nearer);
+                    false
+                }
+                Err(Refused { nearer: Some(Nearer::Obstacle(number, nearer)), .. }) => {
+                    self.beside[number].upper = Some(nearer);
                     false
                 }
                 Err(Refused { obstacle, .. }) if length > least => {
@@ -385,6 +474,10 @@ impl<'a, 'w> Descent<'a, 'w> {
                 Err(Refused { obstacle: Obstacle::Stall(_) | Obstacle::Behind, .. }) if self.links == Links::Front => {
                     self.links = Links::All;
                     self.covered = false;
+                    false
+                }
+                Err(Refused { obstacle: Obstacle::Stage(number), .. }) => {
+                    self.beside[number].is_lost = true;
                     false
                 }
                 Err(_) => true,
@@ -417,6 +510,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         self.at = from;
         let ShownStep { step, body_forward } = shown?;
         self.chain.start = self.chain.start.or(step.spans.first().map(|span| span.1));
+        self.add_beside(&step);
         if let Some(metres) = step.apart {
             let least = self.shown.map_or(metres, |(least, _)| least.min(metres));
             self.shown = Some((least, step.to));
@@ -458,17 +552,19 @@ impl<'a, 'w> Descent<'a, 'w> {
                         head: [first_order.at; 2],
                         benches,
                     })
-                    .filter(|nearer| self.upper.is_some_and(|upper| nearer.value < upper.value - 1e-3 * WIDTH));
-                Refused { obstacle: Obstacle::Pair(benches[0], benches[1]), nearer }
+                    .filter(|nearer| self.upper.is_some_and(|upper| nearer.value < upper.value - LOWER));
+                Refused { obstacle: Obstacle::Pair(benches[0], benches[1]), nearer: nearer.map(Nearer::Boards) }
             })?;
         }
+        let beside = self.boards_are_beside(&first_order, points.middle.travelled)?;
         let looks = self.looks_at_boards();
         let FirstOrderStep { listed, places, .. } = first_order;
         let spans: Vec<Span> = listed.handles[1..].iter().map(|handle| handle.span).collect();
         let Span(from, to) = listed.handles[0].span;
-        let (apart, at) = if looks { (Some(self.threshold()), places) } else { (None, Vec::new()) };
-        let step =
-            Step { links: self.links, from, to, moving: false, clear: false, spans, free: Vec::new(), apart, at };
+        let apart = looks.then(|| self.threshold());
+        let at = if looks || !beside.is_empty() { places } else { Vec::new() };
+        let (links, free) = (self.links, Vec::new());
+        let step = Step { links, from, to, moving: false, clear: false, spans, free, apart, beside, at };
         Ok(ShownStep { step, body_forward: listed.body_forward })
     }
 }

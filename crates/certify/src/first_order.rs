@@ -49,6 +49,9 @@ pub(super) enum When {
 /// A direction fixed to a board: components along the board's axis and a quarter turn to the left of it, not both 0.
 pub(super) type Direction = [f64; 2];
 
+/// The normals of a board's sides.
+pub(super) const SIDES: [Direction; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+
 /// A first-order enclosure of a board, from its two handles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FirstOrderBoard {
@@ -183,19 +186,66 @@ impl FirstOrderBoard {
 
     /// Returns an enclosure of the gap between this board and another along a direction fixed to this board.
     pub fn gap(&self, other: &Self, direction: Direction, when: When) -> Interval {
+        let corners = [(false, false), (false, true), (true, false), (true, true)];
+        self.gap_along(direction, corners.map(|corner| other.corner(self, corner, when)), when)
+    }
+
+    /// Returns an enclosure of the gap between this board and the convex hull of some points, at least one, along a
+    /// direction fixed to this board.
+    pub fn gap_to(&self, points: &[Vector], direction: Direction, when: When) -> Interval {
+        let Self { front, rear, .. } = self;
+        let middle = |one: Vector, other: Vector| plus(one, other).map(|sum| sum * 0.5);
+        let (at, by) = (middle(front.point, rear.point), middle(front.velocity, rear.velocity));
+        let seen = |point: &Vector| {
+            let error = (front.error(when) + rear.error(when)) * 0.5;
+            Linear { at: minus(*point, at), by: by.map(std::ops::Neg::neg), error }
+        };
+        self.gap_along(direction, points.iter().map(seen), when)
+    }
+
+    /// Returns the gap between this board and points relative to the middle of its handles.
+    fn gap_along(&self, direction: Direction, points: impl IntoIterator<Item = Linear>, when: When) -> Interval {
         let along = self.along(when);
         let normal = Linear { at: turned(along.at, direction), by: turned(along.by, direction), error: along.error };
         let size = norm(direction.map(Interval::point));
         let [ahead, left] = direction.map(f64::abs);
         let support = self.half_length * ahead + self.half_width * left;
+        let reaches = points.into_iter().map(|point| self.reach(&normal, size, &point, when));
+        let least = reaches.reduce(Interval::min).unwrap_or(Interval::point(f64::NEG_INFINITY));
+        (least.over(self.link) - support).over(size)
+    }
+
+    /// Returns a lower bound of the gap between this board and the convex hull of some points along a direction that
+    /// stands still.
+    pub fn least_gap_along(&self, n: Direction, points: &[Vector], when: When) -> f64 {
+        let axis = n.map(Interval::point);
+        let size = norm(axis);
+        let step = if when == When::Middle { Interval::ZERO } else { Interval::within(self.half_step) };
         let corners = [(false, false), (false, true), (true, false), (true, true)];
-        let reach = |corner| self.reach(&normal, size, &other.corner(self, corner, when), when);
-        let [first, second, third, last] = corners.map(reach);
-        (first.min(second).min(third.min(last)).over(self.link) - support).over(size)
+        let most = corners.into_iter().map(|corner| {
+            let Linear { at, by, error } = self.corner_on_stage(corner, when);
+            dot(axis, at) + dot(axis, by) * step + size * error
+        });
+        let most = most.map(|reach| reach.hi).fold(f64::NEG_INFINITY, f64::max);
+        let gaps = points.iter().map(|point| (dot(axis, *point) - Interval::point(most)).over(size).lo);
+        gaps.fold(f64::INFINITY, f64::min)
     }
 
     /// Returns a corner of this board, relative to the middle of the handles of another.
-    fn corner(&self, seen_from: &Self, (ahead, left): (bool, bool), when: When) -> Linear {
+    fn corner(&self, seen_from: &Self, corner: (bool, bool), when: When) -> Linear {
+        let Linear { at, by, error } = self.corner_on_stage(corner, when);
+        let middle = |one: Vector, other: Vector| plus(one, other).map(|sum| sum * 0.5);
+        let (own_front, own_rear) = (&seen_from.front, &seen_from.rear);
+        let own_error = (own_front.error(when) + own_rear.error(when)) * 0.5;
+        Linear {
+            at: minus(at, middle(own_front.point, own_rear.point)),
+            by: minus(by, middle(own_front.velocity, own_rear.velocity)),
+            error: error + own_error,
+        }
+    }
+
+    /// Returns a corner of this board.
+    fn corner_on_stage(&self, (ahead, left): (bool, bool), when: When) -> Linear {
         let Self { front, rear, link, half_length, half_width, .. } = self;
         let along = self.along(when);
         // Multiplied by the link vector, these shares are metres.
@@ -203,22 +253,19 @@ impl FirstOrderBoard {
         let share = if ahead { share } else { -share };
         let aside = half_width.over(*link);
         let side = if left { aside } else { -aside };
-        let of = |middle: Vector, along: Vector, own: Vector| {
+        let of = |middle: Vector, along: Vector| {
             let across = [-along[1], along[0]];
-            minus(plus(middle, plus(scaled(along, share), scaled(across, side))), own)
+            plus(middle, plus(scaled(along, share), scaled(across, side)))
         };
         let middle = |one: Vector, other: Vector| plus(one, other).map(|sum| sum * 0.5);
-        let (own_front, own_rear) = (&seen_from.front, &seen_from.rear);
-        let own_error = (own_front.error(when) + own_rear.error(when)) * 0.5;
         // The corner is (1/2 + share) front + (1/2 - share) rear + aside: errors have the same factors.
         let half = Interval::point(0.5);
         let error = (half + share).abs() * front.error(when).hi
             + (half - share).abs() * rear.error(when).hi
-            + aside * along.error.hi
-            + own_error;
+            + aside * along.error.hi;
         Linear {
-            at: of(middle(front.point, rear.point), along.at, middle(own_front.point, own_rear.point)),
-            by: of(middle(front.velocity, rear.velocity), along.by, middle(own_front.velocity, own_rear.velocity)),
+            at: of(middle(front.point, rear.point), along.at),
+            by: of(middle(front.velocity, rear.velocity), along.by),
             error,
         }
     }
@@ -249,11 +296,38 @@ impl FirstOrderBoard {
         (point, (off(front) + off(rear)) * (Interval::point(0.5) + along.abs() + aside.abs()))
     }
 
+    /// Returns an upper bound of the distance of a fixed point from the nearest point of the board; of a point inside
+    /// the board at every moment, minus the least translation that frees it.
+    pub fn at_most_to(&self, target: [f64; 2], when: When) -> f64 {
+        let fixed = target.map(Interval::point);
+        let gap = |direction| self.gap_to(&[fixed], direction, when).hi;
+        let separation = SIDES.map(gap).into_iter().fold(f64::NEG_INFINITY, f64::max);
+        if separation <= 0.0 {
+            return separation;
+        }
+        let board = self.in_doubles();
+        let offset = Point::from(target) - board.centre;
+        let (own, error) = self.point((board.axis.dot(&offset), board.across().dot(&offset)), when);
+        (norm(minus(own, fixed)) + error).hi
+    }
+
+    /// Returns true if the point of the front handle's place is in the board in the middle of the step, and stays in it
+    /// if the board is moved by `metres`.
+    pub fn holds_front_point(&self, metres: f64) -> bool {
+        let inset = self.half_length - self.link * 0.5;
+        (Interval::point(self.front.still) + Interval::point(metres)).is_below(inset.min(self.half_width))
+    }
+
+    /// Returns the point of the front handle's place in the middle of the step, in doubles.
+    pub fn front_point(&self) -> [f64; 2] {
+        self.front.point.map(Interval::middle)
+    }
+
     /// Returns an upper bound of the clearance of two boards.
     pub fn at_most(&self, other: &Self, when: When) -> f64 {
         let most = |one: &Self, other: &Self| {
             let gap = |direction| one.gap(other, direction, when).hi;
-            [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].map(gap).into_iter().fold(f64::NEG_INFINITY, f64::max)
+            SIDES.map(gap).into_iter().fold(f64::NEG_INFINITY, f64::max)
         };
         let separation = most(self, other).max(most(other, self));
         if separation <= 0.0 {

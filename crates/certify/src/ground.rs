@@ -1,7 +1,8 @@
-//! Lemma 9 of `docs/proofs.md`: boards that stay clear of the obstacles of a stage over a step, and boards that have
-//! come to one.
+//! Lemmas 9 and 11 of `docs/proofs.md`: boards that stay clear of the obstacles of a stage over a step, or further away
+//! than a number of metres, and boards that have come to one.
 
 use super::boards::MovingBoard;
+use super::first_order::{FirstOrderBoard, When};
 use super::interval::{Interval, Vector, minus, norm};
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::ground::Obstacle;
@@ -11,6 +12,9 @@ use bench_dragon_motion::model::{self, Point};
 
 /// Rounding of a corner in the path's own coordinates, as a share of the coordinates.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Metres of an overlap with an outline that is no more than a touch.
+const DEEPEST: f64 = 1e-10;
 
 /// An obstacle in the path's own coordinates.
 pub(super) struct Barrier {
@@ -56,6 +60,57 @@ impl Barrier {
             let directions = [on_side - on_board, normal, -normal].into_iter().chain(along_faces);
             directions.filter(|n| n.norm() > 0.0).any(|n| moving.is_clear_along([n.x, n.y], &corners, metres))
         })
+    }
+
+    /// Returns true if the clearance of a board is proved to be more than `clearance` metres throughout a step.
+    pub fn is_further_than(&self, clearance: f64, board: &BoardOverStep) -> bool {
+        let Self { obstacle: Obstacle { shape, keep_out, .. }, rounding } = self;
+        let ([x, y], radius) = board.moving.disc();
+        let axis = model::Vector::new(1.0, 0.0);
+        let disc = Board { centre: Point::new(x, y), axis, half_length: radius, half_width: 0.0 };
+        let most = keep_out + clearance + rounding;
+        if most >= 0.0 && shape.coarse_bound(&disc) > most {
+            return true;
+        }
+        let in_doubles = board.in_doubles();
+        let metres = most + shape.radius();
+        let found: Vec<_> = shape.sides().zip(shape.side_distances(&in_doubles)).collect();
+        let is_clear = |metres: f64, sides: &[Side]| board.is_clear_of(sides, metres, &in_doubles);
+        let sides: Vec<Side> = (found.into_iter())
+            .map(|((from, to), (_, on_board, on_side))| Side { from, to, towards: on_side - on_board })
+            .collect();
+        if shape.kind() == ShapeKind::Circle {
+            return is_clear(metres, &[Side { to: sides[0].from, ..sides[0] }]);
+        }
+        let size = metres.abs();
+        let near: Vec<Side> = sides.into_iter().filter(|side| !is_clear(size, &[*side])).collect();
+        if !(near.is_empty() || metres < 0.0 && is_clear(metres, &near)) {
+            return false;
+        }
+        // Inside or outside: a point that is in the board, also where the board is moved out of the shape.
+        let pin = Board { centre: board.inner_point(), half_length: 0.0, half_width: 0.0, ..in_doubles };
+        let is_inner = board.first_order.is_none_or(|(first, _)| first.holds_front_point(metres.min(0.0).abs()));
+        shape.kind() == ShapeKind::Line || is_inner && shape.signed_distance(&pin) > *rounding
+    }
+
+    /// Returns true if a least clearance can be enclosed: of an overlap with a shape other than a circle it cannot.
+    pub fn is_decidable(&self, clearance: f64) -> bool {
+        let Obstacle { shape, keep_out, .. } = &self.obstacle;
+        shape.kind() == ShapeKind::Circle || clearance + keep_out > -DEEPEST
+    }
+
+    /// Returns an upper bound of the clearance of a board, metres.
+    pub fn at_most(&self, board: &FirstOrderBoard, when: When) -> f64 {
+        let Self { obstacle: Obstacle { shape, keep_out, .. }, rounding } = self;
+        let in_doubles = board.in_doubles();
+        let on_shape = shape.sides().zip(shape.side_distances(&in_doubles));
+        let points = on_shape.map(|((from, _), (_, _, on_side))| match shape.kind() {
+            ShapeKind::Circle => from,
+            _ => on_side,
+        });
+        let least = points.map(|point| board.at_most_to([point.x, point.y], when)).fold(f64::INFINITY, f64::min);
+        let less = Interval::point(least) - Interval::point(shape.radius()) - Interval::point(*keep_out);
+        (less + Interval::point(*rounding)).hi
     }
 
     /// Returns a point of a board that is proved to be within the keep-out throughout the step.
@@ -118,5 +173,51 @@ impl Barrier {
             // Where nothing has to be kept away from, the point of the side itself is in the board.
             if most == 0.0 { metres <= *rounding } else { metres + rounding <= most }
         })
+    }
+}
+
+/// A board over a step, by its capsules and, if they are known, by first-order enclosures.
+pub(super) struct BoardOverStep<'b> {
+    pub moving: MovingBoard,
+    pub first_order: Option<(&'b FirstOrderBoard, When)>,
+}
+
+/// A side of a shape, with the vector to it from the nearest point of a board.
+#[derive(Clone, Copy)]
+struct Side {
+    from: Point,
+    to: Point,
+    towards: model::Vector,
+}
+
+impl BoardOverStep<'_> {
+    fn in_doubles(&self) -> Board {
+        self.first_order.map_or_else(|| self.moving.in_doubles(), |(first, _)| first.in_doubles())
+    }
+
+    /// Returns the point of the board of which it is tested that it is outside a shape.
+    fn inner_point(&self) -> Point {
+        self.first_order.map_or_else(|| self.moving.front_point(), |(first, _)| first.front_point()).into()
+    }
+
+    /// Returns true if the board is proved to be further than `metres` from the convex hull of some sides, along one of
+    /// some directions. A negative number means an overlap less deep.
+    fn is_clear_of(&self, sides: &[Side], metres: f64, board: &Board) -> bool {
+        let corners: Vec<Point> = sides.iter().flat_map(|side| [side.from, side.to]).collect();
+        let along_faces = [board.axis, -board.axis, board.across(), -board.across()];
+        let of_sides = sides.iter().flat_map(|Side { from, to, towards }| {
+            let along = to - from;
+            let normal = model::Vector::new(-along.y, along.x);
+            [*towards, normal, -normal]
+        });
+        let mut directions = of_sides.chain(along_faces).filter(|n| n.norm() > 0.0);
+        let of_first_order = |n: &model::Vector| {
+            self.first_order.is_some_and(|(first, when)| {
+                let points: Vec<Vector> = corners.iter().map(|at| [at.x, at.y].map(Interval::point)).collect();
+                first.least_gap_along([n.x, n.y], &points, when) > metres
+                    || first.gap_to(&points, [board.axis.dot(n), board.across().dot(n)], when).lo > metres
+            })
+        };
+        directions.any(|n| self.moving.is_clear_along([n.x, n.y], &corners, metres) || of_first_order(&n))
     }
 }

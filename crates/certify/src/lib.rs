@@ -6,6 +6,7 @@
 //! ordinary search only suggests where to search: an event that it misses makes the proof fail. Lemmas and file format:
 //! `docs/proofs.md`.
 
+mod between;
 mod boards;
 mod capsule;
 mod clearance;
@@ -28,13 +29,15 @@ mod turn;
 
 use std::io;
 
+pub use between::certify_several;
 pub use capsule::Span;
 pub use clearance::{
-    ClearanceEnclosure, MOST_CLEARANCE_STEPS, Write, certify_least_clearance, enclose_least_clearance,
+    ClearanceEnclosure, ClearanceEnclosures, ClearanceHints, MOST_CLEARANCE_STEPS, ObstacleEnclosure, Write,
+    certify_least_clearance, enclose_least_clearance,
 };
 pub use lines::{
-    About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedPitch, CertifiedSpeed, FORMAT, Links, Status,
-    Step, Until, WIDE,
+    About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedObstacleClearance, CertifiedPitch,
+    CertifiedSpeed, FORMAT, Links, Status, Step, Until, WIDE,
 };
 pub use path::Place;
 
@@ -66,6 +69,8 @@ pub(crate) struct Given<'a> {
     head_speed: f64,
     events: &'a [Event],
     most_steps: u64,
+    /// The number of the dragon and its delay in seconds, in a show of several.
+    dragon: Option<(usize, f64)>,
 }
 
 /// Certifies the events of a motion. `scene` is the text of its scene. `write` receives each line of the certificate,
@@ -90,6 +95,7 @@ pub fn certify(
         head_speed: motion.head_speed(),
         events: &events,
         most_steps,
+        dragon: None,
     };
     search::CertificateSearch::new(given, ground::barriers(motion), write).run(progress)
 }

@@ -69,6 +69,23 @@ pub enum CertificateLine<'a> {
         /// Metres.
         most: f64,
     },
+    /// The clearance of an obstacle is no more than a number of metres.
+    NearObstacle {
+        /// The obstacle's number on the stage, the boundary last.
+        obstacle: usize,
+        /// The bench, counted from 0.
+        bench: usize,
+        /// The first place of the head.
+        from: Place,
+        /// The last place of the head.
+        to: Place,
+        /// The spans of the handles from 1 on.
+        spans: Vec<Span>,
+        /// A place of each of these spans, the head's first.
+        at: Vec<Place>,
+        /// Metres.
+        most: f64,
+    },
     /// A board is within the keep-out of an obstacle.
     Reached {
         /// The obstacle's number on the stage, the boundary last.
@@ -115,10 +132,46 @@ pub enum CertificateLine<'a> {
     },
     /// The last step has reached the path's end.
     PathEnd,
+    /// The lines about one of several dragons follow.
+    Dragon {
+        /// The dragon, counted from 0.
+        dragon: usize,
+    },
+    /// The lines about two of several dragons follow.
+    Pair {
+        /// The two, counted from 0.
+        dragons: [usize; 2],
+    },
+    /// No boards of the two dragons touch from one time to another.
+    Both {
+        /// Seconds of the show.
+        from: f64,
+        /// Seconds of the show.
+        to: f64,
+        /// The spans of both heads meanwhile.
+        heads: [Span; 2],
+        /// The spans of the handles from 1 on of each.
+        spans: [Vec<Span>; 2],
+    },
+    /// Two boards of the two dragons have a point in common at a time.
+    Meeting {
+        /// A bench of each, counted from 0.
+        benches: [usize; 2],
+        /// Seconds of the show.
+        time: f64,
+        /// The spans of both heads at that time.
+        heads: [Span; 2],
+        /// The spans of the handles from 1 on of each.
+        spans: [Vec<Span>; 2],
+        /// The point, metres of the stage.
+        point: [f64; 2],
+    },
     /// The result for one kind of event.
     Result(CertifiedEvent),
     /// The result for the least clearance.
     LeastClearance(CertifiedClearance),
+    /// The result for the least clearance of an obstacle.
+    ObstacleClearance(CertifiedObstacleClearance),
     /// The speeds of all handles over a step of the head.
     Speeds {
         /// The first place of the head.
@@ -255,6 +308,24 @@ pub struct CertifiedClearance {
     pub bench_b: Option<usize>,
 }
 
+/// The certified least clearance of an obstacle, from the scene's start on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertifiedObstacleClearance {
+    /// The obstacle's number on the stage, the boundary last.
+    pub obstacle: usize,
+    /// Metres: no board's clearance is less.
+    pub lo: Option<f64>,
+    /// Metres: at one place the bench's clearance is no more.
+    pub hi: Option<f64>,
+    /// The end of the stretch: the path's end or a time.
+    pub until: Until,
+    /// Simulated seconds of that end, for [`Until::Time`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_until: Option<f64>,
+    /// The bench, counted from 0.
+    pub bench: Option<usize>,
+}
+
 /// A step of the head, and the statements that hold throughout it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Step {
@@ -276,7 +347,10 @@ pub struct Step {
     /// Metres that boards are further apart in this step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub apart: Option<f64>,
-    /// A place of each span, the head's first, for `apart`.
+    /// By obstacle: metres that its clearance is more than in this step, if it is claimed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub beside: Vec<Option<f64>>,
+    /// A place of each span, the head's first, for `apart` and `beside`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub at: Vec<Place>,
 }
@@ -290,6 +364,10 @@ pub struct CertifiedEvent {
     /// The number of the obstacle on the stage, the boundary last; `None` for other kinds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<usize>,
+    /// In a show of several dragons, the dragon that the result is about, or the two, counted from 0. Benches are
+    /// counted within each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dragons: Vec<usize>,
     /// The result.
     #[serde(flatten)]
     pub status: Status,

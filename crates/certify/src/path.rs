@@ -4,9 +4,11 @@
 use serde::{Serialize, Serializer};
 
 use super::elementary::{atan, ln, pi, sin_cos};
-use super::interval::{Interval, Vector, cross, plus, scaled};
+use super::interval::{Interval, Vector, cross, minus, plus, scaled};
 use bench_dragon_motion::model::curve::Side;
 use bench_dragon_motion::model::description::{PathDescription, RouteStep};
+use bench_dragon_motion::model::double_double::DoubleDouble;
+use bench_dragon_motion::model::spiral::Direction;
 
 /// A place on the path: a segment, counted from 0, and a coordinate on it. The coordinate is the exact sum of two
 /// doubles, of which the second is at most half a unit in the last place of the first.
@@ -69,10 +71,32 @@ impl Serialize for Place {
 /// A curve of the path.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Curve {
-    Inward { a: Interval },
-    Outward { a: Interval },
+    Inward { a: Interval, frame: Option<Frame> },
+    Outward { a: Interval, frame: Option<Frame> },
     Line { origin: Vector, direction: Vector },
     Arc { origin: Vector, direction: Vector, inward: Vector, radius: Interval },
+}
+
+/// The place of a route's spiral: the spiral about the origin is mirrored, rotated and moved.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    centre: Vector,
+    /// Cosine and sine of the rotation.
+    rotation: Vector,
+    /// True if y goes to -y first.
+    is_mirrored: bool,
+}
+
+impl Frame {
+    fn vector(&self, [x, y]: Vector) -> Vector {
+        let ([cosine, sine], y) = (self.rotation, if self.is_mirrored { -y } else { y });
+        [cosine * x - sine * y, sine * x + cosine * y]
+    }
+}
+
+/// Returns a curvature to the left, or its rate, in a frame.
+fn bend_in(frame: Option<Frame>, bend: Interval) -> Interval {
+    if frame.is_some_and(|frame| frame.is_mirrored) { -bend } else { bend }
 }
 
 /// A segment: its curve, and its first and last coordinates in the direction of travel.
@@ -110,8 +134,8 @@ impl Curve {
             if low == Interval::ZERO { factor * high } else { factor * high + factor * low }
         };
         match *self {
-            Self::Inward { a } => scaled([cosine, sine], times(a)),
-            Self::Outward { a } => scaled([cosine, sine], -times(a)),
+            Self::Inward { a, frame } => placed(frame, scaled([cosine, sine], times(a))),
+            Self::Outward { a, frame } => placed(frame, scaled([cosine, sine], -times(a))),
             Self::Line { origin, direction } => plus(origin, direction.map(times)),
             Self::Arc { origin, direction, inward, radius } => {
                 let versine = Interval::ONE - cosine;
@@ -129,9 +153,10 @@ impl Curve {
 
     fn tangent_of(&self, at: Interval, (sine, cosine): (Interval, Interval)) -> Vector {
         match *self {
-            Self::Inward { .. } | Self::Outward { .. } => {
+            Self::Inward { frame, .. } | Self::Outward { frame, .. } => {
                 let per_metre = -Interval::ONE.over((Interval::ONE + at.square()).sqrt());
-                scaled([cosine - at * sine, sine + at * cosine], per_metre)
+                let tangent = scaled([cosine - at * sine, sine + at * cosine], per_metre);
+                frame.map_or(tangent, |frame| frame.vector(tangent))
             }
             Self::Line { direction, .. } => direction,
             Self::Arc { direction, inward, .. } => plus(scaled(direction, cosine), scaled(inward, sine)),
@@ -149,8 +174,8 @@ impl Curve {
             Interval { lo: at(greatest).lo.max(0.0), hi: at(least).hi }
         };
         match *self {
-            Self::Inward { a } => -of_spiral(a),
-            Self::Outward { a } => of_spiral(a),
+            Self::Inward { a, frame } => bend_in(frame, -of_spiral(a)),
+            Self::Outward { a, frame } => bend_in(frame, of_spiral(a)),
             Self::Line { .. } => Interval::ZERO,
             Self::Arc { direction, inward, radius, .. } => {
                 let bend = Interval::ONE.over(radius);
@@ -163,10 +188,11 @@ impl Curve {
     /// w^6).
     fn bend_rate(&self, one: Interval, other: Interval) -> Interval {
         match *self {
-            Self::Inward { a } | Self::Outward { a } => {
+            Self::Inward { a, frame } | Self::Outward { a, frame } => {
                 let theta = Interval { lo: one.min(other).lo, hi: one.max(other).hi };
                 let (square, w_square) = (theta.square(), Interval::ONE + theta.square());
-                -(theta * (square + Interval::point(4.0))).over((a * w_square).square() * w_square)
+                let rate = -(theta * (square + Interval::point(4.0))).over((a * w_square).square() * w_square);
+                bend_in(frame, rate)
             }
             Self::Line { .. } | Self::Arc { .. } => Interval::ZERO,
         }
@@ -175,7 +201,7 @@ impl Curve {
     /// Returns an upper bound of the metres between two coordinates that are `between` apart.
     fn length(&self, between: Interval, one: Interval, other: Interval) -> f64 {
         match *self {
-            Self::Inward { a } | Self::Outward { a } => {
+            Self::Inward { a, .. } | Self::Outward { a, .. } => {
                 (between * a * (Interval::ONE + one.max(other).square()).sqrt()).hi
             }
             Self::Line { .. } => between.hi,
@@ -228,7 +254,7 @@ impl ExactPath {
         let first_radius = second_radius * arc_ratio;
         let angle = atan(theta) * 2.0;
         let turn = sin_cos_of(theta);
-        let inward = Curve::Inward { a };
+        let inward = Curve::Inward { a, frame: None };
         let (start, tangent) = (inward.point_of(exactly(theta), turn), inward.tangent_of(theta, turn));
         let right: Vector = [tangent[1], -tangent[0]];
         let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
@@ -245,7 +271,12 @@ impl ExactPath {
             Segment { curve: inward, begin: far, end: theta, travelled: lead_in },
             Segment { curve: first, begin: zero, end: angle, travelled: lead_in },
             Segment { curve: second, begin: zero, end: angle, travelled: arc_end },
-            Segment { curve: Curve::Outward { a }, begin: theta, end: far, travelled: arc_end + second_radius * angle },
+            Segment {
+                curve: Curve::Outward { a, frame: None },
+                begin: theta,
+                end: far,
+                travelled: arc_end + second_radius * angle,
+            },
         ];
         Self { segments }
     }
@@ -253,7 +284,7 @@ impl ExactPath {
     /// Creates an inward spiral alone, of `a` metres per radian. The head reaches its end at the centre after
     /// `travelled` metres.
     pub fn inward(a: Interval, travelled: Interval) -> Self {
-        let (curve, begin) = (Curve::Inward { a }, Interval::point(FAR));
+        let (curve, begin) = (Curve::Inward { a, frame: None }, Interval::point(FAR));
         Self { segments: vec![Segment { curve, begin, end: Interval::ZERO, travelled }] }
     }
 
@@ -311,7 +342,7 @@ impl ExactPath {
         let Place(segment, at, _) = place;
         let Segment { curve, begin, end, .. } = &self.segments[segment];
         let rate = match curve {
-            Curve::Inward { a } | Curve::Outward { a } => a.lo * 1f64.hypot(at),
+            Curve::Inward { a, .. } | Curve::Outward { a, .. } => a.lo * 1f64.hypot(at),
             Curve::Line { .. } => 1.0,
             Curve::Arc { radius, .. } => radius.lo,
         };
@@ -330,7 +361,7 @@ impl ExactPath {
         let last = segment + 1 == self.segments.len();
         if metres >= 0.0 && last {
             // The centre of a spiral.
-            return Place(segment, end.hi, 0.0);
+            return Place(segment, if curve.grows() { end.hi } else { 0.0 }, 0.0);
         }
         let beyond = if metres >= 0.0 { self.after(segment) } else { self.before(segment) };
         // The first segment has no beginning to fall off.
@@ -401,9 +432,8 @@ impl ExactPath {
     pub fn bend(&self, x: Place, y: Place) -> Interval {
         let bends = (x.0..=y.0).map(|segment| {
             let Segment { curve, begin, end, .. } = &self.segments[segment];
-            // A place that is outside the segment by rounding bends more, if anything.
-            let from = if segment == x.0 { x.coordinate() } else { Interval::point(begin.lo) };
-            let to = if segment == y.0 { y.coordinate() } else { Interval::point(end.lo) };
+            let from = if segment == x.0 { x.coordinate() } else { *begin };
+            let to = if segment == y.0 { y.coordinate() } else { *end };
             curve.bend(from.min(to).lo, from.max(to).hi)
         });
         let hull = |a: Interval, b: Interval| Interval { lo: a.lo.min(b.lo), hi: a.hi.max(b.hi) };
@@ -422,8 +452,8 @@ impl ExactPath {
         let at = place.coordinate();
         let reference = if begin.lo.is_infinite() { *end } else { *begin };
         match *curve {
-            Curve::Inward { a } => *travelled - (spiral_length(a, at) - spiral_length(a, reference)),
-            Curve::Outward { a } => *travelled + (spiral_length(a, at) - spiral_length(a, reference)),
+            Curve::Inward { a, .. } => *travelled - (spiral_length(a, at) - spiral_length(a, reference)),
+            Curve::Outward { a, .. } => *travelled + (spiral_length(a, at) - spiral_length(a, reference)),
             Curve::Line { .. } => *travelled + (at - reference),
             Curve::Arc { radius, .. } => *travelled + radius * (at - reference),
         }
@@ -438,10 +468,11 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
     let curve = Curve::Line { origin, direction };
     let mut segments = vec![Segment { curve, begin: Interval::point(-FAR), end: zero, travelled: zero }];
     for step in steps {
-        let (curve, end, length) = match *step {
+        // The last place: its coordinate as a sum, with its sine and cosine.
+        let (curve, [begin, end], length, (last, sin_cos)) = match *step {
             RouteStep::Line { length } => {
                 let length = Interval::point(length);
-                (Curve::Line { origin, direction }, length, length)
+                (Curve::Line { origin, direction }, [zero, length], length, (exactly(length), sin_cos_of(length)))
             }
             RouteStep::Arc { side, radius, turns: by } => {
                 let [x, y] = direction;
@@ -449,19 +480,78 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
                 let radius = Interval::point(radius);
                 let angle = pi() * 2.0 * by;
                 turns = if side == Side::Left { turns + Interval::point(by) } else { turns - Interval::point(by) };
-                (Curve::Arc { origin, direction, inward, radius }, angle, radius * angle)
+                let curve = Curve::Arc { origin, direction, inward, radius };
+                (curve, [zero, angle], radius * angle, (exactly(angle), sin_cos_of(angle)))
+            }
+            RouteStep::Spiral { side, direction: way, pitch, radius, turns: by } => {
+                let a = Interval::point(pitch).over(pi() * 2.0);
+                let [first, last] = spiral_ends(way, pitch, radius, by);
+                let ends = [first, last].map(|DoubleDouble { high, low }| Interval::point(high) + Interval::point(low));
+                let [inner, outer] = if way == Direction::Inward { [ends[1], ends[0]] } else { ends };
+                let turned = Interval::point(by) + (atan(outer) - atan(inner)).over(pi() * 2.0);
+                turns = if side == Side::Left { turns + turned } else { turns - turned };
+                let [first, last] = [first, last].map(|end| nearly(end, outer.hi));
+                let curve = spiral_from(a, way, side, (origin, direction), first);
+                (curve, ends, spiral_length(a, outer) - spiral_length(a, inner), last)
             }
         };
-        segments.push(Segment { curve, begin: zero, end, travelled });
+        segments.push(Segment { curve, begin, end, travelled });
         travelled = travelled + length;
-        origin = curve.point_of(exactly(end), sin_cos_of(end));
+        origin = curve.point_of(last, sin_cos);
         direction = of_turns(turns);
     }
     ExactPath { segments }
 }
 
+/// The relative error of [`spiral_ends`]: some hundred times that of a few operations of [`DoubleDouble`].
+const OF_SUMS: f64 = 1e-28;
+
+/// Returns the polar angles at the ends of a route's spiral, within a part [`OF_SUMS`] of the greater one.
+fn spiral_ends(way: Direction, pitch: f64, radius: f64, turns: f64) -> [DoubleDouble; 2] {
+    let DoubleDouble { high, low } = DoubleDouble::quotient(radius, pitch);
+    let first = DoubleDouble::from_turns(high).plus(std::f64::consts::TAU * low);
+    let sign = if way == Direction::Inward { -1.0 } else { 1.0 };
+    let around = DoubleDouble::from_turns(turns);
+    [first, first.plus(sign * around.high).plus(sign * around.low)]
+}
+
+/// Returns a polar angle with the error of [`spiral_ends`] as a sum of two numbers, and its sine and cosine.
+fn nearly(DoubleDouble { high, low }: DoubleDouble, greatest: f64) -> ([Interval; 2], (Interval, Interval)) {
+    let error = Interval::within(OF_SUMS * greatest);
+    let (sine, cosine) = sin_cos_at(Place(0, high, low));
+    ([Interval::point(high), Interval::point(low) + error], (sine + error, cosine + error))
+}
+
+/// Creates the spiral that has a given point and direction at its first polar angle, its centre on one side.
+fn spiral_from(
+    a: Interval,
+    way: Direction,
+    side: Side,
+    (origin, direction): (Vector, Vector),
+    (first, sin_cos): ([Interval; 2], (Interval, Interval)),
+) -> Curve {
+    let of = |frame| match way {
+        Direction::Inward => Curve::Inward { a, frame },
+        Direction::Outward => Curve::Outward { a, frame },
+    };
+    let is_mirrored = (way == Direction::Outward) != (side == Side::Left);
+    let about_origin = of(None);
+    let (point, tangent) =
+        (about_origin.point_of(first, sin_cos), about_origin.tangent_of(first[0] + first[1], sin_cos));
+    // Direction over tangent, as complex numbers.
+    let [x, y] = if is_mirrored { [tangent[0], -tangent[1]] } else { tangent };
+    let rotation = [direction[0] * x + direction[1] * y, direction[1] * x - direction[0] * y];
+    let turned = Frame { centre: [Interval::ZERO; 2], rotation, is_mirrored };
+    of(Some(Frame { centre: minus(origin, turned.vector(point)), ..turned }))
+}
+
+/// Returns a point in a frame.
+fn placed(frame: Option<Frame>, point: Vector) -> Vector {
+    frame.map_or(point, |frame| plus(frame.centre, frame.vector(point)))
+}
+
 /// Returns the direction `turns` turns counter-clockwise from x.
-fn of_turns(turns: Interval) -> Vector {
+pub(super) fn of_turns(turns: Interval) -> Vector {
     let (sine, cosine) = sin_cos_of(pi() * 2.0 * turns);
     [cosine, sine]
 }

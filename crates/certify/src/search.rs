@@ -16,23 +16,23 @@ use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::path::Path;
 
 /// Half width of the proved interval of an event, seconds.
-const AROUND: f64 = 1e-10;
+pub(super) const AROUND: f64 = 1e-10;
 
 /// Distance that doubles can resolve, as a share of the path length in metres.
 pub(super) const LEAST: f64 = 1e-13;
 
 /// The shortest step, as a share of the path length in metres.
-const LEAST_STEP: f64 = 2e-15;
+pub(super) const LEAST_STEP: f64 = 2e-15;
 
 /// Share of the distance from an event to which the nearest place beyond it is found at which the event is shown.
-const BESIDE: f64 = 0.1;
+pub(super) const BESIDE: f64 = 0.1;
 
 /// Factors of the step length after a step that is shown, and after a step that is not.
-const GROWTH: f64 = 1.3;
-const SHRINK: f64 = 0.5;
+pub(super) const GROWTH: f64 = 1.3;
+pub(super) const SHRINK: f64 = 0.5;
 
 /// Distance from an event, in links, within which a failed step is explained by the event.
-const NEAR: f64 = 1e-3;
+pub(super) const NEAR: f64 = 1e-3;
 
 pub(super) struct CertificateSearch<'a, 'w> {
     given: Given<'a>,
@@ -49,12 +49,32 @@ pub(super) struct CertificateSearch<'a, 'w> {
     /// True if Lemma 4 may still be used.
     covered: bool,
     proofs: [Option<Status>; 4],
+    /// True if the path's end is shown.
+    ends_with_path: bool,
     /// The obstacles of which steps still claim to stay clear, and by obstacle the result.
     free: Vec<usize>,
     of_obstacles: Vec<Option<Status>>,
     /// Length of the next step to try, metres.
     step: f64,
     steps: u64,
+}
+
+/// What the lines about one dragon prove.
+pub(super) struct Section {
+    pub events: Vec<CertifiedEvent>,
+    /// The place of the head at the end of the last step.
+    pub end: Place,
+    pub ends_with_path: bool,
+    pub locks: bool,
+}
+
+/// Writes the first line of a certificate of events.
+pub(super) fn first_line(
+    write: &mut dyn FnMut(&CertificateLine) -> io::Result<()>,
+    scene: &str,
+) -> Result<(), CertifyError> {
+    let (version, format) = (env!("CARGO_PKG_VERSION"), super::FORMAT);
+    Ok(write(&CertificateLine::Certificate { format, version, about: None, scene })?)
 }
 
 /// The reason for the end of a search.
@@ -98,6 +118,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             clear: true,
             covered: true,
             proofs,
+            ends_with_path: false,
             free,
             of_obstacles,
             step,
@@ -106,10 +127,13 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     }
 
     /// Writes the certificate and returns what it proves.
-    pub fn run(mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<CertifiedEvent>, CertifyError> {
-        let (version, scene) = (env!("CARGO_PKG_VERSION"), self.given.scene);
-        (self.write)(&CertificateLine::Certificate { format: super::FORMAT, version, about: None, scene })
-            .map_err(CertifyError::Write)?;
+    pub fn run(self, progress: &mut dyn FnMut(f64)) -> Result<Vec<CertifiedEvent>, CertifyError> {
+        first_line(&mut *self.write, self.given.scene)?;
+        Ok(self.section(progress)?.events)
+    }
+
+    /// Writes the lines after the first, and returns what they prove.
+    pub fn section(mut self, progress: &mut dyn FnMut(f64)) -> Result<Section, CertifyError> {
         let stuck = match self.motion(progress) {
             Ok(()) => None,
             Err(Halt::Error(error)) => return Err(error),
@@ -130,13 +154,14 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                     (None, EventKind::PathEnd) => Status::None { time_lo: None },
                     (None, _) => Status::None { time_lo: lock },
                 });
-                CertifiedEvent { event, obstacle, status }
+                let dragons = self.given.dragon.iter().map(|(dragon, _)| *dragon).collect();
+                CertifiedEvent { event, obstacle, dragons, status }
             })
             .collect();
         for event in &events {
             (self.write)(&CertificateLine::Result(event.clone())).map_err(CertifyError::Write)?;
         }
-        Ok(events)
+        Ok(Section { events, end: self.at.head, ends_with_path: self.ends_with_path, locks: lock.is_some() })
     }
 
     /// Proves the whole motion, event by event.
@@ -153,6 +178,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                     self.go_to(event.travelled - self.around(), None, &mut progress)?;
                     self.go_to_point(&beyond, None, &mut progress)?;
                     (self.write)(&CertificateLine::PathEnd)?;
+                    self.ends_with_path = true;
                     self.proofs[EventKind::PathEnd as usize] = Some(self.at_path_end());
                 }
                 kind => {
@@ -179,7 +205,18 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let time = self.chain.exact.travelled(place).over(Interval::point(self.given.head_speed));
         // Covers the rounding of a `lead_in` that the scene gives in other digits.
         let slack = 1e-14 * (1.0 + time.magnitude());
-        Interval { lo: (time.lo - slack).max(0.0), hi: (time.hi + slack).max(0.0) }
+        let (lo, hi) = (time.lo - slack, time.hi + slack);
+        match self.given.dragon {
+            // At its start it is from 0 on.
+            Some((_, delay)) if delay > 0.0 => {
+                let later = |seconds: f64| Interval::point(seconds) + Interval::point(delay);
+                Interval {
+                    lo: if lo > 0.0 { later(lo).lo } else { 0.0 },
+                    hi: if hi > 0.0 { later(hi).hi } else { 0.0 },
+                }
+            }
+            _ => Interval { lo: lo.max(0.0), hi: hi.max(0.0) },
+        }
     }
 
     fn grid_point(&self, travelled: f64) -> GridPoint {
@@ -539,7 +576,7 @@ pub(super) fn path_end(exact: &ExactPath, path: &Path) -> GridPoint {
     let length = path.length();
     let end = place(path.param_at(length));
     let beyond = exact.moved(end, LEAST * (1.0 + length), false);
-    let inward = matches!(exact.segments[beyond.0].curve, super::path::Curve::Inward { .. });
-    let head = if inward { Place(beyond.0, 0.0, 0.0) } else { beyond };
+    // An inward spiral that is the whole path ends at its centre.
+    let head = if exact.segments.len() == 1 { Place(0, 0.0, 0.0) } else { beyond };
     GridPoint::at(head, length)
 }

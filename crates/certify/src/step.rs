@@ -118,8 +118,8 @@ impl<'a> Chain<'a> {
         listed.boards_avoid(free, claim.links)?;
         let spans = listed.handles[1..].iter().map(|handle| handle.span).collect();
         let Claim { links, moving, clear } = claim;
-        let (free, apart, at) = (free.to_vec(), None, Vec::new());
-        let step = Step { links, from: from.head, to: to.head, moving, clear, spans, free, apart, at };
+        let (free, apart, beside, at) = (free.to_vec(), None, Vec::new(), Vec::new());
+        let step = Step { links, from: from.head, to: to.head, moving, clear, spans, free, apart, beside, at };
         Ok(Shown { step, body_forward: listed.body_forward })
     }
 
@@ -216,7 +216,7 @@ impl<'c, 'a> Listed<'c, 'a> {
     fn ring(&self, handle: usize) -> f64 {
         let Place(segment, theta, _) = self.handles[handle].span.1;
         match self.chain.exact.segments[0].curve {
-            Curve::Inward { a } if segment == 0 => (a * theta).lo,
+            Curve::Inward { a, .. } if segment == 0 => (a * theta).lo,
             _ => f64::NEG_INFINITY,
         }
     }
@@ -335,11 +335,8 @@ impl<'c, 'a> Listed<'c, 'a> {
         Ok(())
     }
 
-    /// Shows that boards stay clear of obstacles: all boards, or boards 0 and 1.
-    fn boards_avoid(&self, free: &[usize], links: Links) -> Result<(), Obstacle> {
-        if free.is_empty() {
-            return Ok(());
-        }
+    /// Returns the boards that obstacles concern: all, those that are not listed as one, or boards 0 and 1.
+    pub fn boards_on_ground(&self, links: Links) -> Vec<MovingBoard> {
         let (chain, benches) = (self.chain, self.chain.team.benches);
         let listed = self.handles.len() - 1;
         let firsts = if links == Links::All { listed } else { listed.min(2) };
@@ -347,6 +344,15 @@ impl<'c, 'a> Listed<'c, 'a> {
         if links == Links::All && listed < benches {
             boards.push(self.straight_run(listed));
         }
+        boards
+    }
+
+    /// Shows that boards stay clear of obstacles: all boards, or boards 0 and 1.
+    fn boards_avoid(&self, free: &[usize], links: Links) -> Result<(), Obstacle> {
+        if free.is_empty() {
+            return Ok(());
+        }
+        let (chain, boards) = (self.chain, self.boards_on_ground(links));
         let is_near = |obstacle: &&usize| !boards.iter().all(|board| chain.barriers[**obstacle].is_avoided_by(board));
         free.iter().find(is_near).map_or(Ok(()), |obstacle| Err(Obstacle::Stage(*obstacle)))
     }

@@ -179,6 +179,7 @@ impl Passage {
             head_speed: 1.0,
             events: &[end],
             most_steps: MOST_STEPS,
+            dragon: None,
         };
         let is_none = |event: &CertifiedEvent| {
             event.event == EventKind::PathEnd || matches!(event.status, Status::None { time_lo: None })

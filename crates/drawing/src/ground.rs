@@ -20,14 +20,18 @@ pub fn include(ground: &Ground, shown: &mut StageBox) {
     }
 }
 
-/// Returns the obstacles, in metres: first all keep-outs, then all shapes, each titled with its name.
+/// Returns the obstacles, in metres: the dashes around all keep-outs, all keep-outs, then all shapes, each titled with
+/// its name.
 pub fn group(ground: &Ground, camera: &Camera, palette: &Palette) -> Group {
+    let (mut rims, dash) = (Group::new().set("id", "keep-out-rims").set("fill", "none"), camera.metres(6.0));
+    rims = rims.set("stroke", palette.quiet).set("stroke-width", camera.metres(2.5)).set("stroke-dasharray", dash);
     let (mut keep_outs, mut shapes) = (Group::new(), Group::new().set("stroke-linejoin", "round"));
     for Obstacle { name, shape, keep_out } in ground.obstacles() {
         // Half of a round stroke lies on either side of an outline.
         let around = metres(2.0 * keep_out);
         let round = |path: Path| path.set("stroke-linejoin", "round").set("stroke-linecap", "round");
         if *keep_out > 0.0 {
+            rims = rim(shape, *keep_out).into_iter().fold(rims, Group::add);
             keep_outs = match shape.kind() {
                 ShapeKind::Circle => keep_outs.add(disc(shape, keep_out + shape.radius())),
                 _ => keep_outs.add(round(outline(shape)).set("stroke", palette.line).set("stroke-width", around)),
@@ -44,7 +48,31 @@ pub fn group(ground: &Ground, camera: &Camera, palette: &Palette) -> Group {
         };
     }
     let keep_outs = keep_outs.set("id", "keep-outs").set("fill", palette.line);
-    Group::new().set("id", "ground").add(keep_outs).add(shapes.set("id", "obstacles"))
+    Group::new().set("id", "ground").add(rims).add(keep_outs).add(shapes.set("id", "obstacles"))
+}
+
+/// Returns the outline of a keep-out: those of the sides of a shape one over the other. The keep-out covers their inner
+/// parts.
+fn rim(shape: &Shape, keep_out: f64) -> Vec<Path> {
+    let radius = metres(keep_out);
+    let around = |[from, to]: [Point; 2]| {
+        let along = to - from;
+        let aside = Vector::new(-along.y, along.x) * (keep_out / along.norm());
+        let [a, b, c, d] = [from - aside, to - aside, to + aside, from + aside]
+            .map(|corner| format!("{} {}", metres(corner.x), metres(corner.y)));
+        let arc = format!("A{radius} {radius} 0 0 1");
+        Path::new().set("d", format!("M{a}L{b}{arc} {c}L{d}{arc} {a}Z"))
+    };
+    if shape.kind() == ShapeKind::Circle {
+        let (centre, radius) = (shape.points()[0], shape.radius() + keep_out);
+        let [left, right] = [-radius, radius].map(|at| format!("{} {}", metres(centre.x + at), metres(centre.y)));
+        let arc = format!("A{0} {0} 0 0 1", metres(radius));
+        return vec![Path::new().set("d", format!("M{left}{arc} {right}{arc} {left}Z"))];
+    }
+    let points = shape.points();
+    let closing = (shape.kind() != ShapeKind::Line).then(|| [points[points.len() - 1], points[0]]);
+    let open = points.windows(2).map(|pair| [pair[0], pair[1]]);
+    open.chain(closing).map(around).collect()
 }
 
 /// Returns the names of the obstacles, each at a point of its shape, for those in the picture.

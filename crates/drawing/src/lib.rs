@@ -30,7 +30,6 @@ use svg::node::element::{ClipPath, Definitions, Description, Group, Path, Rectan
 use bench_dragon_messages::sentence::rounded;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::Point;
-use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 use camera::{Camera, StageBox, Viewport};
@@ -269,12 +268,8 @@ impl<'a> Drawing<'a> {
         let id = if of.name.is_empty() { "path".to_owned() } else { format!("path-{}", of.name) };
         let path = Path::new().set("id", id).set("d", route::data(of.motion, &self.camera)).set("fill", "none");
         // Finer where turns are close together.
-        let turns = match of.motion.description() {
-            PathDescription::Spiral { pitch, .. } | PathDescription::Turnaround { pitch, .. } => {
-                pitch * self.camera.scale
-            }
-            PathDescription::Route { .. } => f64::INFINITY,
-        };
+        let pitches = of.motion.description().pitches();
+        let turns = pitches.fold(f64::INFINITY, f64::min) * self.camera.scale;
         let width = self.camera.metres((0.07 * turns).clamp(0.5, 1.3));
         path.set("stroke", palette.faint).set("stroke-width", width).set("stroke-linejoin", "round")
     }

@@ -63,8 +63,14 @@ impl Happened {
             (EventKind::Stall, Tense::Past) => format!("stall: {who} stalled at {time} s, its rear handle {place}"),
             (EventKind::Lock, Tense::Present) => format!("lock: {who} locks, its rear handle {place}"),
             (EventKind::Lock, Tense::Past) => format!("lock: {who} locked at {time} s, its rear handle {place}"),
-            (EventKind::PathEnd, Tense::Present) => return "the head is at the end of the path".to_owned(),
-            (EventKind::PathEnd, Tense::Past) => return format!("the head reached the end of the path at {time} s"),
+            (EventKind::PathEnd, Tense::Present) if who.is_empty() => {
+                return "the head is at the end of the path".to_owned();
+            }
+            (EventKind::PathEnd, Tense::Past) if who.is_empty() => {
+                return format!("the head reached the end of the path at {time} s");
+            }
+            (EventKind::PathEnd, Tense::Present) => format!("{who} is at the end of its path"),
+            (EventKind::PathEnd, Tense::Past) => format!("{who} reached the end of its path at {time} s"),
         };
         sentence + " (counting from 1)"
     }

@@ -23,6 +23,7 @@ const LEAST_PITCH: f64 = 1.5;
 pub fn data(motion: &Motion, camera: &Camera) -> String {
     let (view, outline) = (camera.view(), motion.outline());
     let mut data = String::new();
+    let mut is_route = false;
     match motion.description() {
         PathDescription::Spiral { pitch, .. } => {
             spiral(&mut data, Direction::Inward, *pitch, (0.0, f64::MAX), motion.placement(), camera);
@@ -32,6 +33,7 @@ pub fn data(motion: &Motion, camera: &Camera) -> String {
             spiral(&mut data, Direction::Inward, *pitch, (turn, f64::MAX), motion.placement(), camera);
         }
         PathDescription::Route { .. } => {
+            is_route = true;
             if let Some(SegmentOutline { start, heading, .. }) = outline.first() {
                 let reach = (view.centre() - start).norm() + view.width() + view.height();
                 line(&mut data, start - reach * direction(*heading), *start);
@@ -44,11 +46,13 @@ pub fn data(motion: &Motion, camera: &Camera) -> String {
                 line(&mut data, segment.start, segment.start + segment.length * direction(segment.heading));
             }
             OutlineKind::Arc { curvature } => arc(&mut data, &segment, curvature),
-            OutlineKind::Spiral { direction: Direction::Outward, pitch, first, last, .. } => {
-                spiral(&mut data, Direction::Outward, pitch, (first, last), motion.placement(), camera);
-            }
             // Drawn above, with the path behind the start.
-            OutlineKind::Spiral { direction: Direction::Inward, .. } => {}
+            OutlineKind::Spiral { direction: Direction::Inward, .. } if !is_route => {}
+            OutlineKind::Spiral { direction, pitch, first, last, .. } => {
+                if let Some(placement) = Placement::of_spiral(&segment) {
+                    spiral(&mut data, direction, pitch, (first.min(last), first.max(last)), &placement, camera);
+                }
+            }
         }
     }
     data
@@ -180,6 +184,36 @@ mod tests {
                 }
             }
             assert!(worst < 2e-5 * pitch / 0.55, "{worst} m beside the spiral");
+        }
+    }
+
+    /// A spiral piece is drawn from its beginning to its end, on the path's own points.
+    #[test]
+    fn the_spirals_of_a_route_lie_on_the_path() {
+        for (side, direction) in [(Side::Left, Direction::Inward), (Side::Right, Direction::Outward)] {
+            let piece = RouteStep::Spiral { side, direction, pitch: 1.7, radius: 6.0, turns: 2.25 };
+            let steps = vec![RouteStep::Line { length: 3.0 }, piece];
+            let description = PathDescription::Route { heading_turns: 0.1, steps };
+            let motion = Motion::new(description, TEAM, 1.0, Method::Newton).unwrap();
+            let motion = motion.placed(Placement::new(Vector::new(2.0, -1.0), 0.3, true));
+            let drawn = data(&motion, &camera(60.0));
+            // The line behind the start, the line, the spiral.
+            let moves: Vec<usize> = drawn.match_indices('M').map(|(at, _)| at).collect();
+            let drawn = curves(&drawn[moves[2]..]);
+            let path = motion.path();
+            let ends = [3.0, path.length()].map(|s| motion.placement().point(path.point(path.param_at(s))));
+            let has =
+                |end: &Point| drawn.iter().any(|curve| [curve[0], curve[3]].iter().any(|p| (p - end).norm() < 1e-6));
+            assert!(ends.iter().all(has));
+            let on_path: Vec<Point> = (0..200_000)
+                .map(|k| path.point(path.param_at(3.0 + f64::from(k) * (path.length() - 3.0) / 199_999.0)))
+                .map(|point| motion.placement().point(point))
+                .collect();
+            for [a, b, c, d] in drawn {
+                let middle = Point::from((a.coords + 3.0 * b.coords + 3.0 * c.coords + d.coords) / 8.0);
+                let away = on_path.iter().map(|point| (point - middle).norm()).fold(f64::INFINITY, f64::min);
+                assert!(away < 4e-4, "{away} m beside the path");
+            }
         }
     }
 

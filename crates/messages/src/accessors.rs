@@ -1,7 +1,7 @@
 //! From the numbers of a layout to states, levels, codes and events. Called by subscribers.
 
 use crate::control::Code;
-use crate::layouts::{CollisionAlert, ControlResponse, FrameHeader, NO_BENCH, StageEvent};
+use crate::layouts::{CollisionAlert, ControlResponse, FrameHeader, NO_BENCH, Stage, StageDragon, StageEvent};
 use crate::state::{EventKind, FrameState, Level, PlaybackState};
 
 impl FrameHeader {
@@ -25,6 +25,27 @@ impl ControlResponse {
     /// Returns the playback state, or `None` for a number that this layout does not know.
     pub fn playback_state(&self) -> Option<PlaybackState> {
         of_number(&PlaybackState::ALL, self.playback)
+    }
+}
+
+impl Stage {
+    /// Returns the dragon of a handle or a bench by its number through all handles, and its number within the dragon;
+    /// `None` for the number of an obstacle.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use bench_dragon_messages::{List, SceneName, Stage, StageDragon};
+    ///
+    /// let gold = StageDragon { benches: 4, name: SceneName::new("gold"), ..StageDragon::default() };
+    /// let jade = StageDragon { first_handle: 5, benches: 3, name: SceneName::new("jade"), ..StageDragon::default() };
+    /// let stage = Stage { dragons: List::of([gold, jade]), ..Stage::default() };
+    /// let owner = |number| stage.owner(number).map(|(dragon, bench)| (dragon.name.as_str(), bench));
+    /// assert_eq!((owner(4), owner(5), owner(9)), (Some(("gold", 4)), Some(("jade", 0)), None));
+    /// ```
+    pub fn owner(&self, number: u32) -> Option<(&StageDragon, u32)> {
+        let own = |dragon: &StageDragon| number.checked_sub(dragon.first_handle).filter(|own| *own <= dragon.benches);
+        self.dragons.iter().find_map(|dragon| own(dragon).map(|bench| (dragon, bench)))
     }
 }
 

@@ -54,8 +54,12 @@ pub fn chase_sentence(status: &ChaseStatus) -> String {
 /// Returns the name of the obstacle that an alert is about: that of its event, or else the nearest one; `None` if it is
 /// about boards alone.
 pub fn obstacle_in<'a>(stage: &'a Stage, alert: &CollisionAlert) -> Option<&'a str> {
-    let of = |number: u32| stage.obstacles.get(obstacle_number(stage, number)?);
-    of(alert.event_bench_b).or_else(|| of(alert.bench_b)).map(|obstacle| obstacle.name.as_str())
+    obstacle_name(stage, alert.event_bench_b).or_else(|| obstacle_name(stage, alert.bench_b))
+}
+
+/// Returns the name of the obstacle of a number that follows the handles; `None` for a bench.
+pub fn obstacle_name(stage: &Stage, number: u32) -> Option<&str> {
+    Some(stage.obstacles.get(obstacle_number(stage, number)?)?.name.as_str())
 }
 
 /// Returns an alert of a show as a sentence; the stage has the names. A past event is in the past tense, since the show

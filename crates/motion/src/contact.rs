@@ -192,7 +192,8 @@ impl<'a> ConservativeAdvancement<'a> {
         let length = (1.0 + 1e-7) * (along(self.team.link(0))? + body);
         let curve = self.curves[head.segment];
         let begin = if curve == 0 { f64::NEG_INFINITY } else { self.path.end_of(curve - 1) };
-        let last = (0..self.curves.len()).rev().find(|segment| self.curves[*segment] == curve)?;
+        let same = self.curves[head.segment..].iter().take_while(|other| **other == curve).count();
+        let last = head.segment + same - 1;
         (travelled - length >= begin).then(|| self.path.end_of(last))
     }
 }

@@ -184,7 +184,10 @@ impl Ensemble {
             };
             // The head of the dragon that reaches its path's end.
             let bench_a = bench_a.map_or((kind == EventKind::PathEnd).then_some(first), |bench| Some(bench + first));
-            TimedEvent { event: Event { kind, travelled, bench_a, bench_b, place }, time: timed.time + delay }
+            // A dragon that stands on itself or at an obstacle does so from the show's start on.
+            let is_at_start = timed.time == 0.0 && matches!(kind, EventKind::Contact | EventKind::Obstacle);
+            let time = if is_at_start { 0.0 } else { timed.time + delay };
+            TimedEvent { event: Event { kind, travelled, bench_a, bench_b, place }, time }
         };
         let events = timeline.events().iter().map(numbered).collect();
         Timeline::new(events, timeline.searched_until().map(|until| until + delay))
@@ -215,6 +218,22 @@ impl Ensemble {
         Ok((first.map(|(meeting, pair)| self.contact_event(&meeting, pair)), until))
     }
 
+    /// Returns the first contact of boards of two dragons up to a time of the show: its time, and a bench of each,
+    /// counted within it; `None` if there is none, or the search gave up.
+    pub fn first_contact_of(
+        &self,
+        pair: [usize; 2],
+        to: f64,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<(f64, [usize; 2])> {
+        let two: Vec<&Dragon> = pair.iter().map(|dragon| &self.dragons[*dragon]).collect();
+        let found: Vec<_> = two.iter().map(|dragon| dragon.motion.singularities(&mut |_| ())).collect();
+        let moving: Result<Vec<_>, _> = two.iter().zip(&found).map(|(dragon, found)| moving(dragon, found)).collect();
+        let (moving, mut budget) = (moving.ok()?, Budget::new(CONTACT_BUDGET, progress));
+        let contact = between::first_contact([&moving[0], &moving[1]], (0.0, to), &mut budget).ok()?;
+        contact.value.map(|meeting| (meeting.time, meeting.benches))
+    }
+
     fn contact_event(&self, meeting: &Meeting, pair: [usize; 2]) -> TimedEvent {
         let [a, b] = self.numbered(meeting, pair);
         let travelled = self.dragons[pair[0]].travelled_at(meeting.time);
@@ -231,11 +250,7 @@ impl Ensemble {
     }
 
     fn moving<'a>(&'a self, found: &'a [Singularities]) -> Result<Vec<MovingDragon<'a>>, NoFollower> {
-        let one = |(Dragon { delay, motion, .. }, found): (&'a Dragon, &'a Singularities)| {
-            let end = found.end.map_or(motion.path().length(), |end| end.travelled);
-            MovingDragon::new(motion.advancement(found), *motion.placement(), (*delay, motion.head_speed(), end))
-        };
-        self.dragons.iter().zip(found).map(one).collect()
+        self.dragons.iter().zip(found).map(|(dragon, found)| moving(dragon, found)).collect()
     }
 
     /// Returns the least clearance of any two boards that share no handle, from the start until the show ends at
@@ -348,8 +363,16 @@ impl Solver for EnsembleSolver {
     }
 }
 
-/// Returns all pairs of `count` dragons.
-fn pairs(count: usize) -> impl Iterator<Item = [usize; 2]> {
+fn moving<'a>(
+    Dragon { delay, motion, .. }: &'a Dragon,
+    found: &'a Singularities,
+) -> Result<MovingDragon<'a>, NoFollower> {
+    let end = found.end.map_or(motion.path().length(), |end| end.travelled);
+    MovingDragon::new(motion.advancement(found), *motion.placement(), (*delay, motion.head_speed(), end))
+}
+
+/// Returns all pairs of `count` dragons, in order.
+pub fn pairs(count: usize) -> impl Iterator<Item = [usize; 2]> {
     (0..count).flat_map(move |a| (a + 1..count).map(move |b| [a, b]))
 }
 

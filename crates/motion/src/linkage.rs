@@ -70,7 +70,7 @@ const MOST_STEPS: usize = 100_000;
 
 /// Returns the units of the coordinate that a segment has behind a place.
 fn remaining_behind(path: &Path, param: Param) -> f64 {
-    if param.segment == 0 { f64::INFINITY } else { param.at.minus(path.first(param.segment)) }
+    if param.segment == 0 { f64::INFINITY } else { path.segment(param).progress(path.first(param.segment), param.at) }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ pub mod double_double;
 pub mod elementary;
 pub mod line;
 pub mod path;
+pub mod placed_spiral;
 pub mod root;
 pub mod segment;
 pub mod separation;

@@ -7,9 +7,11 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::linkage::NoFollower;
+use crate::model::curve::{Coordinate, Curve};
 use crate::model::double_double::DoubleDouble;
+use crate::model::elementary;
 use crate::model::path::{OutlineKind, SegmentOutline};
-use crate::model::spiral::Direction;
+use crate::model::spiral::{Direction, Spiral};
 use crate::model::{Point, Vector};
 use crate::solve::{Chain, Solver};
 
@@ -83,6 +85,21 @@ impl Placement {
             Turn { sine, cosine, angle: TAU * part, side: if mirror { -1.0 } else { 1.0 } }
         });
         Self { turn: turned, origin }
+    }
+
+    /// Returns the placement of the spiral about the origin that a spiral of an outline is: its beginning, its heading
+    /// and the side of its curvature say where it lies. `None` for other curves.
+    pub fn of_spiral(outline: &SegmentOutline) -> Option<Self> {
+        let OutlineKind::Spiral { direction, pitch, first, curvature, .. } = outline.kind else { return None };
+        if curvature.is_nan() {
+            return Some(Self::IDENTITY);
+        }
+        let (spiral, first) = (Spiral::new(pitch, direction), Coordinate { high: first, low: 0.0 });
+        let (point, tangent) = (spiral.point(first).coords, spiral.tangent(first));
+        let mirror = spiral.turning() * curvature < 0.0;
+        let heading = if mirror { -1.0 } else { 1.0 } * elementary::atan2(tangent.y, tangent.x);
+        let turned = Self::new(Vector::zeros(), (outline.heading - heading) / TAU, mirror);
+        Some(Self { origin: outline.start.coords - turned.vector(point), ..turned })
     }
 
     /// Returns the placement of a path that is first moved by `start`, metres, in its own coordinates.
@@ -190,6 +207,9 @@ impl Placement {
             OutlineKind::Line => kind,
             OutlineKind::Arc { curvature } => OutlineKind::Arc { curvature: side * curvature },
             OutlineKind::Spiral { .. } if self.is_identity() => kind,
+            OutlineKind::Spiral { direction, pitch, first, last, curvature } if curvature.is_finite() => {
+                OutlineKind::Spiral { direction, pitch, first, last, curvature: side * curvature }
+            }
             OutlineKind::Spiral { direction, pitch, first, last, .. } => {
                 let way = match direction {
                     Direction::Inward => -side,

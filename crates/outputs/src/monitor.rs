@@ -8,7 +8,7 @@ use hdrhistogram::Histogram;
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_messages::chase::ChaseState;
 use bench_dragon_messages::state::FrameState;
-use bench_dragon_messages::{ChaseStatus, CollisionAlert, FrameHeader, HandlePose, LoopStatus};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
 /// Time without a status after which a chase counts as dead. It sends five a second.
 const CHASE_SILENCE: Duration = Duration::from_secs(2);
@@ -42,8 +42,12 @@ pub struct IntervalReport {
     pub presence: Presence,
     /// The latest frame's header, if any frame has come.
     pub header: Option<FrameHeader>,
-    /// The latest frame's head.
+    /// The latest frame's head; of several dragons the first one's.
     pub head: HandlePose,
+    /// The latest frame's heads, in the order of the stage's dragons; empty before the stage.
+    pub heads: Vec<HandlePose>,
+    /// The stage of the present publisher, which has the names.
+    pub stage: Option<Box<Stage>>,
     /// Frames received in this interval, per second.
     pub rate: f64,
     /// Frames received since the monitor started.
@@ -79,6 +83,8 @@ pub struct Monitor {
     presence: Presence,
     header: Option<FrameHeader>,
     head: HandlePose,
+    heads: Vec<HandlePose>,
+    stage: Option<Box<Stage>>,
     received: u64,
     missed: u64,
     received_in_interval: u64,
@@ -96,6 +102,8 @@ impl Default for Monitor {
             presence: Presence::Waiting,
             header: None,
             head: HandlePose::default(),
+            heads: Vec::new(),
+            stage: None,
             received: 0,
             missed: 0,
             received_in_interval: 0,
@@ -122,6 +130,9 @@ impl Monitor {
                 self.missed += missed;
                 self.header = Some(*header);
                 self.head = handles.first().copied().unwrap_or_default();
+                let dragons = self.stage.iter().flat_map(|stage| stage.dragons.iter());
+                self.heads.clear();
+                self.heads.extend(dragons.filter_map(|dragon| handles.get(dragon.first_handle as usize)));
             }
             FeedEvent::Alert(alert) => self.alert = Some(*alert),
             FeedEvent::Status(status) => self.status = Some(*status),
@@ -135,8 +146,11 @@ impl Monitor {
                 self.status = None;
                 self.alert = None;
                 self.chase = None;
+                self.stage = None;
+                self.heads.clear();
             }
-            FeedEvent::Started { .. } | FeedEvent::Stage { .. } | FeedEvent::Scene { .. } | FeedEvent::Cue(_) => (),
+            FeedEvent::Stage { stage, .. } => self.stage = Some(Box::new(*stage)),
+            FeedEvent::Started { .. } | FeedEvent::Scene { .. } | FeedEvent::Cue(_) => (),
         }
     }
 
@@ -159,6 +173,8 @@ impl Monitor {
             presence: self.presence,
             header: self.header,
             head: self.head,
+            heads: self.heads.clone(),
+            stage: self.stage.clone(),
             rate: self.received_in_interval as f64 / elapsed,
             received: self.received,
             missed: self.missed,

@@ -5,18 +5,17 @@ use super::chain::Chain;
 use super::first_order::{FirstOrder, FirstOrderBoard, When};
 use super::interval::Interval;
 use super::lines::Links;
-use super::path::{Place, Span};
+use super::path::Span;
 use super::scene::Scene;
 use super::steps::{check_ring, straight_run};
 
 /// Checks that no two boards that share no handle are as near as `metres`. A step of the front links concerns only the
-/// pairs with boards 0 and 1. `at` has a place of each listed handle's span. Returns the number of pairs.
+/// pairs with boards 0 and 1. `step` has the first-order enclosures of the chain. Returns the number of pairs.
 ///
 /// # Errors
 /// The pair that does not follow.
-pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, at: &[Place], metres: f64) -> Result<u64, String> {
+pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, step: &FirstOrder, metres: f64) -> Result<u64, String> {
     let team = &scene.team;
-    let step = FirstOrder::new(scene, chain, at)?;
     let metres = Interval::new(metres);
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
         .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))

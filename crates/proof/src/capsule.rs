@@ -1,5 +1,6 @@
 //! Positions over a span, and the front and rear products of two spans (docs/proofs.md, "Capsules").
 
+use super::ground::Mapping;
 use super::interval::{Interval, Vector};
 use super::path::{At, Path, Place, Span};
 
@@ -33,6 +34,11 @@ impl Capsule {
         let sag = (turn * half * Interval::new(0.5)).upper();
         let At { point, tangent } = path.at(middle);
         Self { span, point, tangent, half, curvature, sag, turn }
+    }
+
+    /// Returns the capsule on the stage.
+    pub fn placed(&self, frame: &Mapping) -> Self {
+        Self { point: frame.on_stage(&self.point), tangent: frame.turned(&self.tangent), ..self.clone() }
     }
 
     /// Returns the capsule moved back `metres` on a line.

@@ -22,6 +22,17 @@ pub(super) struct Events {
     pub finish: Option<Finish>,
     /// Two benches, and metres that they are no further apart at a place of the motion.
     pub near: Option<([usize; 2], Interval)>,
+    /// Boards near obstacles.
+    pub near_obstacles: Vec<NearObstacle>,
+}
+
+/// A bench whose clearance from an obstacle is no more than some metres at a place of the motion.
+pub(super) struct NearObstacle {
+    pub obstacle: usize,
+    pub bench: usize,
+    pub most: Interval,
+    /// Metres of the head from the start to that place or one before it.
+    pub travelled: Interval,
 }
 
 /// The end of a motion.
@@ -49,6 +60,45 @@ fn check_is_in_motion(scene: &Scene, to: Place) -> Result<(), String> {
     if scene.path.is_within(to) { Ok(()) } else { Err("the head is beyond the end of the path".to_owned()) }
 }
 
+/// Returns the handles with the head in a span that ends where the last step ended, or that is at the start.
+///
+/// # Errors
+/// The condition that does not follow.
+fn touching_chain(scene: &Scene, steps: &Steps, head: Span, spans: &[Span]) -> Result<Chain, String> {
+    let chain = Chain::check(scene, head, spans)?;
+    let Span(from, to) = head;
+    check_is_in_motion(scene, to)?;
+    match steps.end {
+        Some(end) if end != to => Err("it is not where the last step ended".to_owned()),
+        None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
+            Err("no step precedes it, and it begins beyond the start".to_owned())
+        }
+        _ => Ok(chain),
+    }
+}
+
+/// Returns the handles with the head in a span, of which some place is in the motion and no step that counts ends
+/// before it.
+///
+/// # Errors
+/// The condition that does not follow.
+fn near_step(
+    scene: &Scene,
+    shown: Option<Place>,
+    head: Span,
+    (spans, at): (&[Span], &[Place]),
+) -> Result<FirstOrder, String> {
+    let (path, Span(from, to)) = (&scene.path, head);
+    let chain = Chain::check(scene, head, spans)?;
+    if !Interval::new(0.0).is_at_most(&path.travelled(to)) || !path.is_within(from) {
+        return Err("the head is before the start or beyond the end of the path".to_owned());
+    }
+    if !shown.is_some_and(|end| path.in_order(from, end)) {
+        return Err("no step has come there".to_owned());
+    }
+    FirstOrder::new(scene, &chain, at)
+}
+
 impl Events {
     /// Checks and adds a contact: Lemma 5, *Contact*.
     ///
@@ -70,16 +120,7 @@ impl Events {
         if a.abs_diff(b) < 2 || a.max(b) >= spans.len() {
             return Err(format!("benches {a} and {b} share a handle, or are not both listed"));
         }
-        let chain = Chain::check(scene, head, spans)?;
-        let Span(from, to) = head;
-        check_is_in_motion(scene, to)?;
-        match steps.end {
-            Some(end) if end != to => return Err("it is not where the last step ended".to_owned()),
-            None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
-                return Err("no step precedes it, and it begins beyond the start".to_owned());
-            }
-            _ => {}
-        }
+        let chain = touching_chain(scene, steps, head, spans)?;
         let point = Vector::new(point[0], point[1]);
         for bench in benches {
             let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
@@ -88,7 +129,7 @@ impl Events {
                 return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
             }
         }
-        self.contact = Some((benches, from));
+        self.contact = Some((benches, head.0));
         Ok(())
     }
 
@@ -112,22 +153,13 @@ impl Events {
         if bench >= spans.len() {
             return Err(format!("bench {bench} is not listed"));
         }
-        let chain = Chain::check(scene, head, spans)?;
-        let Span(from, to) = head;
-        check_is_in_motion(scene, to)?;
-        match steps.end {
-            Some(end) if end != to => return Err("it is not where the last step ended".to_owned()),
-            None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
-                return Err("no step precedes it, and it begins beyond the start".to_owned());
-            }
-            _ => {}
-        }
+        let chain = touching_chain(scene, steps, head, spans)?;
         let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
         let board = Board::new(front, rear, *scene.team.link(bench), &scene.team);
         if !obstacle.is_reached_by(&board, &Vector::new(point[0], point[1])) {
             return Err(format!("bench {bench} may be clear of obstacle {number} (Lemma 9)"));
         }
-        self.reached.push((number, bench, from));
+        self.reached.push((number, bench, head.0));
         Ok(())
     }
 
@@ -150,23 +182,43 @@ impl Events {
         if a + 2 > b || b >= spans.len() {
             return Err(format!("benches {a} and {b} share a handle, or are not both listed in order"));
         }
-        let path = &scene.path;
-        let chain = Chain::check(scene, head, spans)?;
-        let Span(from, to) = head;
-        // Some place of the span is in the motion, and steps have come to it.
-        if !Interval::new(0.0).is_at_most(&path.travelled(to)) || !path.is_within(from) {
-            return Err("the head is before the start or beyond the end of the path".to_owned());
-        }
-        if !steps.apart_end.is_some_and(|end| path.in_order(from, end)) {
-            return Err("no step has come there".to_owned());
-        }
-        let step = FirstOrder::new(scene, &chain, at)?;
+        let step = near_step(scene, steps.apart_end, head, (spans, at))?;
         let [one, other] = [a, b].map(|bench| step.board(bench, &scene.team));
         let most = Interval::new(most);
         if !one.at_most(&other).is_at_most(&most) {
             return Err(format!("benches {a} and {b} may be further apart than it says (Lemma 6)"));
         }
         self.near = Some(([a, b], most));
+        Ok(())
+    }
+
+    /// Checks and adds a board whose clearance from an obstacle is no more than `most` metres: Lemma 11.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn add_near_obstacle(
+        &mut self,
+        scene: &Scene,
+        steps: &Steps,
+        (number, bench): (usize, usize),
+        head: Span,
+        (spans, at): (&[Span], &[Place]),
+        most: f64,
+    ) -> Result<(), String> {
+        if self.near_obstacles.iter().any(|other| other.obstacle == number) {
+            return Err(format!("a second line `near_obstacle` of obstacle {number}"));
+        }
+        let obstacle = scene.obstacles.get(number).ok_or_else(|| format!("the scene has no obstacle {number}"))?;
+        if bench >= spans.len() {
+            return Err(format!("bench {bench} is not listed"));
+        }
+        let step = near_step(scene, steps.beside(number).end, head, (spans, at))?;
+        let most = Interval::new(most);
+        if !obstacle.at_most(&step.board(bench, &scene.team)).is_at_most(&most) {
+            return Err(format!("bench {bench} may be further from obstacle {number} than it says (Lemma 11)"));
+        }
+        let travelled = scene.path.travelled(head.0);
+        self.near_obstacles.push(NearObstacle { obstacle: number, bench, most, travelled });
         Ok(())
     }
 

@@ -203,29 +203,58 @@ impl FirstOrderBoard {
     }
 
     /// Returns w, the vector to a corner from the middle between the handles of another board.
-    fn corner(&self, [ahead, left]: [f64; 2], seen_from: &Self, when: When) -> Linear {
+    fn corner(&self, corner: [f64; 2], seen_from: &Self, when: When) -> Linear {
+        seen_from.seen(self.point(corner, when), when)
+    }
+
+    /// Returns a point relative to the middle between the handles.
+    fn seen(&self, Linear { at, by, error }: Linear, when: When) -> Linear {
+        let half = Interval::new(0.5);
+        let middle = |front: &Vector, rear: &Vector| front.plus(rear).scaled(&half);
+        let (front, rear) = (&self.front, &self.rear);
+        Linear {
+            at: at.minus(&middle(&front.point, &rear.point)),
+            by: by.minus(&middle(&front.velocity, &rear.velocity)),
+            error: error + half * (front.error(when) + rear.error(when)),
+        }
+    }
+
+    /// Returns a point of the board, by its parts along the board and to the left, as shares of half its length and
+    /// half its width.
+    fn point(&self, [ahead, left]: [f64; 2], when: When) -> Linear {
         let along = self.along(when);
         let share = self.half_length / self.link * Interval::new(ahead);
         let aside = self.half_width / self.link * Interval::new(left);
         let half = Interval::new(0.5);
-        let of = |front: &Vector, rear: &Vector, along: &Vector, own_front: &Vector, own_rear: &Vector| {
-            let middle = front.plus(rear).minus(own_front).minus(own_rear).scaled(&half);
+        let of = |front: &Vector, rear: &Vector, along: &Vector| {
+            let middle = front.plus(rear).scaled(&half);
             middle.plus(&along.scaled(&share)).plus(&along.turned_left().scaled(&aside))
         };
-        let ((front, rear), (own_front, own_rear)) = ((&self.front, &self.rear), (&seen_from.front, &seen_from.rear));
+        let (front, rear) = (&self.front, &self.rear);
         let error = (half + share).abs() * front.error(when)
             + (half - share).abs() * rear.error(when)
-            + aside.abs() * along.error
-            + half * (own_front.error(when) + own_rear.error(when));
+            + aside.abs() * along.error;
         Linear {
-            at: of(&front.point, &rear.point, &along.at, &own_front.point, &own_rear.point),
-            by: of(&front.velocity, &rear.velocity, &along.by, &own_front.velocity, &own_rear.velocity),
+            at: of(&front.point, &rear.point, &along.at),
+            by: of(&front.velocity, &rear.velocity, &along.by),
             error,
         }
     }
 
     /// Returns the gap between this board and another along a direction fixed to this board.
     fn gap(&self, other: &Self, direction: Direction, when: When) -> Interval {
+        self.gap_along(direction, CORNERS.map(|corner| other.corner(corner, self, when)), when)
+    }
+
+    /// Returns the gap between this board and the convex hull of fixed points along a direction fixed to this board.
+    fn gap_to(&self, points: &[Vector], direction: Direction, when: When) -> Interval {
+        let zero = Interval::new(0.0);
+        let still = |at: &Vector| Linear { at: *at, by: Vector { x: zero, y: zero }, error: zero };
+        self.gap_along(direction, points.iter().map(|at| self.seen(still(at), when)), when)
+    }
+
+    /// Returns the gap between this board and points relative to the middle between its handles.
+    fn gap_along(&self, direction: Direction, points: impl IntoIterator<Item = Linear>, when: When) -> Interval {
         let [ahead, left] = direction.map(Interval::new);
         let size = Vector { x: ahead, y: left }.norm();
         let Linear { at, by, error } = self.along(when);
@@ -234,8 +263,7 @@ impl FirstOrderBoard {
         let half_step = if when == When::Middle { Interval::new(0.0) } else { self.half_step };
         let tau = half_step.around_zero();
         let tau_squared = Interval::new(0.0).hull(&half_step.square());
-        let reach = |corner: [f64; 2]| {
-            let Linear { at, by, error } = other.corner(corner, self, when);
+        let reach = |Linear { at, by, error }: Linear| {
             let far = at.norm() + by.norm() * half_step + error;
             let slack = normal.error * far + (self.link * size + normal.error) * error;
             normal.at.dot(&at)
@@ -243,7 +271,7 @@ impl FirstOrderBoard {
                 + normal.by.dot(&by) * tau_squared
                 + slack.around_zero()
         };
-        let least = CORNERS.map(reach).into_iter().reduce(|least, next| least.min(&next)).unwrap_or(size);
+        let least = points.into_iter().map(reach).reduce(|least, next| least.min(&next)).unwrap_or(size);
         let support = self.half_length * ahead.abs() + self.half_width * left.abs();
         (least / self.link - support) / size
     }
@@ -269,6 +297,58 @@ impl FirstOrderBoard {
         })
     }
 
+    /// Returns the gap between this board and the convex hull of fixed points along a fixed direction.
+    fn fixed_gap(&self, points: &[Vector], [x, y]: [f64; 2], when: When) -> Interval {
+        let n = Vector::new(x, y);
+        let size = n.norm();
+        let tau = if when == When::Middle { Interval::new(0.0) } else { self.half_step.around_zero() };
+        let reach = |corner: [f64; 2]| {
+            let Linear { at, by, error } = self.point(corner, when);
+            n.dot(&at) + n.dot(&by) * tau + (size * error).around_zero()
+        };
+        let most = CORNERS.map(reach).into_iter().reduce(|most, next| most.max(&next)).unwrap_or(size);
+        let least = points.iter().map(|point| n.dot(point)).reduce(|least, next| least.min(&next)).unwrap_or(most);
+        (least - most) / size
+    }
+
+    /// Returns true if the gap between the board and the convex hull of some segments is shown to be more than `metres`
+    /// throughout the step (Lemma 11).
+    pub fn is_clear_of(&self, segments: &[[Vector; 2]], metres: &Interval) -> bool {
+        let rough: Vec<_> = segments.iter().map(|ends| ends.map(|end| [end.x.rough(), end.y.rough()])).collect();
+        let points: Vec<Vector> = segments.iter().flatten().copied().collect();
+        let directions = self.sides.directions_to(&rough).into_iter();
+        let mut tries: Vec<_> = directions.map(|n| (self.sides.gap_to(&rough, n), n)).collect();
+        tries.retain(|(gap, _)| *gap >= metres.rough());
+        tries.sort_by(|a, b| b.0.total_cmp(&a.0));
+        tries.iter().take(MOST_TRIES).any(|(_, n)| {
+            metres.is_below(&self.fixed_gap(&points, *n, When::Always))
+                || metres.is_below(&self.gap_to(&points, self.sides.seen(*n), When::Always))
+        })
+    }
+
+    /// Returns the point of the front handle's place at tau = 0, if it is shown to be in the board then, and to stay in
+    /// it if the board is moved by `metres`.
+    pub fn inner_point(&self, metres: &Interval) -> Option<&Vector> {
+        let inset = self.half_length - self.link * Interval::new(0.5);
+        let off = self.front.error(When::Middle) + metres;
+        off.is_below(&inset.min(&self.half_width)).then_some(&self.front.point)
+    }
+
+    /// Returns an upper bound of the signed distance of the board from the point of a segment that is nearest.
+    pub fn at_most_to(&self, [from, to]: &[Vector; 2]) -> Interval {
+        let rough = |at: &Vector| [at.x.rough(), at.y.rough()];
+        let (share, _) = Sides::nearest_of([rough(from), rough(to)], &self.sides);
+        let target = from.plus(&to.minus(from).scaled(&Interval::new(share)));
+        let gaps = SIDES.map(|direction| self.gap_to(&[target], direction, When::Always));
+        let greatest =
+            gaps.into_iter().reduce(|most, next| most.max(&next)).unwrap_or_else(|| Interval::new(0.0)).upper();
+        if !greatest.is_positive() {
+            return greatest;
+        }
+        let Linear { at, by, error } = self.point(self.sides.shares_of(rough(&target)), When::Always);
+        (at.minus(&target).norm() + by.norm() * self.half_step + error).upper()
+    }
+
     /// Returns an upper bound of the clearance of two boards throughout the step (Lemma 6, *From above*).
     pub fn at_most(&self, other: &Self) -> Interval {
         let of_sides = |own: &Self, its: &Self| SIDES.map(|direction| own.gap(its, direction, When::Always));
@@ -280,8 +360,8 @@ impl FirstOrderBoard {
         let distance = |own: &Self, its: &Self| {
             // The corner and the point of a side that are nearest by doubles.
             let (corner, side, share) = own.sides.nearest_point(&its.sides);
-            let point = own.corner(CORNERS[corner], own, When::Always);
-            let [one, next] = [side, (side + 1) % 4].map(|end| its.corner(CORNERS[end], own, When::Always));
+            let point = own.point(CORNERS[corner], When::Always);
+            let [one, next] = [side, (side + 1) % 4].map(|end| its.point(CORNERS[end], When::Always));
             let share = Interval::new(share);
             let by =
                 |one: Vector, next: Vector, point: Vector| one.plus(&next.minus(&one).scaled(&share)).minus(&point);

@@ -1,10 +1,11 @@
 //! The obstacles of a stage: their shapes in the path's own coordinates, boards that stay clear of them (Lemma 9 of
-//! docs/proofs.md), and boards that have come within their keep-out.
+//! docs/proofs.md), boards that have come within their keep-out, and clearances (Lemma 11).
 
 use serde::Deserialize;
 
 use super::boards::{Board, covers};
 use super::elementary;
+use super::first_order::FirstOrderBoard;
 use super::interval::{Interval, Vector};
 
 /// Limit of obstacles and of the corners of one.
@@ -76,6 +77,39 @@ impl Obstacle {
             }
             Some(inside)
         })
+    }
+
+    /// Returns true if the clearance of the board is shown to be more than `metres` throughout the step (Lemma 11).
+    pub fn is_further_than(&self, metres: &Interval, board: &Board, first: &FirstOrderBoard) -> bool {
+        let far = self.keep_out + self.radius + metres;
+        let is_hull_clear = || board.is_roughly_clear_of(&self.points, &far);
+        if far.is_not_negative() && self.kind != Kind::Boundary && is_hull_clear() {
+            return true;
+        }
+        let is_clear = |sides: &[[Vector; 2]], far: &Interval| {
+            let ends: Vec<Vector> = sides.iter().flatten().copied().collect();
+            board.is_roughly_clear_of(&ends, far) || first.is_clear_of(sides, far) || board.is_clear_of(&ends, far)
+        };
+        if self.kind == Kind::Circle {
+            return is_clear(&[[self.points[0]; 2]], &far);
+        }
+        let size = far.abs();
+        let near: Vec<_> = self.sides().into_iter().filter(|side| !is_clear(&[*side], &size)).collect();
+        if !(near.is_empty() || far.is_negative() && is_clear(&near, &far)) {
+            return false;
+        }
+        let moved = if far.is_not_negative() { Interval::new(0.0) } else { size };
+        let is_outside = || first.inner_point(&moved).and_then(|point| self.is_inside(point));
+        self.kind == Kind::Line || is_outside() == Some(self.kind == Kind::Boundary)
+    }
+
+    /// Returns an upper bound of the clearance of the board throughout the step (Lemma 11).
+    pub fn at_most(&self, board: &FirstOrderBoard) -> Interval {
+        let sides = if self.kind == Kind::Circle { vec![[self.points[0]; 2]] } else { self.sides() };
+        let distances = sides.iter().map(|side| board.at_most_to(side));
+        // Every obstacle has a side.
+        let least = distances.reduce(|least, next| least.min(&next)).unwrap_or(self.radius);
+        (least - self.radius - self.keep_out).upper()
     }
 
     /// Returns true if a point of the board is shown to be within the keep-out, or on the wrong side.
@@ -162,7 +196,7 @@ pub(super) struct PlacementText {
 }
 
 /// The way from the stage's coordinates to those of a path that starts at `start` in its own.
-struct Mapping {
+pub(super) struct Mapping {
     origin: Vector,
     sine: Interval,
     cosine: Interval,
@@ -171,6 +205,38 @@ struct Mapping {
 }
 
 impl Mapping {
+    /// Creates the way of a route that starts at `start`.
+    ///
+    /// # Errors
+    /// A sentence about a number that is out of range.
+    pub fn new(placement: &PlacementText, start: [f64; 2]) -> Result<Self, String> {
+        let numbers = [placement.origin[0], placement.origin[1], placement.rotation_turns, start[0], start[1]];
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err("the placement is out of range".to_owned());
+        }
+        let (sine, cosine) = elementary::sin_cos(&elementary::turns(placement.rotation_turns));
+        let [origin, start] = [placement.origin, start].map(|[x, y]| Vector::new(x, y));
+        Ok(Self { origin, sine, cosine, mirror: placement.mirror, start })
+    }
+
+    /// Returns the way of a path that is where its own coordinates say.
+    pub fn unmoved() -> Self {
+        let zero = Vector::new(0.0, 0.0);
+        Self { origin: zero, sine: Interval::new(0.0), cosine: Interval::new(1.0), mirror: false, start: zero }
+    }
+
+    /// Returns a vector of the path on the stage.
+    pub fn turned(&self, vector: &Vector) -> Vector {
+        let Vector { x, y } = *vector;
+        let y = if self.mirror { -y } else { y };
+        Vector { x: self.cosine * x - self.sine * y, y: self.sine * x + self.cosine * y }
+    }
+
+    /// Returns a point of the path on the stage.
+    pub fn on_stage(&self, point: &Vector) -> Vector {
+        self.turned(&point.plus(&self.start)).plus(&self.origin)
+    }
+
     fn point(&self, [x, y]: [f64; 2]) -> Vector {
         let Vector { x, y } = Vector::new(x, y).minus(&self.origin);
         let turned = Vector { x: self.cosine * x + self.sine * y, y: self.cosine * y - self.sine * x };
@@ -180,34 +246,25 @@ impl Mapping {
 }
 
 impl StageText {
-    /// Returns the obstacles in the order of the scene, the boundary last, for a route that starts at `start`.
+    /// Returns the obstacles in the path's own coordinates, in the order of the scene, the boundary last.
     ///
     /// # Errors
     /// A sentence about the field that is wrong.
-    pub fn read(&self, placement: &PlacementText, start: [f64; 2]) -> Result<Vec<Obstacle>, String> {
-        let numbers = [placement.origin[0], placement.origin[1], placement.rotation_turns, start[0], start[1]];
-        if !numbers.iter().all(|number| number.is_finite()) || self.obstacles.len() > MOST {
-            return Err("the placement or the number of obstacles is out of range".to_owned());
+    pub fn read(&self, mapping: &Mapping) -> Result<Vec<Obstacle>, String> {
+        if self.obstacles.len() > MOST {
+            return Err("the number of obstacles is out of range".to_owned());
         }
-        let (sine, cosine) = elementary::sin_cos(&elementary::turns(placement.rotation_turns));
-        let mapping = Mapping {
-            origin: Vector::new(placement.origin[0], placement.origin[1]),
-            sine,
-            cosine,
-            mirror: placement.mirror,
-            start: Vector::new(start[0], start[1]),
-        };
         let of = |text: &ObstacleText| match (&text.circle, &text.polygon, &text.line) {
             (Some(circle), None, None) => {
-                obstacle(&mapping, Kind::Circle, &[circle.center], circle.radius, text.keep_out)
+                obstacle(mapping, Kind::Circle, &[circle.center], circle.radius, text.keep_out)
             }
-            (None, Some(corners), None) => obstacle(&mapping, Kind::Polygon, corners, 0.0, text.keep_out),
-            (None, None, Some(corners)) => obstacle(&mapping, Kind::Line, corners, 0.0, text.keep_out),
+            (None, Some(corners), None) => obstacle(mapping, Kind::Polygon, corners, 0.0, text.keep_out),
+            (None, None, Some(corners)) => obstacle(mapping, Kind::Line, corners, 0.0, text.keep_out),
             _ => Err("an obstacle has one of circle, polygon and line".to_owned()),
         };
         let obstacles = self.obstacles.iter().map(of);
         let boundary = self.boundary.iter();
-        let boundary = boundary.map(|text| obstacle(&mapping, Kind::Boundary, &text.polygon, 0.0, text.keep_out));
+        let boundary = boundary.map(|text| obstacle(mapping, Kind::Boundary, &text.polygon, 0.0, text.keep_out));
         obstacles.chain(boundary).collect()
     }
 }

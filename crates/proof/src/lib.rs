@@ -22,6 +22,7 @@ mod path;
 mod pitch;
 mod results;
 mod scene;
+mod several;
 mod sides;
 mod speeds;
 mod steps;
@@ -36,10 +37,13 @@ use serde::Serialize;
 use self::events::{Events, LockShown};
 use self::greatest::Greatest;
 use self::lines::{About, ParsedLine};
-pub use self::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedPitch, ProvedSpeed, Status, Until};
+pub use self::lines::{
+    EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, ProvedPitch, ProvedSpeed, Status, Until,
+};
 use self::path::Span;
 use self::pitch::Pitch;
 use self::scene::Scene;
+use self::several::{Alone, Pair};
 use self::steps::{Step, Steps};
 
 /// The version of the file format.
@@ -54,12 +58,18 @@ pub struct Proved {
     pub scene: String,
     /// The version of the program that wrote the certificate.
     pub version: String,
+    /// The names of the dragons in a scene of several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dragons: Vec<String>,
     /// The results for contact, stall, lock and path end, in this order, and for each obstacle; none in a certificate
-    /// of another question.
+    /// of another question. With several dragons, those of each, and then the contacts of each two.
     pub results: Vec<ProvedEvent>,
     /// The least clearance, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_clearance: Option<ProvedClearance>,
+    /// The least clearance of each obstacle, in a certificate of that question.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub obstacle_clearances: Vec<ProvedObstacleClearance>,
     /// The greatest speed, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub greatest_speed: Option<ProvedSpeed>,
@@ -110,7 +120,10 @@ pub fn scene_hash(text: &str) -> [u8; 32] {
 pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
     let form = |problem: String| Refused::Form { line: 1, problem };
     let parsed = serde_json::from_slice(first_line).map_err(|error| form(error.to_string()))?;
-    let Checker { about, proved, .. } = Checker::begin(parsed).map_err(form)?;
+    let Checker { about, alone, proved, .. } = Checker::begin(parsed).map_err(form)?;
+    if alone.is_some() {
+        return Err(form("it is a certificate of several dragons, expected one of a scene with [team]".to_owned()));
+    }
     if about == About::Events {
         return Ok(proved.scene);
     }
@@ -154,7 +167,15 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
 /// The state of the check.
 struct Checker {
     about: About,
-    scene: Scene,
+    /// The dragon of a scene of one, or all.
+    scenes: Vec<Scene>,
+    /// What the sections of dragons have shown; `None` in a scene of one.
+    alone: Option<Vec<Alone>>,
+    /// True in the section of a dragon.
+    is_in_section: bool,
+    between: Option<Pair>,
+    /// Number of results before the section.
+    before: usize,
     steps: Steps,
     events: Events,
     greatest: Greatest,
@@ -170,16 +191,24 @@ impl Checker {
         if format != FORMAT {
             return Err(format!("a certificate of format {format}, expected {FORMAT}"));
         }
-        let scene = Scene::read(&text).map_err(|problem| format!("the scene: {problem}"))?;
-        if about != About::Events && !scene.obstacles.is_empty() {
-            return Err("the scene has obstacles, of which this kind of certificate proves nothing".to_owned());
+        let in_scene = |problem: String| format!("the scene: {problem}");
+        let mut scenes = Scene::read_several(&text).map_err(in_scene)?;
+        let alone = if scenes.is_empty() { None } else { Some(Vec::new()) };
+        if alone.is_none() {
+            scenes.push(Scene::read(&text).map_err(in_scene)?);
+        } else if about != About::Events {
+            return Err("the scene has several dragons, of which this kind of certificate proves nothing".to_owned());
         }
+        let dragons =
+            if alone.is_some() { scenes.iter().map(|scene| scene.name.clone()).collect() } else { Vec::new() };
         let (results, steps, links, pairs) = (Vec::new(), 0, 0, 0);
         let proved = Proved {
             scene: text,
             version,
+            dragons,
             results,
             least_clearance: None,
+            obstacle_clearances: Vec::new(),
             greatest_speed: None,
             least_pitch: None,
             steps,
@@ -187,14 +216,117 @@ impl Checker {
             pairs,
         };
         let (steps, events, greatest) = (Steps::new(), Events::default(), Greatest::default());
-        Ok(Self { about, scene, steps, events, greatest, pitch: None, proved })
+        let (is_in_section, between, before) = (false, None, 0);
+        Ok(Self { about, scenes, alone, is_in_section, between, before, steps, events, greatest, pitch: None, proved })
+    }
+
+    /// Returns the number of results of a dragon's section.
+    fn results_of(&self, dragon: usize) -> usize {
+        4 + self.scenes[dragon].obstacles.len()
+    }
+
+    /// Returns true if the section of a dragon or of two has its results.
+    fn is_section_complete(&self) -> bool {
+        let so_far = self.proved.results.len() - self.before;
+        match (&self.alone, &self.between) {
+            (_, Some(_)) => so_far == 1,
+            (Some(alone), None) => self.is_in_section && so_far == self.results_of(alone.len()),
+            (None, None) => so_far == self.results_of(0),
+        }
+    }
+
+    /// Ends a section, and adds its counts.
+    fn end_section(&mut self) -> Result<(), String> {
+        if (self.is_in_section || self.between.is_some()) && !self.is_section_complete() {
+            return Err("the section before it lacks a result".to_owned());
+        }
+        let Some(alone) = &mut self.alone else {
+            return Err("the scene has one dragon, and no sections".to_owned());
+        };
+        let (steps, events) = (std::mem::replace(&mut self.steps, Steps::new()), std::mem::take(&mut self.events));
+        let mut counts = [steps.steps, steps.links, steps.pairs];
+        if self.is_in_section {
+            alone.push(Alone::new(&steps, &events));
+        }
+        if let Some(Pair { steps, links, pairs, .. }) = self.between.take() {
+            counts = [steps, links, pairs];
+        }
+        self.proved.steps += counts[0];
+        self.proved.links += counts[1];
+        self.proved.pairs += counts[2];
+        (self.is_in_section, self.before) = (false, self.proved.results.len());
+        Ok(())
+    }
+
+    /// Returns the pair that follows another, in their order; `None` after the last.
+    fn next_pair(&self, after: Option<[usize; 2]>) -> Option<[usize; 2]> {
+        let count = self.scenes.len();
+        let next = match after {
+            None => [0, 1],
+            Some([a, b]) if b + 1 < count => [a, b + 1],
+            Some([a, _]) => [a + 1, a + 2],
+        };
+        (next[1] < count).then_some(next)
+    }
+
+    /// Handles the lines of a scene of several dragons. Returns false for another line.
+    fn add_of_several(&mut self, line: &ParsedLine) -> Result<bool, String> {
+        let Self { scenes, alone, between, proved, .. } = self;
+        match (line, between, alone) {
+            (ParsedLine::Dragon { dragon }, None, _) => {
+                self.end_section()?;
+                let expected = self.alone.as_ref().map_or(0, Vec::len);
+                if *dragon != expected || *dragon >= self.scenes.len() {
+                    return Err(format!("it is about dragon {dragon}, expected {expected}"));
+                }
+                self.is_in_section = true;
+            }
+            (ParsedLine::Pair { dragons }, between, _) => {
+                let last = between.as_ref().map(|pair| pair.dragons);
+                self.end_section()?;
+                let are_alone_shown = self.alone.as_ref().is_some_and(|alone| alone.len() == self.scenes.len());
+                if !are_alone_shown || self.next_pair(last) != Some(*dragons) {
+                    return Err("the two dragons are not those that follow".to_owned());
+                }
+                self.between = Some(Pair::new(*dragons));
+            }
+            (ParsedLine::Both { from, to, heads, spans: [one, other] }, Some(pair), Some(_)) => {
+                pair.add_clear(scenes, [*from, *to], *heads, [one, other])?;
+            }
+            (ParsedLine::Meeting { benches, time, heads, spans: [one, other], point }, Some(pair), Some(alone)) => {
+                pair.add_meeting(scenes, alone, (*benches, *time), (*heads, [one, other]), *point)?;
+            }
+            (ParsedLine::Result(outcome), Some(pair), Some(alone)) => {
+                if proved.results.len() > self.before {
+                    return Err("a second result for two dragons".to_owned());
+                }
+                pair.check(scenes, alone, outcome)?;
+                proved.results.push(outcome.clone());
+            }
+            (ParsedLine::Dragon { .. } | ParsedLine::Both { .. } | ParsedLine::Meeting { .. }, ..) => {
+                return Err("it is not in a section of two dragons, or not in its place".to_owned());
+            }
+            (_, Some(_), _) => return Err("it is about one dragon, in a section of two".to_owned()),
+            (_, None, Some(_)) if !self.is_in_section => {
+                return Err("no line says which dragon it is about".to_owned());
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
     }
 
     /// Returns true if all results of the question are there.
     fn is_complete(&self) -> bool {
         match self.about {
-            About::Events => self.proved.results.len() == 4 + self.scene.obstacles.len(),
-            About::LeastClearance => self.proved.least_clearance.is_some(),
+            About::Events => match (&self.alone, &self.between) {
+                (None, _) => self.is_section_complete(),
+                (Some(_), Some(pair)) => self.is_section_complete() && self.next_pair(Some(pair.dragons)).is_none(),
+                (Some(_), None) => self.scenes.len() == 1 && self.is_section_complete(),
+            },
+            About::LeastClearance => {
+                let of_obstacles = self.proved.obstacle_clearances.len();
+                self.proved.least_clearance.is_some() && of_obstacles == self.scenes[0].obstacles.len()
+            }
             About::GreatestSpeed => self.proved.greatest_speed.is_some(),
             About::LeastPitch => self.proved.least_pitch.is_some(),
         }
@@ -204,10 +336,16 @@ impl Checker {
         if self.about != About::Events && self.is_complete() {
             return Err("nothing can follow the result".to_owned());
         }
-        let Self { about, scene, steps, events, greatest, pitch, proved } = self;
+        if self.add_of_several(&line)? {
+            return Ok(());
+        }
+        let section = self.alone.as_ref().map(Vec::len);
+        let Self { about, scenes, before, steps, events, greatest, pitch, proved, .. } = self;
+        let scene = &scenes[section.unwrap_or(0)];
+        let results = &proved.results[*before..];
         let question = match line {
             ParsedLine::Result(_) => Some(About::Events),
-            ParsedLine::LeastClearance(_) => Some(About::LeastClearance),
+            ParsedLine::LeastClearance(_) | ParsedLine::ObstacleClearance(_) => Some(About::LeastClearance),
             ParsedLine::GreatestSpeed(_) => Some(About::GreatestSpeed),
             ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
             _ => None,
@@ -215,13 +353,14 @@ impl Checker {
         if question.is_some_and(|question| question != *about) {
             return Err("it is a result of another question".to_owned());
         }
-        if question.is_none() && (events.finish.is_some() || !proved.results.is_empty()) {
+        let has_results = !results.is_empty() || proved.least_clearance.is_some();
+        if question.is_none() && (events.finish.is_some() || has_results) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
         }
         match line {
             ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
-            ParsedLine::Step { links, from, to, moving, clear, spans, free, apart, at } => {
-                let step = Step { links, head: Span(from, to), moving, clear, spans, free, apart, at };
+            ParsedLine::Step { links, from, to, moving, clear, spans, free, apart, beside, at } => {
+                let step = Step { links, head: Span(from, to), moving, clear, spans, free, apart, beside, at };
                 match pitch {
                     Some(pitch) => pitch.add_step(step),
                     None => steps.add(scene, step),
@@ -229,6 +368,9 @@ impl Checker {
             }
             ParsedLine::Near { benches, from, to, spans, at, most } => {
                 events.add_near(scene, steps, benches, Span(from, to), (&spans, &at), most)
+            }
+            ParsedLine::NearObstacle { obstacle, bench, from, to, spans, at, most } => {
+                events.add_near_obstacle(scene, steps, (obstacle, bench), Span(from, to), (&spans, &at), most)
             }
             ParsedLine::Contact { benches, from, to, spans, point } => {
                 events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
@@ -247,8 +389,21 @@ impl Checker {
             }
             ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
             ParsedLine::Result(outcome) => {
-                results::check(scene, steps, events, &outcome, &proved.results)?;
+                results::check(scene, steps, events, &outcome, results)?;
+                if section.into_iter().collect::<Vec<_>>() != outcome.dragons {
+                    return Err("it is not the result for this dragon".to_owned());
+                }
                 proved.results.push(outcome);
+                Ok(())
+            }
+            ParsedLine::LeastClearance(_) if proved.least_clearance.is_some() => Err("a second result".to_owned()),
+            ParsedLine::ObstacleClearance(outcome) => {
+                let earlier = proved.obstacle_clearances.len();
+                if proved.least_clearance.is_none() {
+                    return Err("the result for two boards does not precede it".to_owned());
+                }
+                results::check_obstacle_clearance(scene, steps, events, &outcome, earlier)?;
+                proved.obstacle_clearances.push(outcome);
                 Ok(())
             }
             ParsedLine::LeastClearance(outcome) => {
@@ -273,6 +428,10 @@ impl Checker {
             }
             ParsedLine::HeadLocks { from, to } => begun(pitch)?.add_lock(scene, from, to),
             ParsedLine::Far { pitch: free, radius } => begun(pitch)?.add_far(scene, free, radius),
+            ParsedLine::Dragon { .. }
+            | ParsedLine::Pair { .. }
+            | ParsedLine::Both { .. }
+            | ParsedLine::Meeting { .. } => Err("the scene has one dragon".to_owned()),
             ParsedLine::LeastPitch(outcome) => {
                 begun(pitch)?.check(&outcome)?;
                 proved.least_pitch = Some(outcome);
@@ -281,7 +440,12 @@ impl Checker {
         }
     }
 
-    fn finished(self) -> Proved {
+    fn finished(mut self) -> Proved {
+        if self.alone.is_some() {
+            // A complete certificate ends with a complete section.
+            let _ = self.end_section();
+            return self.proved;
+        }
         let Steps { steps, links, pairs, .. } = self.steps;
         let of_pitch = self.pitch.as_ref().map_or((0, 0, 0), Pitch::counts);
         let (steps, links) = (steps + self.greatest.steps + of_pitch.0, links + self.greatest.links + of_pitch.1);

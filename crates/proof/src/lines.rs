@@ -27,10 +27,21 @@ pub(super) enum ParsedLine {
         #[serde(default)]
         apart: Option<f64>,
         #[serde(default)]
+        beside: Vec<Option<f64>>,
+        #[serde(default)]
         at: Vec<Place>,
     },
     Near {
         benches: [usize; 2],
+        from: Place,
+        to: Place,
+        spans: Vec<Span>,
+        at: Vec<Place>,
+        most: f64,
+    },
+    NearObstacle {
+        obstacle: usize,
+        bench: usize,
         from: Place,
         to: Place,
         spans: Vec<Span>,
@@ -69,8 +80,28 @@ pub(super) enum ParsedLine {
         jump: Option<Span>,
     },
     PathEnd {},
+    Dragon {
+        dragon: usize,
+    },
+    Pair {
+        dragons: [usize; 2],
+    },
+    Both {
+        from: f64,
+        to: f64,
+        heads: [Span; 2],
+        spans: [Vec<Span>; 2],
+    },
+    Meeting {
+        benches: [usize; 2],
+        time: f64,
+        heads: [Span; 2],
+        spans: [Vec<Span>; 2],
+        point: [f64; 2],
+    },
     Result(ProvedEvent),
     LeastClearance(ProvedClearance),
+    ObstacleClearance(ProvedObstacleClearance),
     Speeds {
         from: Place,
         to: Place,
@@ -176,6 +207,10 @@ pub struct ProvedEvent {
     /// The number of the obstacle on the stage, from 0; the boundary is the last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<usize>,
+    /// In a scene of several dragons, the dragon that the result is about, or the two, counted from 0. Benches are
+    /// counted within each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dragons: Vec<usize>,
     /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not checked.
     #[serde(default)]
     pub because: Option<String>,
@@ -214,6 +249,28 @@ pub struct ProvedClearance {
     /// The other bench.
     #[serde(default)]
     pub bench_b: Option<usize>,
+}
+
+/// The proved least clearance of an obstacle, from the scene's start on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProvedObstacleClearance {
+    /// The number of the obstacle on the stage, from 0; the boundary is the last.
+    pub obstacle: usize,
+    /// Metres: no board's clearance is less.
+    #[serde(default)]
+    pub lo: Option<f64>,
+    /// Metres: at one place the bench's clearance is no more.
+    #[serde(default)]
+    pub hi: Option<f64>,
+    /// The end of the stretch: the path's end or a time.
+    pub until: Until,
+    /// Seconds of that end, for [`Until::Time`].
+    #[serde(default)]
+    pub time_until: Option<f64>,
+    /// The bench, counted from 0.
+    #[serde(default)]
+    pub bench: Option<usize>,
 }
 
 /// The proved greatest speed of the head at which no handle exceeds a limit.

@@ -34,13 +34,39 @@ pub(super) struct Span(pub Place, pub Place);
 /// A curve, as a function of its coordinate.
 pub(super) enum Curve {
     /// Towards the centre: the coordinate falls with travel. `a` is in metres of radius per radian.
-    Inward { a: Interval },
+    Inward { a: Interval, frame: Option<Frame> },
     /// Away from the centre, turned by half a turn.
-    Outward { a: Interval },
+    Outward { a: Interval, frame: Option<Frame> },
     /// Coordinates are metres from `origin`.
     Line { origin: Vector, direction: Vector },
     /// Coordinates are radians from `origin`.
     Arc { origin: Vector, direction: Vector, to_centre: Vector, radius: Interval },
+}
+
+/// The place of a route's spiral: the spiral about the origin is mirrored (y to -y), rotated and moved.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    centre: Vector,
+    /// Cosine and sine of the rotation.
+    rotation: Vector,
+    is_mirrored: bool,
+}
+
+impl Frame {
+    fn vector(&self, Vector { x, y }: &Vector) -> Vector {
+        let Vector { x: cosine, y: sine } = &self.rotation;
+        let y = if self.is_mirrored { -*y } else { *y };
+        Vector { x: cosine * x - sine * y, y: sine * x + cosine * y }
+    }
+
+    fn at(&self, At { point, tangent }: &At) -> At {
+        At { point: self.centre.plus(&self.vector(point)), tangent: self.vector(tangent) }
+    }
+
+    /// Returns a curvature to the left, or its rate, of the spiral about the origin in this frame.
+    fn bend(frame: Option<&Self>, bend: Interval) -> Interval {
+        if frame.is_some_and(|frame| frame.is_mirrored) { -bend } else { bend }
+    }
 }
 
 /// A point of the path with the unit tangent in the direction of travel.
@@ -57,14 +83,40 @@ impl Curve {
         Self::Arc { origin, direction, to_centre, radius }
     }
 
+    /// Creates a spiral of `a` metres per radian from `origin`, where its polar angle is `first` and the direction of
+    /// travel `heading` radians from x. `to_left` is true if its centre is on the left.
+    pub fn spiral_from(
+        origin: &Vector,
+        heading: &Interval,
+        is_inward: bool,
+        to_left: bool,
+        a: Interval,
+        first: &Interval,
+    ) -> Self {
+        let of = |frame| if is_inward { Self::Inward { a, frame } } else { Self::Outward { a, frame } };
+        // About the origin an inward spiral turns right, an outward one left, with the tangent at theta + atan theta +
+        // pi.
+        let is_mirrored = is_inward == to_left;
+        let own_heading = first + elementary::atan(first) + elementary::turns(0.5);
+        let turned = if is_mirrored { heading + own_heading } else { heading - own_heading };
+        let (sine, cosine) = elementary::sin_cos(&turned);
+        let frame = Frame { centre: *origin, rotation: Vector { x: cosine, y: sine }, is_mirrored };
+        let centre = origin.minus(&frame.vector(&of(None).at(first).point));
+        of(Some(Frame { centre, ..frame }))
+    }
+
     /// Returns point and tangent at a coordinate.
     pub fn at(&self, coordinate: &Interval) -> At {
         match self {
-            Self::Inward { a } => spiral_at(a, coordinate),
-            Self::Outward { a } => {
+            Self::Inward { a, frame } => {
+                let at = spiral_at(a, coordinate);
+                frame.as_ref().map_or_else(|| at.clone(), |frame| frame.at(&at))
+            }
+            Self::Outward { a, frame } => {
                 let At { point, tangent } = spiral_at(a, coordinate);
                 // Turned by half a turn, and travelled the other way.
-                At { point: Vector { x: -point.x, y: -point.y }, tangent }
+                let at = At { point: Vector { x: -point.x, y: -point.y }, tangent };
+                frame.as_ref().map_or_else(|| at.clone(), |frame| frame.at(&at))
             }
             Self::Line { origin, direction } => {
                 At { point: origin.plus(&direction.scaled(coordinate)), tangent: *direction }
@@ -82,8 +134,8 @@ impl Curve {
     /// Returns the metres of travel from one coordinate to another.
     pub fn metres(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
-            Self::Inward { a } => spiral_metres(a, from) - spiral_metres(a, to),
-            Self::Outward { a } => spiral_metres(a, to) - spiral_metres(a, from),
+            Self::Inward { a, .. } => spiral_metres(a, from) - spiral_metres(a, to),
+            Self::Outward { a, .. } => spiral_metres(a, to) - spiral_metres(a, from),
             Self::Line { .. } => to - from,
             Self::Arc { radius, .. } => radius * (to - from),
         }
@@ -93,8 +145,8 @@ impl Curve {
     fn metres_bound(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
             // The radian at angle theta is a w(theta) metres long, most at the greater angle.
-            Self::Inward { a } => a * w(from) * (from - to),
-            Self::Outward { a } => a * w(to) * (to - from),
+            Self::Inward { a, .. } => a * w(from) * (from - to),
+            Self::Outward { a, .. } => a * w(to) * (to - from),
             Self::Line { .. } | Self::Arc { .. } => self.metres(from, to),
         }
     }
@@ -102,8 +154,8 @@ impl Curve {
     /// Returns an upper bound of the curvature from one coordinate to a later one, 1/m.
     fn curvature_bound(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
-            Self::Inward { a } => spiral_curvature(a, to),
-            Self::Outward { a } => spiral_curvature(a, from),
+            Self::Inward { a, .. } => spiral_curvature(a, to),
+            Self::Outward { a, .. } => spiral_curvature(a, from),
             Self::Line { .. } => Interval::new(0.0),
             Self::Arc { radius, .. } => Interval::new(1.0) / radius,
         }
@@ -127,8 +179,12 @@ impl Curve {
     fn bend(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
             // The curvature falls with the angle.
-            Self::Inward { a } => -spiral_curvature(a, from).hull(&spiral_curvature(a, to)),
-            Self::Outward { a } => spiral_curvature(a, from).hull(&spiral_curvature(a, to)),
+            Self::Inward { a, frame } => {
+                Frame::bend(frame.as_ref(), -spiral_curvature(a, from).hull(&spiral_curvature(a, to)))
+            }
+            Self::Outward { a, frame } => {
+                Frame::bend(frame.as_ref(), spiral_curvature(a, from).hull(&spiral_curvature(a, to)))
+            }
             Self::Line { .. } => Interval::new(0.0),
             Self::Arc { direction, to_centre, radius, .. } => {
                 let is_left = direction.cross(to_centre).is_positive();
@@ -140,11 +196,12 @@ impl Curve {
     /// Returns the change of that curvature per metre from one coordinate to a later one, 1/m^2.
     fn bend_rate(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
-            Self::Inward { a } | Self::Outward { a } => {
+            Self::Inward { a, frame } | Self::Outward { a, frame } => {
                 let theta = from.hull(to);
                 let square = theta.square();
                 let w_squared = square + Interval::new(1.0);
-                -(theta * (square + Interval::new(4.0)) / (a.square() * w_squared * w_squared.square()))
+                let rate = -(theta * (square + Interval::new(4.0)) / (a.square() * w_squared * w_squared.square()));
+                Frame::bend(frame.as_ref(), rate)
             }
             Self::Line { .. } | Self::Arc { .. } => Interval::new(0.0),
         }
@@ -153,8 +210,8 @@ impl Curve {
     /// Returns a double near the metres per unit of the coordinate, negative if the coordinate falls with travel.
     fn rough_speed(&self, coordinate: f64) -> f64 {
         match self {
-            Self::Inward { a } => -a.rough() * coordinate.hypot(1.0),
-            Self::Outward { a } => a.rough() * coordinate.hypot(1.0),
+            Self::Inward { a, .. } => -a.rough() * coordinate.hypot(1.0),
+            Self::Outward { a, .. } => a.rough() * coordinate.hypot(1.0),
             Self::Line { .. } => 1.0,
             Self::Arc { radius, .. } => radius.rough(),
         }
@@ -280,7 +337,9 @@ impl Path {
             return at.is_not_negative();
         }
         let before = |a: &Interval, b: &Interval| if self.falls(place.0) { b.is_below(a) } else { a.is_below(b) };
-        segment.begin.as_ref().is_none_or(|begin| before(begin, &at))
+        // The last segment continues beyond the path's end, but not through the centre of a spiral.
+        (!self.falls(place.0) || at.is_not_negative())
+            && segment.begin.as_ref().is_none_or(|begin| before(begin, &at))
             && segment.end.as_ref().is_none_or(|end| before(&at, end))
     }
 
@@ -321,7 +380,7 @@ impl Path {
     /// Returns the metres from the centre at a place of an inward spiral.
     pub fn spiral_radius(&self, place: Place) -> Option<Interval> {
         match &self.segments[place.0].curve {
-            Curve::Inward { a } => Some(a * place.coordinate()),
+            Curve::Inward { a, .. } => Some(a * place.coordinate()),
             _ => None,
         }
     }

@@ -2,7 +2,7 @@
 
 use super::events::{Events, Finish};
 use super::interval::Interval;
-use super::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
+use super::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, Status, Until};
 use super::path::Place;
 use super::scene::Scene;
 use super::steps::Steps;
@@ -119,9 +119,53 @@ pub(super) fn check_clearance(
     }
 }
 
+/// Checks the result for an obstacle in a certificate of the least clearance.
+///
+/// # Errors
+/// The condition that does not follow.
+pub(super) fn check_obstacle_clearance(
+    scene: &Scene,
+    steps: &Steps,
+    events: &Events,
+    outcome: &ProvedObstacleClearance,
+    earlier: usize,
+) -> Result<(), String> {
+    let ProvedObstacleClearance { obstacle, lo, hi, until, time_until, bench } = *outcome;
+    if obstacle != earlier || obstacle >= scene.obstacles.len() {
+        return Err("the obstacles are not all named in their order".to_owned());
+    }
+    let beside = steps.beside(obstacle);
+    let comes_to = |metres: &Interval| beside.end.is_some_and(|end| metres.is_at_most(&scene.path.travelled(end)));
+    if lo.is_some_and(|lo| !(lo.is_finite() && lo <= beside.least && comes_to(&Interval::new(0.0)))) {
+        return Err("the clearance lo does not follow".to_owned());
+    }
+    let is_reached = match (until, time_until) {
+        (Until::PathEnd, None) => beside.all && matches!(events.finish, Some(Finish::PathEnd)),
+        (Until::Time, Some(time)) => {
+            time >= 0.0 && (lo.is_none() || comes_to(&(Interval::new(time) * scene.head_speed)))
+        }
+        _ => false,
+    };
+    if !is_reached {
+        return Err("the end of the stretch does not follow".to_owned());
+    }
+    let near = events.near_obstacles.iter().find(|near| near.obstacle == obstacle);
+    let is_before = |travelled: &Interval| {
+        time_until.is_none_or(|time| travelled.is_at_most(&(Interval::new(time) * scene.head_speed)))
+    };
+    let follows = match (hi, bench, near) {
+        (None, None, _) => true,
+        (Some(hi), Some(bench), Some(near)) => {
+            bench == near.bench && near.most.is_at_most(&Interval::new(hi)) && is_before(&near.travelled)
+        }
+        _ => false,
+    };
+    if follows { Ok(()) } else { Err("the clearance hi, or its bench, does not follow".to_owned()) }
+}
+
 fn known(scene: &Scene, steps: &Steps, events: &Events, (event, obstacle): (EventKind, usize)) -> Known {
     let zero = Interval::new(0.0);
-    let seconds = |place: Place| (scene.path.travelled(place) / scene.head_speed).max(&zero);
+    let seconds = |place: Place| scene.time(&scene.path.travelled(place));
     let after = |place: Option<Place>| place.map_or_else(|| zero, seconds);
     let finished = events.finish.is_some();
     match event {
@@ -153,7 +197,7 @@ fn known(scene: &Scene, steps: &Steps, events: &Events, (event, obstacle): (Even
             }
         }
         EventKind::PathEnd => {
-            let seconds = (scene.path.length / scene.head_speed).max(&zero);
+            let seconds = scene.time(&scene.path.length);
             let reached = matches!(events.finish, Some(Finish::PathEnd));
             Known {
                 not_before: seconds,

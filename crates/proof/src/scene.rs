@@ -2,17 +2,27 @@
 //! are ignored.
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::elementary;
-use super::ground::{Obstacle, PlacementText, StageText};
+use super::ground::{Mapping, Obstacle, PlacementText, StageText};
 use super::interval::{Interval, Vector};
 use super::path::{Curve, Path, PathEnd, Segment};
 
 /// Limit of benches, and of pieces of a path.
 const MOST: usize = 1_000_000;
 
-/// The scene of a certificate.
+/// The greatest number of dragons.
+const MOST_DRAGONS: usize = 16;
+
+/// One dragon of the scene of a certificate.
 pub(super) struct Scene {
+    /// The name; empty in a scene of one dragon.
+    pub name: String,
+    /// Seconds of the show during which it stands at its start.
+    pub delay: Interval,
+    /// The place of the path on the stage.
+    pub frame: Mapping,
     pub team: Team,
     pub path: Path,
     /// Metres per second.
@@ -50,6 +60,28 @@ struct Text {
     motion: MotionText,
     placement: Option<PlacementText>,
     stage: Option<StageText>,
+}
+
+/// The dragons of a scene of several.
+#[derive(Deserialize)]
+struct SeveralText {
+    #[serde(default)]
+    dragons: Vec<DragonText>,
+    team: Option<IgnoredAny>,
+    stage: Option<StageText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DragonText {
+    name: String,
+    #[serde(default)]
+    delay: f64,
+    team: TeamText,
+    path: PathText,
+    #[serde(default)]
+    placement: PlacementText,
+    motion: MotionText,
 }
 
 #[derive(Deserialize)]
@@ -97,6 +129,14 @@ enum PathText {
 enum PieceText {
     Line { length: f64 },
     Arc { radius: f64, side: Side, turns: Option<f64>, length: Option<f64> },
+    Spiral { pitch: f64, radius: f64, direction: Way, side: Side, turns: Option<f64>, length: Option<f64> },
+}
+
+#[derive(Deserialize, Clone, Copy, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Way {
+    In,
+    Out,
 }
 
 #[derive(Deserialize, Clone, Copy)]
@@ -104,6 +144,11 @@ enum PieceText {
 enum Side {
     Left,
     Right,
+}
+
+/// Reads a text.
+fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+    toml::from_str(text).map_err(|error: toml::de::Error| error.message().trim().replace('\n', ", "))
 }
 
 fn positive(field: &str, number: f64) -> Result<Interval, String> {
@@ -128,7 +173,27 @@ impl Scene {
     /// # Errors
     /// A sentence for a text that is not a scene.
     pub fn read(text: &str) -> Result<Self, String> {
-        let text: Text = toml::from_str(text).map_err(|error| error.message().trim().replace('\n', ", "))?;
+        let Text { team, path, motion, placement, stage } = parsed(text)?;
+        let placement = placement.unwrap_or_default();
+        Self::of(DragonText { name: String::new(), delay: 0.0, team, path, placement, motion }, stage.as_ref())
+    }
+
+    /// Reads the dragons of a scene of several; an empty list if it is a scene of one.
+    ///
+    /// # Errors
+    /// A sentence for a text that is not a scene.
+    pub fn read_several(text: &str) -> Result<Vec<Self>, String> {
+        let SeveralText { dragons, team, stage } = parsed(text)?;
+        if dragons.len() > MOST_DRAGONS || !dragons.is_empty() && team.is_some() {
+            return Err("expected [team], or from 1 to 16 [[dragons]]".to_owned());
+        }
+        dragons.into_iter().map(|dragon| Self::of(dragon, stage.as_ref())).collect()
+    }
+
+    fn of(text: DragonText, stage: Option<&StageText>) -> Result<Self, String> {
+        if !(text.delay.is_finite() && text.delay >= 0.0) {
+            return Err(format!("a delay is {:?}, expected a number that is not negative", text.delay));
+        }
         let team = text.team.read()?;
         let path = match &text.path {
             PathText::Spiral { pitch, start_turn } => spiral(*pitch, *start_turn)?,
@@ -140,15 +205,28 @@ impl Scene {
         }
         let head_speed = positive("motion.head_speed", text.motion.head_speed)?;
         let start = if let PathText::Pieces { start, .. } = &text.path { *start } else { [0.0; 2] };
-        let obstacles = match &text.stage {
-            Some(stage) => stage.read(&text.placement.unwrap_or_default(), start)?,
-            None => Vec::new(),
-        };
-        Ok(Self { team, path, head_speed, obstacles })
+        let frame = Mapping::new(&text.placement, start)?;
+        let obstacles = stage.map_or_else(|| Ok(Vec::new()), |stage| stage.read(&frame))?;
+        let (name, delay) = (text.name, Interval::new(text.delay));
+        Ok(Self { name, delay, frame, team, path, head_speed, obstacles })
     }
-}
 
-impl Scene {
+    /// Returns the seconds of the show at which the head has travelled some metres: before the path's start 0, and at
+    /// it from 0 until it begins to move.
+    pub fn time(&self, travelled: &Interval) -> Interval {
+        let zero = Interval::new(0.0);
+        let seconds = (travelled / self.head_speed).max(&zero);
+        if !self.delay.is_positive() {
+            seconds
+        } else if travelled.is_positive() {
+            seconds + self.delay
+        } else if travelled.is_at_most(&zero) {
+            zero
+        } else {
+            zero.hull(&(seconds + self.delay))
+        }
+    }
+
     /// Returns the same team in units of `unit` metres, on the inward spiral r = theta.
     pub fn in_units(&self, unit: &Interval) -> Self {
         let Team { benches, width, hole_inset, head_link, body_link } = &self.team;
@@ -168,9 +246,17 @@ impl Scene {
         let Team { benches, width, hole_inset, head_link, body_link } = self.team;
         let team = Team { benches, width, hole_inset, head_link, body_link };
         let zero = Interval::new(0.0);
-        let inward = Segment { curve: Curve::Inward { a }, begin: None, end: Some(zero) };
+        let inward = Segment { curve: Curve::Inward { a, frame: None }, begin: None, end: Some(zero) };
         let path = Path::new(vec![inward], zero, PathEnd::Coordinate(zero), zero);
-        Self { team, path, head_speed: self.head_speed, obstacles: Vec::new() }
+        Self {
+            name: String::new(),
+            delay: zero,
+            frame: Mapping::unmoved(),
+            team,
+            path,
+            head_speed: self.head_speed,
+            obstacles: Vec::new(),
+        }
     }
 }
 
@@ -201,7 +287,8 @@ fn growth(pitch: f64) -> Result<Interval, String> {
 
 fn spiral(pitch: f64, start_turn: f64) -> Result<Path, String> {
     positive("path.start_turn", start_turn)?;
-    let inward = Segment { curve: Curve::Inward { a: growth(pitch)? }, begin: None, end: Some(Interval::new(0.0)) };
+    let curve = Curve::Inward { a: growth(pitch)?, frame: None };
+    let inward = Segment { curve, begin: None, end: Some(Interval::new(0.0)) };
     let start = elementary::turns(start_turn);
     let length = inward.curve.metres(&start, &Interval::new(0.0));
     Ok(Path::new(vec![inward], length, PathEnd::Coordinate(Interval::new(0.0)), length))
@@ -215,7 +302,7 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
     let radius = positive("path.turn_radius", *turn_radius)?;
     let ratio = positive("path.arc_ratio", *arc_ratio)?;
     let turn = radius / a;
-    let inward = Curve::Inward { a };
+    let inward = Curve::Inward { a, frame: None };
     let lead_in = match (lead_in, start_turn) {
         (Some(metres), None) if *metres == 0.0 => Interval::new(0.0),
         (Some(metres), None) => positive("path.lead_in", *metres)?,
@@ -249,7 +336,7 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
         Segment { curve: inward, begin: None, end: Some(turn) },
         Segment { curve: first, begin: zero(), end: Some(angle) },
         Segment { curve: second, begin: zero(), end: Some(angle) },
-        Segment { curve: Curve::Outward { a }, begin: Some(turn), end: None },
+        Segment { curve: Curve::Outward { a, frame: None }, begin: Some(turn), end: None },
     ];
     Ok(Path::new(segments, lead_in, PathEnd::Travelled, length))
 }
@@ -262,40 +349,137 @@ fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Pa
     finite("path.start", start[0]).and(finite("path.start", start[1]))?;
     // The route in its own coordinates: no statement of a certificate depends on the place of its start.
     let mut origin = Vector { x: Interval::new(0.0), y: Interval::new(0.0) };
-    let (sine, cosine) = elementary::sin_cos(&elementary::turns(heading_turns));
-    let mut direction = Vector { x: cosine, y: sine };
+    // Directions follow from the angle turned so far: the product of thousands of rotations would be too wide.
+    let mut heading = elementary::turns(heading_turns);
     let zero = || Interval::new(0.0);
-    let behind = Curve::Line { origin, direction };
+    let behind = Curve::Line { origin, direction: direction(&heading) };
     let mut segments = vec![Segment { curve: behind, begin: None, end: Some(zero()) }];
     let (mut length, mut end) = (zero(), zero());
     for piece in pieces {
-        let curve = match piece {
-            PieceText::Line { length } => {
-                end = positive("path.pieces.length", *length)?;
-                Curve::Line { origin, direction }
-            }
-            PieceText::Arc { radius, side, turns, length } => {
-                let radius = positive("path.pieces.radius", *radius)?;
-                end = match (turns, length) {
-                    (Some(turns), None) => {
-                        positive("path.pieces.turns", *turns)?;
-                        elementary::turns(*turns)
-                    }
-                    (None, Some(length)) => positive("path.pieces.length", *length)? / radius,
-                    _ => return Err("an arc has either turns or a length".to_owned()),
-                };
-                let to_left = Interval::new(if matches!(side, Side::Left) { 1.0 } else { -1.0 });
-                Curve::arc(origin, direction, to_left, radius)
-            }
-        };
-        length = length + curve.metres(&zero(), &end);
-        let at = curve.at(&end);
-        (origin, direction) = (at.point, at.tangent);
-        segments.push(Segment { curve, begin: Some(zero()), end: Some(end) });
+        let (curve, begin, turned);
+        (curve, begin, end, turned) = read_piece(piece, origin, &heading)?;
+        length = length + curve.metres(&begin, &end);
+        origin = curve.at(&end).point;
+        heading = heading + turned;
+        segments.push(Segment { curve, begin: Some(begin), end: Some(end) });
     }
     // The last segment continues beyond the path's end.
     if let Some(last) = segments.last_mut() {
         last.end = None;
     }
     Ok(Path::new(segments, zero(), PathEnd::Coordinate(end), length))
+}
+
+fn direction(heading: &Interval) -> Vector {
+    let (sine, cosine) = elementary::sin_cos(heading);
+    Vector { x: cosine, y: sine }
+}
+
+/// Returns the curve of a piece that begins at `origin`, its first and last coordinates, and the radians by which it
+/// turns to the left.
+fn read_piece(
+    piece: &PieceText,
+    origin: Vector,
+    heading: &Interval,
+) -> Result<(Curve, Interval, Interval, Interval), String> {
+    let zero = Interval::new(0.0);
+    let to_left = |side: &Side| Interval::new(if matches!(side, Side::Left) { 1.0 } else { -1.0 });
+    match piece {
+        PieceText::Line { length } => {
+            let end = positive("path.pieces.length", *length)?;
+            Ok((Curve::Line { origin, direction: direction(heading) }, zero, end, zero))
+        }
+        PieceText::Arc { radius, side, turns, length } => {
+            let radius = positive("path.pieces.radius", *radius)?;
+            let end = match (turns, length) {
+                (Some(turns), None) => {
+                    positive("path.pieces.turns", *turns)?;
+                    elementary::turns(*turns)
+                }
+                (None, Some(length)) => positive("path.pieces.length", *length)? / radius,
+                _ => return Err("an arc has either turns or a length".to_owned()),
+            };
+            let curve = Curve::arc(origin, direction(heading), to_left(side), radius);
+            Ok((curve, zero, end, to_left(side) * end))
+        }
+        PieceText::Spiral { pitch, radius, direction, side, turns, length } => {
+            let a = positive("path.pieces.pitch", *pitch)? / elementary::turns(1.0);
+            let first = positive("path.pieces.radius", *radius)? / a;
+            let is_inward = *direction == Way::In;
+            let last = match (turns, length) {
+                (Some(turns), None) => {
+                    positive("path.pieces.turns", *turns)?;
+                    let around = elementary::turns(*turns);
+                    if is_inward { first - around } else { first + around }
+                }
+                (None, Some(length)) => {
+                    let metres = positive("path.pieces.length", *length)?;
+                    last_angle(&a, &first, &if is_inward { -metres } else { metres })?
+                }
+                _ => return Err("a spiral has either turns or a length".to_owned()),
+            };
+            if !last.is_positive() {
+                return Err("a spiral leads to its centre or past it".to_owned());
+            }
+            let (inner, outer) = if is_inward { (last, first) } else { (first, last) };
+            let turned = (outer - inner) + (elementary::atan(&outer) - elementary::atan(&inner));
+            let is_left = matches!(side, Side::Left);
+            let curve = Curve::spiral_from(&origin, heading, is_inward, is_left, a, &first);
+            Ok((curve, first, last, to_left(side) * turned))
+        }
+    }
+}
+
+/// Returns the polar angle `metres` of a spiral further out than `first`, further in if they are negative, by a step of
+/// Newton's method from a guess: the root is within an interval if the step from its middle leads there with every rate
+/// in it.
+fn last_angle(a: &Interval, first: &Interval, metres: &Interval) -> Result<Interval, String> {
+    let outward = Curve::Outward { a: *a, frame: None };
+    let step = |from: f64, within: &Interval| {
+        let rate = a * (within.square() + Interval::new(1.0)).sqrt();
+        (metres - outward.metres(first, &Interval::new(from))) / rate
+    };
+    let guess = rough_angle(metres.rough() / a.rough(), first.rough());
+    // Near the centre the guess lacks digits, as a difference of lengths.
+    let guess = (0..4).fold(guess, |guess, _| guess + step(guess, &Interval::new(guess)).rough());
+    let within = Interval::new(guess) + Interval::new(1e-9 * guess.abs()).around_zero();
+    let last = Interval::new(guess) + step(guess, &within);
+    let is_found = guess > 0.0 && (last - Interval::new(guess)).abs().is_below(&Interval::new(1e-9 * guess));
+    if is_found { Ok(last) } else { Err("a spiral's length leads to its centre or past it".to_owned()) }
+}
+
+/// Returns a double near the polar angle that is `length` further out than `first` on the spiral r = theta.
+fn rough_angle(length: f64, first: f64) -> f64 {
+    let of = |theta: f64| 0.5 * (theta * theta.hypot(1.0) + theta.asinh());
+    let target = of(first) + length;
+    // The length is convex: Newton's method comes down from a guess that is too far out.
+    let mut theta = (2.0 * target.max(0.0)).sqrt();
+    for _ in 0..100 {
+        theta -= (of(theta) - target) / theta.hypot(1.0);
+    }
+    theta
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The metres to the angle found are those asked for, with more digits than a double has, up to a centimetre from
+    /// the centre.
+    #[test]
+    fn the_angle_after_some_metres_of_a_spiral() {
+        let a = Interval::new(1.7) / elementary::turns(1.0);
+        let first = Interval::new(12.0) / a;
+        let to_centre = Curve::Inward { a, frame: None }.metres(&first, &Interval::new(0.0));
+        let inward = [1e-3, 40.0, 266.0].map(|metres| Interval::new(-metres));
+        let outward = [1e-3, 1.0, 1e5].map(Interval::new);
+        let near_the_centre = [Interval::new(0.01) - to_centre];
+        for metres in inward.into_iter().chain(outward).chain(near_the_centre) {
+            let last = last_angle(&a, &first, &metres).unwrap();
+            let found = Curve::Outward { a, frame: None }.metres(&first, &last);
+            assert!((found - metres).abs().is_below(&Interval::new(1e-19)), "{}", metres.rough());
+        }
+        assert!(last_angle(&a, &first, &-to_centre).is_err());
+        assert!(last_angle(&a, &first, &Interval::new(-300.0)).is_err());
+    }
 }

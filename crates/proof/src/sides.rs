@@ -40,6 +40,55 @@ impl Sides {
         })
     }
 
+    /// Returns the gap between this board and the ends of segments along a unit vector.
+    pub fn gap_to(&self, segments: &[[[f64; 2]; 2]], n: [f64; 2]) -> f64 {
+        let least = segments.iter().flatten().map(|end| dot(n, *end)).fold(f64::INFINITY, f64::min);
+        let most = self.corners().into_iter().map(|corner| dot(n, corner)).fold(f64::NEG_INFINITY, f64::max);
+        least - most
+    }
+
+    /// Returns the parts of a point along the board and to the left, as shares of half its length and half its width,
+    /// at most 1: the nearest point of the board.
+    pub fn shares_of(&self, point: [f64; 2]) -> [f64; 2] {
+        let [along, aside] = self.seen(minus(point, self.centre));
+        [(along / self.half_length).clamp(-1.0, 1.0), (aside / self.half_width).clamp(-1.0, 1.0)]
+    }
+
+    /// Returns the share of the way along a segment at which the point nearest to the board is, and the vector to it
+    /// from the board.
+    pub fn nearest_of([from, to]: [[f64; 2]; 2], board: &Self) -> (f64, [f64; 2]) {
+        let along = minus(to, from);
+        let at = |share: f64| [0, 1].map(|part| from[part] + share * along[part]);
+        let of_corner = |corner: [f64; 2]| {
+            let share = (dot(minus(corner, from), along) / dot(along, along)).clamp(0.0, 1.0);
+            // A segment of one point.
+            let share = if share.is_nan() { 0.0 } else { share };
+            (share, minus(at(share), corner))
+        };
+        let of_end = |share: f64| {
+            let ([x, y], [ahead, left]) = (board.axis, board.shares_of(at(share)));
+            let (along, aside) = (ahead * board.half_length, left * board.half_width);
+            let on_board = [board.centre[0] + along * x - aside * y, board.centre[1] + along * y + aside * x];
+            (share, minus(at(share), on_board))
+        };
+        let all = board.corners().into_iter().map(of_corner).chain([0.0, 1.0].map(of_end));
+        let square = |(_, by): &(f64, [f64; 2])| dot(*by, *by);
+        all.min_by(|one, other| square(one).total_cmp(&square(other))).unwrap_or((0.0, [0.0; 2]))
+    }
+
+    /// Returns unit vectors along which segments may be apart from the board: to the nearest point of each, its
+    /// normals, and the normals of the board's sides.
+    pub fn directions_to(&self, segments: &[[[f64; 2]; 2]]) -> Vec<[f64; 2]> {
+        let [x, y] = self.axis;
+        let mut directions = vec![[x, y], [-y, x], [-x, -y], [y, -x]];
+        for [from, to] in segments {
+            let [along_x, along_y] = minus(*to, *from);
+            directions.extend([[-along_y, along_x], [along_y, -along_x], Self::nearest_of([*from, *to], self).1]);
+        }
+        let unit = |[x, y]: [f64; 2]| [x / x.hypot(y), y / x.hypot(y)];
+        directions.into_iter().map(unit).filter(|n| n[0].is_finite() && n[1].is_finite()).collect()
+    }
+
     /// Returns the gap between this board and another along a direction fixed to this board.
     pub fn gap(&self, other: &Self, [ahead, left]: [f64; 2]) -> f64 {
         let reach = |corner: [f64; 2]| dot([ahead, left], self.seen(minus(corner, self.centre)));

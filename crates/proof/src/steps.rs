@@ -6,6 +6,7 @@ use super::apart;
 use super::boards::{Board, is_inside_ring};
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
+use super::first_order::FirstOrder;
 use super::interval::Interval;
 use super::lines::Links;
 use super::path::{Place, Span};
@@ -22,6 +23,8 @@ pub(super) struct Step {
     pub free: Vec<usize>,
     /// Metres that boards are said to be more apart.
     pub apart: Option<f64>,
+    /// By obstacle: metres that its clearance is said to be more than.
+    pub beside: Vec<Option<f64>>,
     /// Places of all listed handles with the head at one place.
     pub at: Vec<Place>,
 }
@@ -43,6 +46,8 @@ pub(super) struct Steps {
     pub apart: f64,
     /// By obstacle: the end of the last step that stays clear of it, and true if all steps did.
     free: Vec<(Option<Place>, bool)>,
+    /// By obstacle: what is known of its clearance.
+    beside: Vec<Beside>,
     /// Spans of the last step.
     pub spans: Vec<Span>,
     /// Lemma 4: S is not beyond this place, the end of handle 1's span in the first step.
@@ -57,6 +62,19 @@ pub(super) struct Steps {
     pub pairs: u64,
 }
 
+/// The clearance of an obstacle in the steps so far.
+#[derive(Clone, Copy)]
+pub(super) struct Beside {
+    /// The end of the last step that says something of it.
+    pub end: Option<Place>,
+    /// True if all steps do.
+    pub all: bool,
+    /// Metres that it was more than up to `end`.
+    pub least: f64,
+}
+
+const NOTHING: Beside = Beside { end: None, all: true, least: f64::INFINITY };
+
 impl Steps {
     pub fn new() -> Self {
         Self {
@@ -69,6 +87,7 @@ impl Steps {
             all_apart: true,
             apart: f64::INFINITY,
             free: Vec::new(),
+            beside: Vec::new(),
             spans: Vec::new(),
             start_of_second: None,
             has_come: false,
@@ -89,7 +108,7 @@ impl Steps {
     /// # Errors
     /// The condition that does not follow.
     pub fn add(&mut self, scene: &Scene, step: Step) -> Result<(), String> {
-        let Step { links, head, moving, clear, spans, free, apart, at } = step;
+        let Step { links, head, moving, clear, spans, free, apart, beside, at } = step;
         let Span(from, to) = head;
         span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
         match self.end {
@@ -110,7 +129,10 @@ impl Steps {
         self.add_moving(moving, to, &chain)?;
         self.add_clear(scene, links, clear, to, &chain)?;
         self.add_free(scene, links, &free, to, &chain)?;
-        self.add_apart(scene, links, (apart, &at), to, &chain)?;
+        let claims = apart.is_some() || beside.iter().any(Option::is_some);
+        let first_order = if claims { Some(FirstOrder::new(scene, &chain, &at)?) } else { None };
+        self.add_apart(scene, links, apart.zip(first_order.as_ref()), to, &chain)?;
+        self.add_beside(scene, links, (&beside, first_order.as_ref()), to, &chain)?;
         self.steps += 1;
         self.links += chain.products.len() as u64;
         self.end = Some(to);
@@ -199,17 +221,8 @@ impl Steps {
             return Err(format!("it names the obstacle {obstacle}, which the scene has not"));
         }
         self.free.resize(scene.obstacles.len(), (None, true));
-        let team = &scene.team;
-        let mut boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
-            .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
-            .collect();
-        let last = chain.last();
-        let run = (links == Links::All && last < team.benches).then(|| straight_run(scene, chain, last));
-        match &run {
-            Some((front, rear, length)) => boards.push(Board::new(front, rear, *length, team)),
-            None if links == Links::Front => boards.truncate(2),
-            None => {}
-        }
+        let run = run_on_ground(scene, links, chain);
+        let boards = boards_on_ground(scene, links, chain, run.as_ref());
         for (number, obstacle) in scene.obstacles.iter().enumerate() {
             let (end, all) = &mut self.free[number];
             if !free.contains(&number) {
@@ -231,11 +244,11 @@ impl Steps {
         &mut self,
         scene: &Scene,
         links: Links,
-        (apart, at): (Option<f64>, &[Place]),
+        apart: Option<(f64, &FirstOrder)>,
         to: Place,
         chain: &Chain,
     ) -> Result<(), String> {
-        let Some(metres) = apart else {
+        let Some((metres, step)) = apart else {
             self.all_apart = false;
             return Ok(());
         };
@@ -245,11 +258,83 @@ impl Steps {
         if !metres.is_finite() {
             return Err(format!("`apart` is {metres:?}, expected a number"));
         }
-        self.pairs += apart::check(scene, links, chain, at, metres)?;
+        self.pairs += apart::check(scene, links, chain, step, metres)?;
         self.apart = self.apart.min(metres);
         self.apart_end = Some(to);
         Ok(())
     }
+
+    /// Returns what is known of the clearance of an obstacle.
+    pub fn beside(&self, obstacle: usize) -> Beside {
+        let nothing = Beside { all: false, ..NOTHING };
+        self.beside.get(obstacle).copied().unwrap_or(nothing)
+    }
+
+    /// Checks the clearances of obstacles (Lemma 11).
+    fn add_beside(
+        &mut self,
+        scene: &Scene,
+        links: Links,
+        (claims, step): (&[Option<f64>], Option<&FirstOrder>),
+        to: Place,
+        chain: &Chain,
+    ) -> Result<(), String> {
+        if claims.len() > scene.obstacles.len() {
+            return Err(format!("it names {} obstacles, expected at most {}", claims.len(), scene.obstacles.len()));
+        }
+        self.beside.resize(scene.obstacles.len(), Beside { all: self.steps == 0, ..NOTHING });
+        let run = run_on_ground(scene, links, chain);
+        let boards = step.map_or_else(Vec::new, |_| boards_on_ground(scene, links, chain, run.as_ref()));
+        let first_order = |step: &FirstOrder, bench: usize| {
+            let is_run = run.is_some() && bench + 1 == boards.len();
+            if is_run { step.straight_run(bench, &scene.team) } else { step.board(bench, &scene.team) }
+        };
+        let first_order: Vec<_> = (0..boards.len()).filter_map(|bench| Some(first_order(step?, bench))).collect();
+        for (number, (obstacle, beside)) in scene.obstacles.iter().zip(&mut self.beside).enumerate() {
+            let Some(metres) = claims.get(number).copied().flatten() else {
+                beside.all = false;
+                continue;
+            };
+            if !beside.all {
+                return Err(format!("it states a clearance of obstacle {number} after a step that does not"));
+            }
+            if !metres.is_finite() {
+                return Err(format!("`beside` of obstacle {number} is {metres:?}, expected a number"));
+            }
+            let far = Interval::new(metres);
+            let mut pairs = boards.iter().zip(&first_order);
+            if let Some(bench) = pairs.position(|(board, first)| !obstacle.is_further_than(&far, board, first)) {
+                return Err(format!("bench {bench}, or one behind it, may be nearer to obstacle {number} (Lemma 11)"));
+            }
+            *beside = Beside { end: Some(to), all: true, least: beside.least.min(metres) };
+        }
+        Ok(())
+    }
+}
+
+/// Returns the boards on the line without end, if a step about all links does not list them.
+fn run_on_ground(scene: &Scene, links: Links, chain: &Chain) -> Option<(Capsule, Capsule, Interval)> {
+    let last = chain.last();
+    (links == Links::All && last < scene.team.benches).then(|| straight_run(scene, chain, last))
+}
+
+/// Returns the boards that obstacles concern: all, those on the line as one, or boards 0 and 1.
+fn boards_on_ground<'c>(
+    scene: &Scene,
+    links: Links,
+    chain: &'c Chain,
+    run: Option<&'c (Capsule, Capsule, Interval)>,
+) -> Vec<Board<'c>> {
+    let team = &scene.team;
+    let mut boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
+        .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
+        .collect();
+    match run {
+        Some((front, rear, length)) => boards.push(Board::new(front, rear, *length, team)),
+        None if links == Links::Front => boards.truncate(2),
+        None => {}
+    }
+    boards
 }
 
 /// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs with boards 0

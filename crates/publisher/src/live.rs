@@ -11,7 +11,8 @@ pub mod statistics;
 #[cfg(test)]
 mod tests;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use bench_dragon_messages::control::{Command, CommandRecord};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus};
@@ -220,6 +221,20 @@ pub struct Reports {
     pub samples: rtrb::Producer<Sample>,
     /// Every alert and every cue.
     pub announcements: rtrb::Producer<Announcement>,
+    /// Turns of the loop's wait so far: a sign of life also between two frames.
+    turns: Arc<AtomicU64>,
+}
+
+impl Reports {
+    /// Creates the loop's ends of these queues.
+    pub fn new(samples: rtrb::Producer<Sample>, announcements: rtrb::Producer<Announcement>) -> Self {
+        Self { samples, announcements, turns: Arc::default() }
+    }
+
+    /// Reports that the loop lives. The loop's thread alone writes the count.
+    fn turn(&self) {
+        self.turns.store(self.turns.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+    }
 }
 
 /// Publishes one frame in each period until `stop` is set or the periods are over.
@@ -245,7 +260,7 @@ pub fn run_loop<C: Clock>(
     let mut tick = 0;
     loop {
         let deadline_ns = deadlines.of(tick);
-        let reached = wait(clock, deadline_ns, stop, publishers, &mut maintenance_due_ns);
+        let reached = wait(clock, deadline_ns, stop, publishers, &mut maintenance_due_ns, &reports);
         let woke_ns = clock.monotonic_ns();
         // The first period that has not wholly passed. After a stop, too, the periods before it count as skipped.
         let current = deadlines.latest_at(woke_ns).max(tick).min(periods);
@@ -313,8 +328,10 @@ fn wait<C: Clock>(
     stop: &AtomicBool,
     publishers: &mut [Box<dyn Publisher>],
     maintenance_due_ns: &mut u64,
+    reports: &Reports,
 ) -> bool {
     loop {
+        reports.turn();
         if stop.load(Ordering::Relaxed) {
             return false;
         }

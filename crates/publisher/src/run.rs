@@ -87,6 +87,8 @@ pub struct Hooks<'a> {
     pub announce: Box<dyn FnMut(&Announcement) + Send + 'a>,
     /// Called with each sample, on the statistics thread.
     pub sample: Box<dyn FnMut(&Sample) + Send + 'a>,
+    /// Called on the statistics thread about ten times a second, as long as the loop does not hang.
+    pub alive: Box<dyn FnMut() + Send + 'a>,
     /// Called once the loop has ended, before the transports shut down.
     pub ended: Box<dyn FnOnce(LoopCounts) + 'a>,
 }
@@ -102,6 +104,10 @@ pub struct Published {
     /// The transport's failure that ended the loop.
     pub error: Option<PublishError>,
 }
+
+/// The hooks of the statistics thread: announce, sample, alive.
+type StatisticsHooks<'a> =
+    (Box<dyn FnMut(&Announcement) + Send + 'a>, Box<dyn FnMut(&Sample) + Send + 'a>, Box<dyn FnMut() + Send + 'a>);
 
 /// The loop's publishers, the transports for the other threads, and the open handle of /dev/cpu_dma_latency.
 type LoopEnds = (Vec<Box<dyn Publisher>>, Vec<Box<dyn Transport>>, Option<File>);
@@ -120,7 +126,7 @@ impl Publishing<'_> {
         stop: &AtomicBool,
         hooks: Hooks,
     ) -> Result<Published, RunError> {
-        let Hooks { opened: when_open, mut announce, mut sample, ended: when_ended } = hooks;
+        let Hooks { opened: when_open, announce, sample, alive, ended: when_ended } = hooks;
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
@@ -145,7 +151,7 @@ impl Publishing<'_> {
                 when_open(&transports);
                 let collecting = threads.spawn(|| {
                     // A loop without statistics could not be watched.
-                    self.collect(clock, inbox, transports, &mut announce, &mut sample, &done)
+                    self.collect(clock, inbox, transports, (announce, sample, alive), &done)
                         .inspect_err(|_| stop.store(true, Ordering::Relaxed))
                 });
                 let outcome = looping.join();
@@ -197,20 +203,13 @@ impl Publishing<'_> {
         clock: &impl Clock,
         inbox: Inbox,
         mut transports: Vec<Box<dyn Transport>>,
-        announce: &mut (dyn FnMut(&Announcement) + Send),
-        sample: &mut (dyn FnMut(&Sample) + Send),
+        (announce, record, alive): StatisticsHooks<'_>,
         done: &AtomicBool,
     ) -> Result<(Summary, Vec<Box<dyn Transport>>), RunError> {
         let sinks: Vec<Box<dyn StatusPublisher>> =
             transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?;
-        let run = statistics::Run {
-            run_id: self.run_id,
-            rate: self.rate,
-            scene: self.scene,
-            sinks,
-            announce: Box::new(announce),
-            record: Box::new(sample),
-        };
+        let Self { run_id, rate, scene, .. } = *self;
+        let run = statistics::Run { run_id, rate, scene, sinks, announce, record, alive };
         Ok((statistics::collect(clock, inbox, run, done), transports))
     }
 }
@@ -310,6 +309,7 @@ mod tests {
             opened: Box::new(|_| log.lock().unwrap().push("opened")),
             announce: Box::new(|_| ()),
             sample: Box::new(|_| ()),
+            alive: Box::new(|| ()),
             ended: Box::new(|_| log.lock().unwrap().push("ended")),
         };
         let mut source = OneFrame(Frame::new(1), FrameMessages::default());

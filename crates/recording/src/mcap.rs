@@ -9,6 +9,7 @@ mod bag;
 mod disk;
 mod file;
 mod index;
+mod layout_history;
 mod messages;
 pub mod reader;
 pub mod recorder;

@@ -115,6 +115,7 @@ mod tests {
     use super::*;
     use bench_dragon_motion::model::curve::Side;
     use bench_dragon_motion::model::path::Path as ModelPath;
+    use bench_dragon_motion::model::spiral::Direction;
     use bench_dragon_motion::model::{Point, Vector};
     use bench_dragon_motion::placement::Placement;
     use bench_dragon_show::convert::stage_segment;
@@ -175,5 +176,9 @@ mod tests {
         check(&ModelPath::turnaround(1.7, 4.5, 2.0, 100.0, 60.0).unwrap());
         let route = ModelPath::route(0.1).line(5.0).arc(Side::Left, 3.0, 0.5);
         check(&route.line(2.0).arc(Side::Right, 1.5, 0.75).build().unwrap());
+        let spirals = ModelPath::route(0.1).line(5.0).spiral(Side::Left, Direction::Inward, 1.7, 7.0, 2.5);
+        let spirals = spirals.arc(Side::Right, 2.0, 0.3).spiral(Side::Left, Direction::Outward, 0.9, 4.0, 1.2);
+        let spirals = spirals.spiral(Side::Right, Direction::Inward, 0.9, 4.0, 2.2);
+        check(&spirals.spiral(Side::Right, Direction::Outward, 1.3, 3.0, 2.2).build().unwrap());
     }
 }

@@ -297,7 +297,7 @@ impl ShowBridge {
         let (name, cues) = (self.name.clone(), stage.stage.cues as usize);
         let rate = settings.greatest_rate();
         let topic_names = topic_names(&name, &settings, alerts, cues);
-        let config = Ros2Config { name, handles: header.handles as usize, rate, settings, alerts, cues, stage };
+        let config = Ros2Config { name, handles: header.handles as usize, settings, alerts, cues, stage };
         // The node of the run before has the same name, and its latest alert would be one more.
         self.ended = None;
         let mut node = node::open(context, &self.name)?;

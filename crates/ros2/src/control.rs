@@ -38,7 +38,8 @@ const MOST_CALLS: usize = 16;
 const MOST_PENDING: usize = 512;
 /// The longest wait of an answer for its client's reply reader: while the client is there, and otherwise. RMW
 /// implementations stop after 0.1 s. On a loaded machine discovery takes longer, and a lost datagram of discovery is
-/// repeated after seconds; an answer that is sent before is lost. Other answers do not wait.
+/// repeated after seconds; an answer that is sent before is lost. Other answers do not wait. It is also the longest wait of
+/// an answer that RustDDS refuses: a killed client ends such a refusal after its lease, 20 s with Fast DDS.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(30);
 const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
@@ -243,8 +244,12 @@ impl Server {
                 Some(reader) => vec![reader],
                 None => matches.readers_in_process(endpoint.responses_guid, client.writer),
             };
-            endpoint.answer(client, &readers, response);
-            false
+            let is_sent = endpoint.answer(client, &readers, response);
+            let is_late = since.elapsed() >= patience;
+            if !is_sent && is_late {
+                endpoint.report_discarded();
+            }
+            !is_sent && !is_late
         });
     }
 }

@@ -8,6 +8,7 @@ pub mod bridge;
 mod commands;
 mod control;
 pub mod environment;
+mod gaps;
 mod matching;
 mod node;
 mod rate;
@@ -50,8 +51,6 @@ struct Ros2Config {
     name: String,
     /// Handles in a frame.
     handles: usize,
-    /// Frames per second.
-    rate: f64,
     /// The scene's settings.
     settings: Ros2Settings,
     /// True if there are alerts.

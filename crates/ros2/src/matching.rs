@@ -4,35 +4,20 @@
 //! which hold a message until there is a subscriber, and by the services: a response is lost if it is written before
 //! the client's reply reader is matched.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ros2_client::Context;
 use rustdds::policy::Durability;
 use rustdds::{DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
 
+use super::gaps::OldMessages;
 use super::retransmission::FirstMessages;
 
 /// The matches of one participant, shared by its threads.
 #[derive(Clone)]
 pub(super) struct Matches {
     ends: Arc<Mutex<Ends>>,
-}
-
-/// The subscribers of a writer.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Readers {
-    /// The number of those that request the history.
-    pub transient_local: usize,
-    /// The number of all others.
-    pub volatile: usize,
-}
-
-impl Readers {
-    /// Returns true if there is a subscriber.
-    pub(super) fn any(self) -> bool {
-        self.transient_local + self.volatile > 0
-    }
 }
 
 struct Ends {
@@ -46,6 +31,8 @@ struct Ends {
     transient_local: BTreeSet<GUID>,
     /// New writers whose first messages are requested.
     first_messages: Vec<FirstMessages>,
+    /// New readers from which older messages are withheld.
+    old_messages: Vec<OldMessages>,
 }
 
 impl Matches {
@@ -55,7 +42,8 @@ impl Matches {
         let events = participant.status_listener();
         let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
         let (transient_local, first_messages) = (BTreeSet::new(), Vec::new());
-        let ends = Ends { participant, events, readers, writers, transient_local, first_messages };
+        let old_messages = Vec::new();
+        let ends = Ends { participant, events, readers, writers, transient_local, first_messages, old_messages };
         Self { ends: Arc::new(Mutex::new(ends)) }
     }
 
@@ -71,18 +59,19 @@ impl Matches {
         self.with(|_| ());
     }
 
-    /// Returns the subscribers of a local writer.
-    pub(super) fn readers(&self, writer: GUID) -> Readers {
+    /// Returns the subscribers of a local writer, and for each whether it requests the history.
+    pub(super) fn subscribers(&self, writer: GUID) -> BTreeMap<GUID, bool> {
         self.with(|ends| {
-            let mut readers = Readers { transient_local: 0, volatile: 0 };
-            for (_, reader) in ends.readers.iter().filter(|(here, _)| *here == writer) {
-                match ends.transient_local.contains(reader) {
-                    true => readers.transient_local += 1,
-                    false => readers.volatile += 1,
-                }
-            }
-            readers
+            let readers = ends.readers.iter().filter(|(here, _)| *here == writer);
+            readers.map(|(_, reader)| (*reader, ends.transient_local.contains(reader))).collect()
         })
+    }
+
+    /// Withholds the first `last` messages of a local writer from a new subscriber.
+    pub(super) fn withhold(&self, writer: GUID, reader: GUID, last: u32) {
+        let mut ends = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
+        let old = OldMessages::of(&ends.participant, writer, reader, last);
+        ends.old_messages.extend(old);
     }
 
     /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to
@@ -140,6 +129,7 @@ impl Ends {
                 Event::ReaderLost { guid, .. } => {
                     self.readers.retain(|(_, reader)| *reader != guid);
                     self.transient_local.remove(&guid);
+                    self.old_messages.retain(|of| of.reader() != guid);
                 }
                 Event::WriterLost { guid, .. } => {
                     self.writers.retain(|(_, writer)| *writer != guid);
@@ -148,6 +138,7 @@ impl Ends {
                 Event::ParticipantLost { id, .. } => {
                     self.readers.retain(|(_, reader)| reader.prefix != id);
                     self.transient_local.retain(|reader| reader.prefix != id);
+                    self.old_messages.retain(|of| of.reader().prefix != id);
                     self.writers.retain(|(_, writer)| writer.prefix != id);
                     self.first_messages.retain(|of| of.writer().prefix != id);
                 }
@@ -156,5 +147,6 @@ impl Ends {
         }
         let participant = &self.participant;
         self.first_messages.retain_mut(|of| of.serve(participant));
+        self.old_messages.retain_mut(OldMessages::serve);
     }
 }

@@ -66,38 +66,45 @@ impl FirstMessages {
                     return false;
                 }
                 let locators = data.writer_proxy.unicast_locator_list.into_iter().filter(|locator| locator.is_udp());
-                self.send(locators.map(SocketAddr::from));
+                let datagram = datagram(self.reader.to_bytes(), self.writer.to_bytes(), self.rounds as u32);
+                send(&datagram, locators.map(SocketAddr::from));
             }
             self.rounds += 1;
         }
         self.rounds < TIMES.len()
     }
+}
 
-    fn send(&self, addresses: impl Iterator<Item = SocketAddr>) {
-        let datagram = datagram(self.reader.to_bytes(), self.writer.to_bytes(), self.rounds as u32);
-        for address in addresses {
-            let any =
-                if address.is_ipv4() { IpAddr::from(Ipv4Addr::UNSPECIFIED) } else { Ipv6Addr::UNSPECIFIED.into() };
-            let sent = UdpSocket::bind((any, 0)).and_then(|socket| socket.send_to(&datagram, address));
-            if let Err(error) = sent {
-                log::debug!("ROS 2: no retransmission is requested from {address}: {error}");
-            }
+/// Sends a datagram to these addresses. A failure is logged only: the network may lose any datagram.
+pub(super) fn send(datagram: &[u8], addresses: impl Iterator<Item = SocketAddr>) {
+    for address in addresses {
+        let any = if address.is_ipv4() { IpAddr::from(Ipv4Addr::UNSPECIFIED) } else { Ipv6Addr::UNSPECIFIED.into() };
+        let sent = UdpSocket::bind((any, 0)).and_then(|socket| socket.send_to(datagram, address));
+        if let Err(error) = sent {
+            log::debug!("ROS 2: no datagram can be sent to {address}: {error}");
         }
     }
 }
 
+/// Returns the start of a message from a local endpoint to a remote one: the header, and the remote participant as the
+/// destination of what follows. Also returns the numbers of both endpoints in their participants.
+pub(super) fn addressed(from: [u8; 16], to: [u8; 16]) -> (Vec<u8>, [[u8; 4]; 2]) {
+    let [from, to] = [from, to].map(|guid| {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, entity @ ..] = guid;
+        ([a, b, c, d, e, f, g, h, i, j, k, l], entity)
+    });
+    let mut bytes = [b"RTPS".as_slice(), &VERSION, &RUSTDDS, &from.0].concat();
+    bytes.extend([INFO_DST, LITTLE_ENDIAN, 12, 0]);
+    bytes.extend(to.0);
+    (bytes, [from.1, to.1])
+}
+
 /// Returns the message of `reader` to `writer`. `round` counts the messages of this kind from 0.
 fn datagram(reader: [u8; 16], writer: [u8; 16], round: u32) -> Vec<u8> {
-    let [(own_prefix, reader), (prefix, writer)] = [reader, writer].map(|guid| {
-        let (prefix, entity) = guid.split_at(12);
-        (prefix.to_vec(), entity.to_vec())
-    });
-    let mut bytes = [b"RTPS".as_slice(), &VERSION, &RUSTDDS, &own_prefix].concat();
-    bytes.extend([INFO_DST, LITTLE_ENDIAN, 12, 0]);
-    bytes.extend(&prefix);
+    let (mut bytes, [reader, writer]) = addressed(reader, writer);
     for sequence in 1..=FIRST_MESSAGES {
         bytes.extend([NACK_FRAG, LITTLE_ENDIAN, 32, 0]);
-        bytes.extend([reader.as_slice(), &writer].concat());
+        bytes.extend([reader, writer].concat());
         // The sequence number (high, low), the set of the first fragment alone (base, bits, bitmap), and the counter.
         for word in [0, sequence, 1, 1, 1 << 31, round * FIRST_MESSAGES + sequence] {
             bytes.extend(word.to_le_bytes());

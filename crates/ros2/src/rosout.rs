@@ -92,12 +92,7 @@ impl Rosout {
         let qos = Qos { reliability: Reliability::Reliable, durability: Durability::TransientLocal, depth: DEPTH };
         let dds = context
             .domain_participant()
-            .create_topic(
-                TOPIC_NAME.to_owned(),
-                TYPE_NAME.to_owned(),
-                &policies(qos, LINE_BYTES, 1.0),
-                TopicKind::NoKey,
-            )
+            .create_topic(TOPIC_NAME.to_owned(), TYPE_NAME.to_owned(), &policies(qos, LINE_BYTES), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
         Ok(Self { publisher, name: name.replace('/', ".") })

@@ -3,16 +3,23 @@
 //! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
 //! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first; with
 //! Fast DDS also a volatile one, since RustDDS does not read the durability of a subscriber. So a message without
-//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. A
-//! subscriber that joins others still gets all that RustDDS keeps, the latest last. To end that, RustDDS would have to
-//! send a GAP to a new subscriber that is volatile; it does so only if the writer is volatile. A second, volatile writer
-//! is no remedy: a volatile subscriber matches both, and a transient-local one would report the second as incompatible.
+//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. From a
+//! subscriber that joins others older messages are withheld by a GAP of our own ([`gaps`](super::gaps)): RustDDS sends one
+//! only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches both, and a
+//! transient-local one would report the second as incompatible. Messages to single readers are none either: RustDDS
+//! repairs them for every later subscriber.
+//!
+//! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages for
+//! all subscribers of the topic, of a killed one for its lease: 20 s with Fast DDS. So a refused message is held and
+//! written again, and a writer that refuses for longer than a new subscriber takes is replaced.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node, Publisher};
 use rustdds::policy::{self, ResourceLimits};
-use rustdds::{QosPolicies, QosPolicyBuilder, TopicKind};
+use rustdds::{GUID, QosPolicies, QosPolicyBuilder, TopicKind};
 use serde::Serialize;
 
 use super::matching::Matches;
@@ -21,8 +28,10 @@ use bench_dragon_messages::{MOST_CUES, MOST_DRAGONS, MOST_OBSTACLES, QUEUE_BYTES
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 use bench_dragon_ros2_messages::{HasStamp, MessageType, Time};
 
-/// Seconds for which a dead subscriber counts as slow: its lease.
-const LEASE_SECONDS: f64 = 12.0;
+/// The longest time for which a writer may refuse: a new subscriber takes milliseconds to acknowledge.
+const REFUSAL_PATIENCE: Duration = Duration::from_millis(500);
+/// The time in which RustDDS matches a new publisher with the subscribers that it knows.
+const MATCHING_TIME: Duration = Duration::from_millis(100);
 /// RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
 /// An upper bound of a message's bytes besides its handles.
@@ -39,8 +48,18 @@ pub(super) struct TopicWriter<Message: Serialize> {
     dds: rustdds::Topic,
     topic: String,
     reported: bool,
+    /// The message that RustDDS has refused.
+    refused: Option<Refused<Message>>,
+    /// The time at which the publisher was replaced.
+    replaced: Option<Instant>,
     /// The held message of a transient-local topic.
     latched: Option<Latched<Message>>,
+}
+
+/// A message that RustDDS has refused, with the time of the first refusal.
+struct Refused<Message> {
+    message: Arc<Message>,
+    since: Instant,
 }
 
 /// The state of a transient-local topic.
@@ -49,9 +68,11 @@ struct Latched<Message> {
     /// True if the latest message has been written.
     is_written: bool,
     /// Messages that the publisher has written.
-    written: u64,
+    written: u32,
     /// True if there is a subscriber.
     has_reader: bool,
+    /// The subscribers from which older messages have been withheld.
+    known: BTreeSet<GUID>,
     /// True if the message never changes.
     is_constant: bool,
 }
@@ -62,8 +83,8 @@ impl<Message: Serialize> TopicWriter<Message> {
         Stream { port: self, message: Arc::new(message) }
     }
 
-    /// Sends a message, or holds it until there is a subscriber. Messages discarded by a full queue are counted, and
-    /// reported once.
+    /// Sends a message, or holds it until there is a subscriber or RustDDS takes it. Messages discarded because RustDDS
+    /// still refuses the one before are counted, and reported once.
     pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));
@@ -72,17 +93,36 @@ impl<Message: Serialize> TopicWriter<Message> {
                 return;
             }
         }
-        if self.write(message) {
-            return;
+        self.write_refused();
+        if let Some(refused) = &mut self.refused {
+            refused.message = message;
+            *discarded += 1;
+            if !std::mem::replace(&mut self.reported, true) {
+                log::warn!(
+                    "ROS 2 topic {}: a reliable subscriber is so slow, or dead, that messages are discarded (reported \
+                     once)",
+                    self.topic
+                );
+            }
+        } else if !self.write(Arc::clone(&message)) {
+            self.refused = Some(Refused { message, since: Instant::now() });
         }
-        *discarded += 1;
-        if !self.reported {
-            self.reported = true;
-            log::warn!(
-                "ROS 2 topic {}: a reliable subscriber is so slow, or dead, that messages are discarded until it is \
-                 back or its lease ends (reported once)",
-                self.topic
-            );
+    }
+
+    /// Writes the message that was refused.
+    fn write_refused(&mut self) {
+        let Some(message) = self.refused.as_ref().map(|refused| Arc::clone(&refused.message)) else { return };
+        if self.write(message) {
+            self.refused = None;
+        }
+    }
+
+    /// Writes the message that was refused, if need be by a new publisher, which does not wait for acknowledgements.
+    fn end_refusal(&mut self, node: &mut Node) {
+        self.write_refused();
+        if self.refused.as_ref().is_some_and(|refused| refused.since.elapsed() >= REFUSAL_PATIENCE) {
+            self.replace(node);
+            self.write_refused();
         }
     }
 
@@ -99,6 +139,7 @@ impl<Message: Serialize> TopicWriter<Message> {
 
     /// Replaces the publisher by one without history.
     fn replace(&mut self, node: &mut Node) {
+        self.replaced = Some(Instant::now());
         match node.create_publisher(&self.dds, None) {
             Ok(publisher) => self.publisher = publisher,
             Err(error) => log::warn!("ROS 2 topic {}: late subscribers get old messages first: {error}", self.topic),
@@ -111,7 +152,7 @@ impl<Message: Serialize> TopicWriter<Message> {
 
 /// A writer that serves late subscribers.
 pub(super) trait Serviced {
-    /// Sends the held message to new subscribers, and drops the history after the last subscriber has left. Must be
+    /// Sends held messages, to new subscribers too, and drops the history after the last subscriber has left. Must be
     /// called often.
     fn service(&mut self, matches: &Matches, node: &mut Node);
     /// Returns true if there is a subscriber.
@@ -120,22 +161,34 @@ pub(super) trait Serviced {
 
 impl<Message: Serialize> Serviced for TopicWriter<Message> {
     fn service(&mut self, matches: &Matches, node: &mut Node) {
+        self.end_refusal(node);
         let Some(latched) = &mut self.latched else { return };
-        let readers = matches.readers(self.publisher.guid());
-        latched.has_reader = readers.any();
+        let writer = self.publisher.guid();
+        let subscribers = matches.subscribers(writer);
+        if subscribers.is_empty() && self.replaced.is_some_and(|replaced| replaced.elapsed() < MATCHING_TIME) {
+            return;
+        }
+        latched.has_reader = !subscribers.is_empty();
         if !latched.has_reader {
-            // RustDDS sends a volatile subscriber of Fast DDS all that it keeps, which for an event is out of date.
+            // What RustDDS keeps is out of date for the next subscriber.
             if latched.written > 0 && !latched.is_constant {
+                latched.known.clear();
                 self.replace(node);
             }
             return;
         }
-        if latched.is_written || readers.transient_local == 0 {
+        for (reader, is_transient_local) in &subscribers {
+            if latched.known.insert(*reader) {
+                matches.withhold(writer, *reader, latched.written.saturating_sub(u32::from(*is_transient_local)));
+            }
+        }
+        if latched.is_written || !subscribers.values().any(|is_transient_local| *is_transient_local) {
             return;
         }
         let Some(latest) = latched.latest.clone() else { return };
-        // A volatile subscriber would take the held message for a new one. From a new publisher it gets later ones only.
-        if readers.volatile > 0 {
+        // A volatile subscriber would take the held message for a new one: it is withheld as that of a new publisher.
+        if !subscribers.values().all(|is_transient_local| *is_transient_local) {
+            latched.known.clear();
             self.replace(node);
         }
         // A subscriber that matches this publisher later requests the message when it does.
@@ -143,7 +196,7 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
     }
 
     fn is_read(&self, matches: &Matches) -> bool {
-        matches.readers(self.publisher.guid()).any()
+        !matches.subscribers(self.publisher.guid()).is_empty()
     }
 }
 
@@ -188,7 +241,7 @@ impl WriterFactory<'_> {
         message: impl FnOnce() -> Message,
     ) -> Result<Option<Stream<Message>>, Ros2Error> {
         let bytes = HEADER_BYTES + self.config.handles * each;
-        let port = self.port(topic, bytes, self.config.rate)?;
+        let port = self.port(topic, bytes)?;
         Ok(port.map(|port| port.stream(message())))
     }
 
@@ -198,7 +251,6 @@ impl WriterFactory<'_> {
         &mut self,
         topic: Topic,
         bytes: usize,
-        rate: f64,
     ) -> Result<Option<TopicWriter<Message>>, Ros2Error> {
         let Some(qos) = self.config.settings.topics.get(&topic) else { return Ok(None) };
         let name = topic.path(&self.config.name);
@@ -206,19 +258,26 @@ impl WriterFactory<'_> {
         let (participant, type_name) = (self.context.domain_participant(), MessageType::of(topic).dds_name());
         // Not created through the node, whose quality of service has no limit of memory.
         let dds = participant
-            .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes, rate), TopicKind::NoKey)
+            .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
         let is_constant = matches!(topic, Topic::Stage | Topic::Path);
-        let nothing = Latched { latest: None, is_written: false, written: 0, has_reader: false, is_constant };
+        let nothing = Latched {
+            latest: None,
+            is_written: false,
+            written: 0,
+            has_reader: false,
+            known: BTreeSet::new(),
+            is_constant,
+        };
         let latched = (qos.durability == Durability::TransientLocal).then_some(nothing);
-        Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, latched }))
+        Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, refused: None, replaced: None, latched }))
     }
 }
 
 /// Returns the quality of service on the wire. A full queue refuses at once instead of blocking. It holds the messages
-/// that a dead subscriber leaves unacknowledged during its lease, as far as memory allows.
-pub(super) fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
+/// that a dead subscriber leaves unacknowledged, as far as memory allows.
+pub(super) fn policies(qos: Qos, bytes: usize) -> QosPolicies {
     let reliability = match qos.reliability {
         Reliability::Reliable => policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO },
         Reliability::BestEffort => policy::Reliability::BestEffort,
@@ -229,7 +288,7 @@ pub(super) fn policies(qos: Qos, bytes: usize, rate: f64) -> QosPolicies {
     };
     let depth = qos.depth as i32;
     let affordable = (QUEUE_BYTES as f64 / bytes as f64).min(UNACKNOWLEDGED_MESSAGES);
-    let max_samples = ((LEASE_SECONDS * rate).min(affordable) as i32).max(depth);
+    let max_samples = (affordable as i32).max(depth);
     QosPolicyBuilder::new()
         .reliability(reliability)
         .durability(durability)

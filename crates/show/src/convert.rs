@@ -292,9 +292,15 @@ fn stage_dragon(motion: &Motion, (name, first_handle): (&str, u32), segments: &m
     let Team { benches, head_length, body_length, width, hole_inset } = *motion.team();
     let (mut pitch, mut start_turn) = (f64::NAN, f64::NAN);
     let first_segment = segments.len() as u32;
+    // A route's team stands on a line.
+    let on_spiral = motion.description().pitch().is_some();
     for outline in motion.outline() {
-        if let OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } = outline.kind {
-            (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
+        match outline.kind {
+            OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } if on_spiral => {
+                (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
+            }
+            OutlineKind::Spiral { pitch: metres, .. } if !on_spiral && pitch.is_nan() => pitch = metres,
+            _ => {}
         }
         segments.push(stage_segment(&outline));
     }

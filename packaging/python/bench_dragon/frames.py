@@ -40,7 +40,8 @@ def indices_of(poses32: Any, *handles: int) -> npt.NDArray[np.int64]:
     order of the stage.
     """
     attributes = {attribute.key.to_string(): attribute.value.to_string() for attribute in poses32.attributes.values}
-    parts, first = [], 0
+    parts: list[npt.NDArray[np.int64]] = []
+    first = 0
     for count in handles:
         parts.append(np.append(np.arange(first, first + count - 1, int(attributes["every"])), first + count - 1))
         first += count

@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::super::events::bench_name;
 use super::super::{CommandError, Common, Output, progress_bar};
-use super::expect_no_obstacles;
 
 /// The line of `plan turn --json`.
 #[derive(Serialize)]
@@ -30,7 +29,6 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
     let scene: Scene = common.scene_text()?.parse()?;
-    expect_no_obstacles(&scene)?;
     let Some(pitch) = scene.motion.description().pitch() else {
         let sentence =
             "the scene's path is a route, which has no pitch: expected path.kind \"spiral\" or \"turnaround\"";

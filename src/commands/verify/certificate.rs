@@ -4,7 +4,8 @@ use std::io::BufRead;
 
 use bench_dragon::messages::hexadecimal;
 use bench_dragon::proof::{
-    EventKind, Proved, ProvedClearance, ProvedEvent, ProvedPitch, ProvedSpeed, Refused, Status, Until, scene_hash,
+    EventKind, Proved, ProvedClearance, ProvedEvent, ProvedObstacleClearance, ProvedPitch, ProvedSpeed, Refused,
+    Status, Until, scene_hash,
 };
 use bench_dragon::show::scene::printable;
 use serde::Serialize;
@@ -65,13 +66,22 @@ pub fn proved_of(
 
 /// Returns a sentence for each result.
 fn sentences(proved: &Proved) -> Vec<String> {
-    let Proved { results, least_clearance, greatest_speed, least_pitch, .. } = proved;
+    let Proved { results, least_clearance, obstacle_clearances, greatest_speed, least_pitch, .. } = proved;
     let others = [
         least_clearance.as_ref().map(clearance_sentence),
         greatest_speed.as_ref().map(speed_sentence),
         least_pitch.as_ref().map(pitch_sentence),
     ];
-    results.iter().map(sentence).chain(others.into_iter().flatten()).collect()
+    let obstacles = obstacle_clearances.iter().map(obstacle_sentence);
+    let of_dragons = |outcome: &ProvedEvent| {
+        let names = outcome.dragons.iter().filter_map(|dragon| proved.dragons.get(*dragon)).map(String::as_str);
+        let names: Vec<&str> = names.collect();
+        match names.is_empty() {
+            true => sentence(outcome),
+            false => format!("{}, {}", printable(&names.join(" and ")), sentence(outcome)),
+        }
+    };
+    results.iter().map(of_dragons).chain(others.into_iter().flatten()).chain(obstacles).collect()
 }
 
 /// Returns the error for a refused certificate.
@@ -144,6 +154,25 @@ fn clearance_sentence(outcome: &ProvedClearance) -> String {
     match claims.is_empty() {
         true => format!("least clearance {until}: undecided"),
         false => format!("least clearance {until}: proved that {}", claims.join(", and that ")),
+    }
+}
+
+/// Returns a sentence on the proved least clearance of an obstacle.
+fn obstacle_sentence(outcome: &ProvedObstacleClearance) -> String {
+    let ProvedObstacleClearance { obstacle, lo, hi, until, time_until, bench } = *outcome;
+    let until = match (until, time_until) {
+        (Until::Time, Some(time)) => format!("from the start to {time} s"),
+        _ => "from the start to the path's end".to_owned(),
+    };
+    let of = format!("least clearance of obstacle {} (counting from 1, the boundary last) {until}", obstacle + 1);
+    let below = lo.map(|lo| format!("no board's is less than {lo} m"));
+    let above = hi
+        .zip(bench)
+        .map(|(hi, bench)| format!("that of bench {} (counting from 1) is at most {hi} m at one moment", bench + 1));
+    let claims: Vec<String> = below.into_iter().chain(above).collect();
+    match claims.is_empty() {
+        true => format!("{of}: undecided"),
+        false => format!("{of}: proved that {}", claims.join(", and that ")),
     }
 }
 

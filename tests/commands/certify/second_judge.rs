@@ -37,9 +37,17 @@ fn scene(number: u64) -> String {
                 pieces += &format!("\n[[path.pieces]]\nkind = \"line\"\nlength = {length}");
                 let (radius, turns) = (link * between(0.45, 2.5), between(0.05, 0.8));
                 let side = if between(0.0, 1.0) < 0.5 { "left" } else { "right" };
-                pieces += &format!(
-                    "\n[[path.pieces]]\nkind = \"arc\"\nradius = {radius}\nside = \"{side}\"\nturns = {turns}"
-                );
+                pieces += &if number % 2 == 1 && between(0.0, 1.0) < 0.5 {
+                    // At most half of the way to the centre.
+                    let (direction, pitch) = if between(0.0, 1.0) < 0.5 { ("in", radius) } else { ("out", link) };
+                    format!(
+                        "\n[[path.pieces]]\nkind = \"spiral\"\nradius = {radius}\nside = \"{side}\"\npitch = {}\n\
+                         direction = \"{direction}\"\nturns = {turns}",
+                        between(0.2, 0.6) * pitch
+                    )
+                } else {
+                    format!("\n[[path.pieces]]\nkind = \"arc\"\nradius = {radius}\nside = \"{side}\"\nturns = {turns}")
+                };
             }
             format!(
                 "kind = \"pieces\"\nstart = [{}, 1.0]\nheading_turns = {}{pieces}",

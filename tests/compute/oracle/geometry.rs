@@ -30,10 +30,14 @@ enum Curve {
         phase: f64,
         turn: f64,
     },
-    /// `outward` is -1 on r = a theta inward, 1 on the same spiral turned by half a turn, outward.
+    /// `outward` is -1 on r = a theta inward, 1 on the same spiral turned by half a turn, outward. The polar angle
+    /// about `centre` is `phase` + `turn` theta.
     Spiral {
         radius_per_radian: f64,
         outward: f64,
+        centre: Vector,
+        phase: f64,
+        turn: f64,
     },
 }
 
@@ -87,10 +91,11 @@ impl Curve {
                 let spoke = unit(phase + turn * q);
                 (centre + radius * spoke, turn * left_of(spoke))
             }
-            Self::Spiral { radius_per_radian, outward } => {
-                let spoke = unit(q);
+            Self::Spiral { radius_per_radian, outward, centre, phase, turn } => {
+                let spoke = unit(phase + turn * q);
                 // Half a turn and the other way of travel cancel: both spirals have one tangent at one angle.
-                (-outward * radius_per_radian * q * spoke, -(spoke + q * left_of(spoke)) / 1f64.hypot(q))
+                let tangent = -(spoke + turn * q * left_of(spoke)) / 1f64.hypot(q);
+                (centre - outward * radius_per_radian * q * spoke, tangent)
             }
         }
     }
@@ -100,7 +105,7 @@ impl Curve {
         match *self {
             Self::Line { .. } => to - from,
             Self::Arc { radius, .. } => radius * (to - from),
-            Self::Spiral { radius_per_radian, outward } => {
+            Self::Spiral { radius_per_radian, outward, .. } => {
                 outward * (spiral_length(radius_per_radian, to) - spiral_length(radius_per_radian, from))
             }
         }
@@ -110,7 +115,7 @@ impl Curve {
         match *self {
             Self::Line { .. } => from + metres,
             Self::Arc { radius, .. } => from + metres / radius,
-            Self::Spiral { radius_per_radian, outward } => {
+            Self::Spiral { radius_per_radian, outward, .. } => {
                 spiral_angle(radius_per_radian, spiral_length(radius_per_radian, from) + outward * metres)
             }
         }
@@ -151,7 +156,7 @@ impl Curve {
                 let angle = -turn * spoke.perp(&here).atan2(spoke.dot(&here));
                 opening - angle
             }
-            Self::Spiral { radius_per_radian, outward } => {
+            Self::Spiral { radius_per_radian, outward, .. } => {
                 return leaves_spiral(self, radius_per_radian, outward, q, first, centre, reach);
             }
         };
@@ -193,7 +198,7 @@ fn leaves_spiral(
         let radians =
             if outward < 0.0 { metres / (radius_per_radian * 1f64.hypot(theta + radians)) } else { radians.min(0.25) };
         let next = theta - outward * radians;
-        if outward > 0.0 && next <= first {
+        if outward * (next - first) <= 0.0 {
             let end = (curve.point_and_tangent(first).0 - centre).norm();
             return (end >= reach).then_some(first);
         }
@@ -216,13 +221,19 @@ pub struct Path {
 pub enum RouteSegment {
     Line { length: f64 },
     Arc { radius: f64, turns: f64, left: bool },
+    Spiral { pitch: f64, radius: f64, turns: f64, outward: bool, left: bool },
+}
+
+/// Returns the spiral of a path that has its centre at the origin.
+fn about_origin(radius_per_radian: f64, outward: f64) -> Curve {
+    Curve::Spiral { radius_per_radian, outward, centre: Vector::zeros(), phase: 0.0, turn: 1.0 }
 }
 
 impl Path {
     pub fn spiral(pitch: f64, start_turn: f64) -> Self {
         let (radius_per_radian, start) = (pitch / TAU, TAU * start_turn);
         let mut path = Self { pieces: Vec::new(), end: 0.0 };
-        path.begin_with(Curve::Spiral { radius_per_radian, outward: -1.0 }, start, 0.0);
+        path.begin_with(about_origin(radius_per_radian, -1.0), start, 0.0);
         path.end = spiral_length(radius_per_radian, start);
         path
     }
@@ -234,10 +245,10 @@ impl Path {
         let both = turn_radius.hypot(radius_per_radian);
         let angle = 2.0 * theta.atan();
         let mut path = Self { pieces: Vec::new(), end: 0.0 };
-        path.begin_with(Curve::Spiral { radius_per_radian, outward: -1.0 }, theta, lead_in);
+        path.begin_with(about_origin(radius_per_radian, -1.0), theta, lead_in);
         path.push_arc(both * arc_ratio / (1.0 + arc_ratio), angle, false);
         path.push_arc(both / (1.0 + arc_ratio), angle, true);
-        let out = Curve::Spiral { radius_per_radian, outward: 1.0 };
+        let out = about_origin(radius_per_radian, 1.0);
         path.push(out, theta, spiral_angle(radius_per_radian, spiral_length(radius_per_radian, theta) + lead_out));
         path
     }
@@ -252,6 +263,10 @@ impl Path {
                     path.push(Curve::Line { start, tangent }, 0.0, length);
                 }
                 RouteSegment::Arc { radius, turns, left } => path.push_arc(radius, TAU * turns, left),
+                RouteSegment::Spiral { pitch, radius, turns, outward, left } => {
+                    let outward = if outward { 1.0 } else { -1.0 };
+                    path.push_spiral(pitch / TAU, radius, outward, TAU * turns, left);
+                }
             }
         }
         path
@@ -279,6 +294,23 @@ impl Path {
         let spoke = -turn * left_of(tangent);
         let curve = Curve::Arc { centre: point - radius * spoke, radius, phase: spoke.y.atan2(spoke.x), turn };
         self.push(curve, 0.0, angle);
+    }
+
+    /// The centre is where the pole of the tangent's normal says: the tangent leans by atan(1 / theta) against the
+    /// circle about the centre, towards it or away from it.
+    fn push_spiral(&mut self, radius_per_radian: f64, radius: f64, outward: f64, angle: f64, left: bool) {
+        let (point, tangent) = self.last_point_and_tangent();
+        let side = if left { 1.0 } else { -1.0 };
+        let first = radius / radius_per_radian;
+        // From the centre to the point: right of a travel about the centre to the left, turned on by the lean.
+        let lean = outward * side * (1.0 / first).atan();
+        let spoke = nalgebra::Rotation2::new(lean) * (-side * left_of(tangent));
+        let centre = point - radius * spoke;
+        // Going on, the polar angle about the centre grows to the left; theta grows outward.
+        let turn = side * outward;
+        let phase = (-outward * spoke).y.atan2((-outward * spoke).x) - turn * first;
+        let curve = Curve::Spiral { radius_per_radian, outward, centre, phase, turn };
+        self.push(curve, first, first + outward * angle);
     }
 
     fn last_point_and_tangent(&self) -> (Vector, Vector) {

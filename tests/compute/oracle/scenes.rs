@@ -7,7 +7,9 @@ use toml::{Table, Value};
 use super::chain::Team;
 use super::geometry::{Path, RouteSegment, Vector};
 
-pub const FAMILIES: [&str; 6] = ["spiral", "turnaround", "route", "tight bends", "U-turn", "S-bend"];
+/// The kinds of random scenes; the last is tried in addition to the others.
+pub const FAMILIES: [&str; 7] =
+    ["spiral", "turnaround", "route", "tight bends", "U-turn", "S-bend", "spirals in a route"];
 
 /// Returns the team and the path of a scene; its head speed is 1 m/s.
 pub fn read(text: &str) -> (Team, Path) {
@@ -37,6 +39,13 @@ pub fn read(text: &str) -> (Team, Path) {
                     let number = |field: &str| float(segment, field).unwrap();
                     match segment["kind"].as_str().unwrap() {
                         "line" => RouteSegment::Line { length: number("length") },
+                        "spiral" => RouteSegment::Spiral {
+                            pitch: number("pitch"),
+                            radius: number("radius"),
+                            turns: number("turns"),
+                            outward: segment["direction"].as_str() == Some("out"),
+                            left: segment["side"].as_str() == Some("left"),
+                        },
                         _ => {
                             let left = segment["side"].as_str() == Some("left");
                             RouteSegment::Arc { radius: number("radius"), turns: number("turns"), left }
@@ -100,6 +109,20 @@ pub fn line(length: f64) -> String {
 pub fn arc(radius: f64, turns: f64, left: bool) -> String {
     let side = if left { "left" } else { "right" };
     format!("[[path.pieces]]\nkind = \"arc\"\nradius = {radius:?}\nside = \"{side}\"\nturns = {turns:?}\n")
+}
+
+/// Returns a spiral of a route, as wide as some links: inward it goes up to nine tenths of the way to its centre.
+fn spiral(random: &mut Random, link: f64) -> String {
+    let (pitch, inward) = (link * random.magnitude(0.1, 2.0), random.chance(0.6));
+    let radius = link * random.magnitude(0.5, 8.0);
+    let most = if inward { 0.9 * radius } else { 4.0 * link };
+    let turns = random.between(0.02, 1.0) * (most / pitch).min(5.0);
+    let direction = if inward { "in" } else { "out" };
+    let side = if random.chance(0.5) { "left" } else { "right" };
+    format!(
+        "[[path.pieces]]\nkind = \"spiral\"\npitch = {pitch:?}\nradius = {radius:?}\ndirection = \"{direction}\"\n\
+         side = \"{side}\"\nturns = {turns:?}\n"
+    )
 }
 
 /// Returns a scene of a family.
@@ -179,6 +202,22 @@ pub fn random_scene(family: usize, random: &mut Random) -> String {
             let lines = [random.between(1.0, 30.0), random.between(1.0, 40.0)].map(line);
             let turns = if random.chance(0.75) { 0.5 } else { random.between(0.1, 1.5) };
             format!("{team}{pieces}{}{}{}", lines[0], arc(radius, turns, random.chance(0.5)), lines[1])
+        }
+        "spirals in a route" => {
+            let team = team_text(random, 30.0, head, body);
+            let (x, y) = (random.between(-5.0, 5.0), random.between(-5.0, 5.0));
+            let mut text =
+                format!("{team}{pieces}start = [{x:?}, {y:?}]\nheading_turns = {:?}\n", random.between(-1.0, 1.0));
+            for _ in 0..random.between(1.0, 6.0) as usize {
+                text += &match random.between(0.0, 1.0) {
+                    share if share < 0.25 => line(random.magnitude(0.05, 15.0)),
+                    share if share < 0.5 => {
+                        arc(random.magnitude(0.3, 6.0), random.between(0.02, 0.8), random.chance(0.5))
+                    }
+                    _ => spiral(random, head.max(body)),
+                };
+            }
+            text + &spiral(random, head.max(body)) + &line(random.between(0.5, 10.0))
         }
         _ => {
             // Two arcs of 135 degrees: a link of 1 / (sqrt(2) - 1) radii just locks in them.

@@ -31,6 +31,14 @@ fn routes() -> impl Strategy<Value = Subject> {
         let side = if left { Side::Left } else { Side::Right };
         if line { RouteStep::Line { length: 2.0 * size } } else { RouteStep::Arc { side, radius: size, turns } }
     });
+    let spiral = (any::<bool>(), any::<bool>(), 0.3..2.0f64, 0.5..6.0f64, 0.01..0.95f64).prop_map(
+        |(left, inward, pitch, radius, share)| {
+            let side = if left { Side::Left } else { Side::Right };
+            let direction = if inward { Direction::Inward } else { Direction::Outward };
+            RouteStep::Spiral { side, direction, pitch, radius, turns: (share * radius / pitch).min(3.0) }
+        },
+    );
+    let step = prop_oneof![3 => step, 1 => spiral];
     let route =
         prop::collection::vec(step, 1..12).prop_map(|steps| PathDescription::Route { heading_turns: 0.17, steps });
     let turnaround = (0.4..3.0f64, 1.5..6.0f64, 0.2..5.0f64).prop_map(|(pitch, turns, arc_ratio)| {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
-use bench_dragon::certify::{CertificateLine, certify_least_clearance};
+use bench_dragon::certify::{CertificateLine, ClearanceHints, certify_least_clearance};
 use bench_dragon::proof::{Proved, verify};
 use serde_json::Value;
 
@@ -160,7 +160,8 @@ fn clearance(text: &str) -> Vec<u8> {
     let freeze = timeline.freeze(true);
     let hint = motion.least_clearance(&timeline, freeze, &mut |_| ()).expect("three benches").least;
     written(|write| {
-        certify_least_clearance(&motion, freeze, &hint, text, 1000, write, &mut |_| ()).expect("lines");
+        let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
+        certify_least_clearance(&motion, freeze, hints, text, 1000, write, &mut |_| ()).expect("lines");
     })
 }
 

@@ -12,8 +12,8 @@ enum Segment {
     Line { start: Point, heading: f64, from: f64, to: f64 },
     /// Turns left if `turn` is 1 and right if it is -1.
     Arc { centre: Point, radius: f64, phase: f64, turn: f64, angle: f64 },
-    /// r = a theta from a radius on, turned by half a turn if `sign` is -1.
-    Spiral { radius_per_radian: f64, sign: f64, least_radius: f64 },
+    /// r = a theta about a centre between two radii, at the polar angle `phase` + `sense` theta.
+    Spiral { radius_per_radian: f64, centre: Point, phase: f64, sense: f64, radii: [f64; 2] },
 }
 
 /// A path.
@@ -54,10 +54,7 @@ impl Outline {
             let travelled = spiral_length(radius_per_radian, start) - spiral_length(radius_per_radian, theta);
             (travelled, ahead([0.0, 0.0], theta, radius_per_radian * theta))
         };
-        Self {
-            segments: vec![Segment::Spiral { radius_per_radian, sign: 1.0, least_radius: 0.0 }],
-            known: [0, 1, 10, 20].map(place).into(),
-        }
+        Self { segments: vec![about_origin(radius_per_radian, 0.0, 0.0)], known: [0, 1, 10, 20].map(place).into() }
     }
 
     /// Returns the path inward along a spiral to A at the turn's radius, right along one arc, left along another, and
@@ -79,14 +76,14 @@ impl Outline {
             let centre = ahead(from, heading + turn * FRAC_PI_2, radius);
             Segment::Arc { centre, radius, phase: heading - turn * FRAC_PI_2, turn, angle }
         };
-        let spiral = |sign: f64| Segment::Spiral { radius_per_radian, sign, least_radius: turn_radius };
+        let spiral = |phase: f64| about_origin(radius_per_radian, phase, turn_radius);
         let joint = arc_end(&arc(a, first, -1.0, heading), angle);
         Self {
             segments: vec![
-                spiral(1.0),
+                spiral(0.0),
                 arc(a, first, -1.0, heading),
                 arc(joint, second, 1.0, heading - angle),
-                spiral(-1.0),
+                spiral(PI),
             ],
             known: vec![(lead_in, a), (lead_in + first * angle, joint), (lead_in + whole * angle, b)],
         }
@@ -105,6 +102,10 @@ impl Outline {
                 let to = float(&piece["length"]);
                 segments.push(Segment::Line { start: at, heading, from: 0.0, to });
                 (at, travelled) = (ahead(at, heading, to), travelled + to);
+            } else if piece["kind"].as_str() == Some("spiral") {
+                let spiral = Piece::of(piece, at, heading);
+                segments.push(spiral.segment);
+                (at, heading, travelled) = (spiral.end, heading + spiral.turned, travelled + spiral.length);
             } else {
                 let turn = if piece["side"].as_str() == Some("left") { 1.0 } else { -1.0 };
                 let (radius, angle) = (float(&piece["radius"]), TAU * float(&piece["turns"]));
@@ -122,6 +123,42 @@ impl Outline {
     /// Returns the metres from a point to the path.
     pub fn distance(&self, point: Point) -> f64 {
         self.segments.iter().map(|segment| segment.distance(point)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Returns a spiral about the origin, from a radius on.
+fn about_origin(radius_per_radian: f64, phase: f64, least_radius: f64) -> Segment {
+    Segment::Spiral { radius_per_radian, centre: [0.0, 0.0], phase, sense: 1.0, radii: [least_radius, f64::INFINITY] }
+}
+
+/// A spiral of a route, with its end, the radians by which it turns to the left, and its metres.
+struct Piece {
+    segment: Segment,
+    end: Point,
+    turned: f64,
+    length: f64,
+}
+
+impl Piece {
+    /// The tangent lies atan(theta) from the direction away from the centre, or towards it.
+    fn of(piece: &toml::Value, begin: Point, heading: f64) -> Self {
+        let number = |key: &str| float(&piece[key]);
+        let side = if piece["side"].as_str() == Some("left") { 1.0 } else { -1.0 };
+        let outward = if piece["direction"].as_str() == Some("out") { 1.0 } else { -1.0 };
+        let (radius_per_radian, radius) = (number("pitch") / TAU, number("radius"));
+        let first = radius / radius_per_radian;
+        let last = first + outward * TAU * number("turns");
+        let from_tangent = if outward > 0.0 { first.atan() } else { PI - first.atan() };
+        let polar = heading - side * from_tangent;
+        let (centre, sense) = (ahead(begin, polar, -radius), side * outward);
+        let phase = polar - sense * first;
+        let radii = [radius_per_radian * first.min(last), radius_per_radian * first.max(last)];
+        Self {
+            segment: Segment::Spiral { radius_per_radian, centre, phase, sense, radii },
+            end: ahead(centre, phase + sense * last, radius_per_radian * last),
+            turned: side * ((last - first).abs() + (last.atan() - first.atan()).abs()),
+            length: (spiral_length(radius_per_radian, last) - spiral_length(radius_per_radian, first)).abs(),
+        }
     }
 }
 
@@ -149,14 +186,14 @@ impl Segment {
                         .fold(f64::INFINITY, f64::min)
                 }
             }
-            Self::Spiral { radius_per_radian, sign, least_radius } => {
-                let (x, y) = (sign * point[0], sign * point[1]);
-                let (radius, polar) = (x.hypot(y), y.atan2(x));
+            Self::Spiral { radius_per_radian, centre, phase, sense, radii: [least, greatest] } => {
+                let (x, y) = (point[0] - centre[0], point[1] - centre[1]);
+                let (radius, polar) = (x.hypot(y), sense * (y.atan2(x) - phase));
                 let turns = ((radius / radius_per_radian - polar) / TAU).round();
-                let theta = polar + TAU * turns;
-                let nearest = radius_per_radian * theta;
+                let nearest = radius_per_radian * (polar + TAU * turns);
                 // A junction belongs to both of its segments, and rounding may put a handle on either side of it.
-                if nearest < least_radius - 1e-9 { f64::INFINITY } else { (radius - nearest).abs() }
+                let is_on = nearest > least - 1e-9 && nearest < greatest + 1e-9;
+                if is_on { (radius - nearest).abs() } else { f64::INFINITY }
             }
         }
     }

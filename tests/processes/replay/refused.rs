@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use bench_dragon::publisher::live::{FrameSource, Period};
+use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
 use bench_dragon::recording::mcap::reader::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
 use bench_dragon::show::convert::Stamps;
@@ -95,7 +95,7 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
     assert!(output.status.code() == Some(2) && sentence.contains("the name is"), "{sentence}");
 
     // Recordings with changed messages: the change, the sentence, and true if frames are sent before the sentence.
-    let changed: [(&str, Change, &str, bool); 15] = [
+    let changed: [(&str, Change, &str, bool); 16] = [
         ("no_handles", |it| Vec::from_iter((!is_frame(&it)).then_some(it)), "it has no topic handles", false),
         ("no_frames", |it| vec![with_other_topic(it, "/handles", "/x/y")], "it has no topic handles", false),
         (
@@ -117,7 +117,13 @@ fn what_cannot_be_played_is_refused_with_a_sentence() {
             false,
         ),
         ("type", |it| vec![typed(&it, |schema| schema.name += "2")], "HandlePoses2 (cdr, ros2msg), expected", false),
-        ("fields", |it| vec![typed(&it, with_other_field)], "has other fields than bench_dragon_msgs/msg/", false),
+        ("fields", |it| vec![typed(&it, with_other_field)], "does not know, this program reads FrameHeader/2", false),
+        (
+            "old_frames",
+            |it| vec![typed(&it, without_epoch)],
+            "has FrameHeader/1, this program reads FrameHeader/2",
+            false,
+        ),
         ("short", |it| vec![Message { data: Cow::Owned(it.data[..200].to_vec()), ..it }], "that cannot be read", false),
         ("big_endian", |it| vec![Message { data: Cow::Owned([&[0, 0], &it.data[2..]].concat()), ..it }], "read", false),
         ("state", |it| vec![with_bytes(&it, STATE, &[9])], "whose state this version does not know", false),
@@ -168,6 +174,12 @@ fn with_other_field(schema: &mut Schema<'_>) {
     schema.data = Cow::Owned(text.replace("float64 vx", "float32 vx").into_bytes());
 }
 
+fn without_epoch(schema: &mut Schema<'_>) {
+    let text = String::from_utf8(schema.data.to_vec()).unwrap();
+    assert!(text.contains("\nuint32 epoch\n"));
+    schema.data = Cow::Owned(text.replace("\nuint32 epoch\n", "\n").into_bytes());
+}
+
 /// Changes the frames, except the first ones.
 fn later<'a>(message: Message<'a>, change: impl Fn(Message<'a>) -> Message<'a>) -> Message<'a> {
     if message.sequence > 40 { change(message) } else { message }
@@ -181,15 +193,18 @@ fn with_a_handle_less(message: Message<'_>) -> Message<'_> {
     message
 }
 
-/// Returns simulated time and the first handle of each frame that the library plays, and the reason of an early end.
-fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64)>, ReadError> {
+/// Returns simulated time, the first handle, and the number of alerts and cues, of each frame that the library plays, and
+/// the reason of an early end.
+fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64, usize)>, ReadError> {
     let options = ReplayOptions { pace: Pace::Even(100.0), start: None, looping: false };
     let (mut replay, thread) = Prepared::open(file, options)?.begin()?;
     const STAMPS: Stamps = Stamps { run_id: 0, sequence: 0, stamp_ns: 0, deadline_ns: 0 };
     let mut frames = Vec::new();
     for tick in 0.. {
         match replay.frame(tick, STAMPS) {
-            Period::Frame(frame) => frames.push((frame.header.sim_time.to_bits(), frame.chain.x[0].to_bits())),
+            Period::Frame(Outgoing { header, chain, alerts, cues, .. }) => {
+                frames.push((header.sim_time.to_bits(), chain.x[0].to_bits(), alerts.len() + cues.len()));
+            }
             Period::Empty => std::thread::yield_now(),
             Period::Over => break,
         }
@@ -222,7 +237,8 @@ fn a_bag_of_another_recorder_is_played() {
     assert_eq!((&played["frames"], &played["end"]), (&frames.len().into(), &"recording".into()), "{played}");
 }
 
-/// `ros2 bag record --max-bag-duration` begins a new file at times; the latched stage is in the first.
+/// `ros2 bag record --max-bag-duration` begins a new file at times; the latched stage is in the first. Others repeat the
+/// alert that holds in each file.
 #[test]
 fn a_bag_of_several_files_is_played_as_one_recording() {
     let folder = tempfile::tempdir().unwrap();
@@ -234,9 +250,14 @@ fn a_bag_of_several_files_is_played_as_one_recording() {
     std::fs::create_dir(&bag).unwrap();
     for (part, name) in ["bag_9.mcap", "bag_10.mcap", "bag_11.mcap"].into_iter().enumerate() {
         let part_of = |message: &Message<'_>| (message.log_time - first) * 3 / (last - first + 1);
-        rewrite(&bytes, &bag.join(name), |it| if part_of(&it) == part as u64 { vec![it] } else { vec![] });
+        rewrite(&bytes, &bag.join(name), |it| match part_of(&it) == part as u64 {
+            true if it.channel.topic.ends_with("/alerts") => vec![it.clone(), it],
+            true => vec![it],
+            false => vec![],
+        });
     }
     let frames = contents(&file, None).unwrap();
+    assert!(frames.iter().any(|(_, _, events)| *events > 0));
     // Without metadata.yaml, which a killed recorder does not write.
     assert_eq!(contents(&bag, None).unwrap(), frames);
     let scene = scene(folder.path(), "school", 64, "");

@@ -47,7 +47,8 @@ impl Descent<'_, '_> {
                 return false;
             }
         }
-        self.boards_are_apart(&listed, None, links).is_ok()
+        let is_apart = self.upper.is_none() || self.boards_are_apart(&listed, None, links).is_ok();
+        is_apart && self.stays_beside(&listed, links)
     }
 
     /// Returns true if the listed handles suffice for a step.

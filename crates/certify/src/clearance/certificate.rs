@@ -2,13 +2,15 @@
 
 use std::io;
 
+use super::beside::{Beside, UpperBeside};
 use super::{Descent, Finish, Upper, Write};
 use crate::capsule::Spanned;
 use crate::first_order::When;
 use crate::first_order_step::{FirstOrderStep, step_points};
 use crate::grid::GridPoint;
 use crate::interval::Interval;
-use crate::lines::{About, CertificateLine, CertifiedClearance, Links, Until};
+use crate::lines::{About, CertificateLine, CertifiedClearance, CertifiedObstacleClearance, Links, Until};
+use crate::path::Place;
 
 /// Metres that are added to an upper bound for the rounding of the checker.
 const SPARE: f64 = 1e-12;
@@ -33,6 +35,50 @@ impl Descent<'_, '_> {
         let common = self.chain.common_point(&handles, benches)?;
         let (from, to) = (point.head, point.head);
         Some(CertificateLine::Contact { benches, from, to, spans: spans_of(&handles), point: common })
+    }
+
+    /// Writes that a board is near an obstacle, at a place that the steps have come to. Returns the upper bound.
+    fn write_near_obstacle(&mut self, obstacle: usize, head_speed: f64) -> Option<f64> {
+        let Beside { upper, shown, .. } = self.beside[obstacle];
+        let (chain, (UpperBeside { head, travelled, bench, .. }, (_, end))) = (&self.chain, (upper?, shown?));
+        let until = Interval::point(self.time_of(Some(end), head_speed)) * head_speed;
+        let is_before = chain.exact.travelled(head[0]).hi <= until.lo.max(0.0);
+        if !chain.exact.in_order(head[0], end) || !(is_before || self.is_whole(obstacle)) {
+            return None;
+        }
+        let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
+        let mut middle = from.clone();
+        let mut step = FirstOrderStep::new(chain, &step_points(&mut from, &mut middle, &mut to));
+        while step.listed.handles.len() <= bench + 1 {
+            step.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
+        }
+        let most = chain.barriers[obstacle].at_most(&step.board(bench), When::Always) + SPARE;
+        let (spans, at, [from, to]) = (spans_of(&step.listed.handles), step.places, head);
+        self.write(&CertificateLine::NearObstacle { obstacle, bench, from, to, spans, at, most });
+        Some(most)
+    }
+
+    /// Returns the result for an obstacle.
+    fn result_beside(&self, obstacle: usize, hi: Option<f64>, head_speed: f64) -> CertifiedObstacleClearance {
+        let Beside { upper, shown, .. } = self.beside[obstacle];
+        let bench = upper.filter(|_| hi.is_some()).map(|upper| upper.bench);
+        let (until, time_until) = match self.is_whole(obstacle) {
+            true => (Until::PathEnd, None),
+            false => (Until::Time, Some(self.time_of(shown.map(|(_, end)| end), head_speed))),
+        };
+        CertifiedObstacleClearance { obstacle, lo: shown.map(|(least, _)| least), hi, until, time_until, bench }
+    }
+
+    /// Returns true if the clearance of an obstacle is shown from the start to the path's end.
+    fn is_whole(&self, obstacle: usize) -> bool {
+        let Beside { shown, is_lost, .. } = self.beside[obstacle];
+        matches!(self.finish, Some(Finish::PathEnd)) && shown.is_some() && !is_lost
+    }
+
+    /// Returns a time by which the head has come to a place; 0 without a place.
+    fn time_of(&self, place: Option<Place>, head_speed: f64) -> f64 {
+        let time = |end| (self.chain.exact.travelled(end).over(Interval::point(head_speed)) * (1.0 - 1e-14)).lo;
+        place.map_or(0.0, time).max(0.0)
     }
 
     /// Writes that two boards are near, at a place that the steps have come to. Returns the upper bound.
@@ -62,6 +108,8 @@ impl Descent<'_, '_> {
         let near = self.upper.filter(|_| !matches!(self.finish, Some(Finish::Contact(_))));
         let hi = near.and_then(|upper| self.write_near(upper));
         let benches = near.filter(|_| hi.is_some()).map(|upper| upper.benches);
+        let beside: Vec<_> =
+            (0..self.beside.len()).map(|obstacle| self.write_near_obstacle(obstacle, head_speed)).collect();
         let mut result = CertifiedClearance {
             lo: self.shown.map(|(least, _)| least),
             hi,
@@ -73,7 +121,10 @@ impl Descent<'_, '_> {
         match self.finish {
             Some(Finish::PathEnd) => {
                 self.write(&CertificateLine::PathEnd);
-                result.until = Until::PathEnd;
+                match self.shown {
+                    Some(_) => result.until = Until::PathEnd,
+                    None => result.time_until = Some(0.0),
+                }
             }
             Some(Finish::Contact([bench_a, bench_b])) => {
                 let benches = (Some(bench_a), Some(bench_b));
@@ -81,13 +132,14 @@ impl Descent<'_, '_> {
                 result.until = Until::Contact;
             }
             None => {
-                let time = self.shown.map_or(0.0, |(_, end)| {
-                    (self.chain.exact.travelled(end).over(Interval::point(head_speed)) * (1.0 - 1e-14)).lo
-                });
-                result.time_until = Some(time.max(0.0));
+                result.time_until = Some(self.time_of(self.shown.map(|(_, end)| end), head_speed));
             }
         }
         self.write(&CertificateLine::LeastClearance(result));
+        for (obstacle, hi) in beside.into_iter().enumerate() {
+            let result = self.result_beside(obstacle, hi, head_speed);
+            self.write(&CertificateLine::ObstacleClearance(result));
+        }
         self.failed.map_or(Ok(()), Err)
     }
 }

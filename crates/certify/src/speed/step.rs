@@ -84,7 +84,7 @@ impl Speeds<'_> {
         }
         match self.chain.exact.segments[0].curve {
             Curve::Line { .. } => true,
-            Curve::Inward { a } => {
+            Curve::Inward { a, .. } => {
                 let longest = if last == 0 { self.chain.link(0).max(self.chain.link(1)) } else { self.chain.link(1) };
                 let square = Interval::point(at).square();
                 let turned = longest * (square + Interval::point(2.0));

@@ -9,10 +9,10 @@
 //! that are far from all others; among the others a grid finds the near ones.
 //!
 //! Dragons that go side by side hardly approach each other, however fast they go. So a bench keeps a list of the
-//! boards near it, each with a distance and the handles' places relative to the bench's front handle at that time. A
-//! point of a board is a linear function of the board's two handles. If both boards move by one vector, no distance
-//! changes; so two boards approach by no more than [`corner_reach`] times the movement of their handles less that of
-//! the front handle. A board of the list is measured again only when this bound comes within the limit.
+//! boards near it, each with a distance and the places of the board's handles at that time as seen from the bench: with
+//! the front handle as the origin and the link as an axis. A point of a board is a linear function of the board's two
+//! handles. So two boards have approached by no more than [`corner_reach`] times the movement of the handles as seen
+//! from the bench. A board of the list is measured again only when this bound comes within the limit.
 
 use super::grid::Grid;
 use super::{Nearest, PairClearance, board, circle_radius, corner_reach};
@@ -81,34 +81,51 @@ struct Listed {
     bench: u32,
     /// A lower bound of the distance of the boards at the time of the places, metres.
     distance: f32,
-    /// The rear handle of the bench, then both handles of the board, from the front handle of the bench.
-    places: [[f32; 2]; 3],
+    /// The handles of the board as seen from the bench.
+    places: [[f32; 2]; 2],
 }
 
-/// The handles of a bench and a board from the front handle of the bench, metres.
-fn places(chain: &Chain, a: usize, b: usize) -> [[f64; 2]; 3] {
-    let (x, y) = (chain.x[a], chain.y[a]);
-    [a + 1, b, b + 1].map(|handle| [chain.x[handle] - x, chain.y[handle] - y])
+/// A bench from which others are seen.
+#[derive(Debug, Clone, Copy)]
+struct Seat {
+    front: Vector,
+    axis: Vector,
+}
+
+impl Seat {
+    fn new(chain: &Chain, bench: usize) -> Self {
+        let front = Vector::new(chain.x[bench], chain.y[bench]);
+        let link = front - Vector::new(chain.x[bench + 1], chain.y[bench + 1]);
+        Self { front, axis: link / link.norm() }
+    }
+
+    /// Returns the handles of a bench as seen from here, metres along and across.
+    fn handles(&self, chain: &Chain, bench: usize) -> [[f64; 2]; 2] {
+        [bench, bench + 1].map(|handle| {
+            let from = Vector::new(chain.x[handle], chain.y[handle]) - self.front;
+            [self.axis.dot(&from), self.axis.perp(&from)]
+        })
+    }
 }
 
 impl Listed {
-    fn new(chain: &Chain, (a, b): (usize, usize), distance: f64, reach: f64) -> Self {
-        let places = places(chain, a, b);
+    /// `reach` is the greatest approach of a point of a board per metre of its handles.
+    fn new(chain: &Chain, seat: &Seat, bench: usize, distance: f64, reach: f64) -> Self {
+        let places = seat.handles(chain, bench);
         let rounding = SINGLE_ROUNDING * places.iter().flatten().map(|metres| metres.abs()).sum::<f64>();
         let distance = (distance - (1.0 + reach) * rounding) as f32;
         let places = places.map(|place| place.map(|metres| metres as f32));
-        Self { bench: b as u32, distance: distance.next_down(), places }
+        Self { bench: bench as u32, distance: distance.next_down(), places }
     }
 
-    /// Returns a lower bound of the distance now. `reach` is the greatest approach of a point of a board per metre of
-    /// its handles.
-    fn bound(&self, chain: &Chain, a: usize, reach: f64) -> f64 {
-        let now = places(chain, a, self.bench as usize);
+    /// Returns a lower bound of the distance now.
+    fn bound(&self, chain: &Chain, seat: &Seat, reach: f64) -> f64 {
+        let now = seat.handles(chain, self.bench as usize);
         let moved = |k: usize| {
             let [dx, dy] = [0, 1].map(|axis| now[k][axis] - f64::from(self.places[k][axis]));
             dx * dx + dy * dy
         };
-        f64::from(self.distance) - reach * (moved(0).sqrt() + moved(1).max(moved(2)).sqrt())
+        f64::from(self.distance) - reach * moved(0).max(moved(1)).sqrt()
     }
 }
 
@@ -120,6 +137,8 @@ pub struct BetweenMonitor {
     beyond: f64,
     /// Greatest approach of two boards per metre of displacement of their handles.
     reach: f64,
+    /// Greatest approach of the points of a board while it is a seat: its link may be off its length, metres.
+    link_slack: f64,
     /// The handles of the previous frame.
     x: Vec<f64>,
     y: Vec<f64>,
@@ -153,9 +172,11 @@ impl BetweenMonitor {
         let most =
             |of: fn(&Team, usize) -> f64| teams.iter().map(|team| of(team, 0).max(of(team, 1))).fold(0.0, f64::max);
         let shortest = teams.iter().map(Team::shortest_link).fold(f64::INFINITY, f64::min);
+        let reach = 2.0 * most(corner_reach) * (1.0 + 2.0 * link_error / shortest);
         Self {
             beyond: most(circle_radius) + link_error,
-            reach: 2.0 * most(corner_reach) * (1.0 + 2.0 * link_error / shortest),
+            link_slack: reach * link_error,
+            reach,
             x: vec![0.0; first],
             y: vec![0.0; first],
             closed: f64::INFINITY,
@@ -274,7 +295,7 @@ impl BetweenMonitor {
         let distance = 2.0 * self.beyond + limit + SKIN + margin;
         let mut unlisted = limit + SKIN;
         let first = self.parts[k + 1].first;
-        let reach = 0.5 * self.reach;
+        let (reach, seat) = (0.5 * self.reach, Seat::new(chain, a));
         let Self { grid, boards, listed, counts, tested, .. } = self;
         let (listed, count) = (&mut listed[a], &mut counts[a]);
         let mut visit = |b: usize| {
@@ -290,7 +311,7 @@ impl BetweenMonitor {
                 *tested += 1;
                 measured(nearest, (a, b), &board_a, &board_b)
             };
-            unlisted = unlisted.min(enlist(listed, count, Listed::new(chain, (a, b), bound, reach)));
+            unlisted = unlisted.min(enlist(listed, count, Listed::new(chain, &seat, b, bound, reach)));
         };
         grid.visit_near((x, y), distance, first, &mut visit);
         unlisted
@@ -300,18 +321,18 @@ impl BetweenMonitor {
     fn against_listed(&mut self, chain: &Chain, nearest: &mut Nearest, k: usize, a: usize) -> f64 {
         let mut least = f64::INFINITY;
         let mut board_a = None;
-        let reach = 0.5 * self.reach;
+        let (reach, seat) = (0.5 * self.reach, Seat::new(chain, a));
         let margin = ROUNDING.0 + ROUNDING.1 * (chain.x[a].abs() + chain.y[a].abs());
         for place in 0..usize::from(self.counts[a]) {
             let listed = self.listed[a][place];
-            let mut bound = listed.bound(chain, a, reach) - margin;
+            let mut bound = listed.bound(chain, &seat, reach) - self.link_slack - margin;
             if bound <= nearest.value + margin {
                 let b = listed.bench as usize;
                 let board_a = board_a.get_or_insert_with(|| self.parts[k].board(chain, a));
                 let board_b = self.parts[self.part_of(b)].board(chain, b);
                 self.tested += 1;
                 bound = measured(nearest, (a, b), board_a, &board_b);
-                self.listed[a][place] = Listed::new(chain, (a, b), bound, reach);
+                self.listed[a][place] = Listed::new(chain, &seat, b, bound, reach);
             }
             least = least.min(bound);
         }

@@ -222,7 +222,9 @@ fn of_dragons_side_by_side_few_boards_are_tested() {
         monitor.nearest(&chain, f64::INFINITY).unwrap();
         tested += if k > 0 { monitor.pairs_tested() - before } else { 0 };
     }
-    assert!(tested < 300 * 100, "{} a frame", tested / 299);
+    println!("{} a frame", tested / 299);
+    // A test of all boards near each of 60 takes some 300.
+    assert!(tested < 300 * 60, "{} a frame", tested / 299);
 }
 
 /// Checks every bound that the table has for a chain. Returns the difference of the least distance and the least bound,

@@ -7,7 +7,8 @@ use crate::model::elementary::hypot;
 use crate::model::path::{Param, Path};
 use crate::model::team::Team;
 
-/// A circle about some boards, and the circle about the origin, the centre of every spiral, that holds them.
+/// A circle about some boards, and the circle about the origin that holds them. The origin is the centre of every
+/// spiral but those of routes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reach {
     pub centre: Point,
@@ -21,8 +22,8 @@ impl Reach {
     /// board whose front handle is behind this place cannot.
     ///
     /// No point of a board is further than hypot(max(link / 2, inset), width / 2) from the nearer one of its handles.
-    /// On an inward spiral, let both handles of a board be at least r from the origin. Then its axis is at least
-    /// min(sqrt(r^2 - link^2 / 4), r - inset) from the origin, and its points half a width less.
+    /// On an inward spiral about the origin, let both handles of a board be at least r from the origin. Then its axis
+    /// is at least min(sqrt(r^2 - link^2 / 4), r - inset) from the origin, and its points half a width less.
     pub fn rearmost(&self, path: &Path, team: &Team, limit: f64) -> Option<Param> {
         let half = 0.5 * team.longest_link();
         let disc = self.radius + limit + hypot(half.max(team.hole_inset), 0.5 * team.width);

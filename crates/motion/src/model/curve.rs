@@ -76,7 +76,7 @@ pub struct ReachedDisc {
     pub centre: Point,
     /// Radius of the disc, metres.
     pub radius: f64,
-    /// Radius, metres, of the circle about the origin with the same property for boards on an inward spiral.
+    /// Radius, metres, of the circle about the origin with the same property for boards on an inward spiral about it.
     pub about_origin: f64,
 }
 

@@ -3,6 +3,7 @@
 
 use super::curve::Side;
 use super::path::{Disjoint, Path};
+use super::spiral::Direction;
 
 /// The numbers of a path.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +28,7 @@ pub enum PathDescription {
         /// Metres of travel after it.
         lead_out: f64,
     },
-    /// Lines and arcs: see [`Path::route`]. The head starts at the origin of the path's own coordinates; a
+    /// Lines, arcs and spirals: see [`Path::route`]. The head starts at the origin of the path's own coordinates; a
     /// [`Placement`](crate::placement::Placement) moves the start.
     Route {
         /// The direction at the start, turns counter-clockwise from x.
@@ -36,6 +37,9 @@ pub enum PathDescription {
         steps: Vec<RouteStep>,
     },
 }
+
+/// Pieces of a route up to which its ends are plain sums, as they were when no route had more.
+const FEW_PIECES: usize = 31;
 
 /// One segment of a route.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +58,19 @@ pub enum RouteStep {
         /// Change of direction, in turns (90 degrees are a quarter).
         turns: f64,
     },
+    /// Along an Archimedean spiral.
+    Spiral {
+        /// The side on which the centre is.
+        side: Side,
+        /// Towards the centre or away from it.
+        direction: Direction,
+        /// Metres per turn.
+        pitch: f64,
+        /// Metres from the centre to its beginning.
+        radius: f64,
+        /// Turns around the centre: its end is `pitch` times as many metres nearer to the centre, or further away.
+        turns: f64,
+    },
 }
 
 impl PathDescription {
@@ -63,6 +80,16 @@ impl PathDescription {
             Self::Spiral { pitch, .. } | Self::Turnaround { pitch, .. } => Some(*pitch),
             Self::Route { .. } => None,
         }
+    }
+
+    /// Returns the pitches of the path's spirals, metres per turn.
+    pub fn pitches(&self) -> impl Iterator<Item = f64> + '_ {
+        let steps = if let Self::Route { steps, .. } = self { steps.as_slice() } else { &[] };
+        let of_steps = steps.iter().filter_map(|step| match step {
+            RouteStep::Spiral { pitch, .. } => Some(*pitch),
+            RouteStep::Line { .. } | RouteStep::Arc { .. } => None,
+        });
+        self.pitch().into_iter().chain(of_steps)
     }
 
     /// Builds the path in doubles.
@@ -76,9 +103,14 @@ impl PathDescription {
                 Path::turnaround(*pitch, *turn_radius, *arc_ratio, *lead_in, *lead_out)
             }
             Self::Route { heading_turns, steps } => {
-                let route = steps.iter().fold(Path::route(*heading_turns), |route, step| match *step {
+                let start = Path::route(*heading_turns);
+                let start = if steps.len() > FEW_PIECES { start.of_many_pieces() } else { start };
+                let route = steps.iter().fold(start, |route, step| match *step {
                     RouteStep::Line { length } => route.line(length),
                     RouteStep::Arc { side, radius, turns } => route.arc(side, radius, turns),
+                    RouteStep::Spiral { side, direction, pitch, radius, turns } => {
+                        route.spiral(side, direction, pitch, radius, turns)
+                    }
                 });
                 route.build()
             }

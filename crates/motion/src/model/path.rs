@@ -11,6 +11,7 @@ use super::curve::{Coordinate, Curve, Side};
 use super::double_double::DoubleDouble;
 use super::elementary::{atan, atan2, hypot};
 use super::line::Line;
+use super::placed_spiral::PlacedSpiral;
 use super::segment::Segment;
 use super::spiral::{Direction, Spiral};
 use super::{Point, Vector};
@@ -112,8 +113,8 @@ pub enum OutlineKind {
         first: f64,
         /// Polar angle of its end on the unturned spiral, radians.
         last: f64,
-        /// Curvature at its beginning, 1/m, positive to the left, of a spiral that a placement moves, turns or mirrors;
-        /// NaN of a spiral about the origin.
+        /// Curvature at its beginning, 1/m, positive to the left, of a piece of a route, and of a spiral that a
+        /// placement moves, turns or mirrors; NaN of a spiral about the origin.
         curvature: f64,
     },
 }
@@ -185,7 +186,7 @@ impl Path {
     }
 
     /// Creates a route that begins at the origin in the direction `heading_turns` turns counter-clockwise from x, with
-    /// an infinite straight line behind it. Lines and arcs are added one by one.
+    /// an infinite straight line behind it. Lines, arcs and spirals are added one by one.
     pub fn route(heading_turns: f64) -> Route {
         let start = Point::origin();
         let (sine, cosine) = DoubleDouble::from_turns(heading_turns).sine_and_cosine();
@@ -193,7 +194,7 @@ impl Path {
         let zero = Coordinate::ZERO;
         let behind =
             Placed { segment, begin: f64::NEG_INFINITY, end: 0.0, anchor: zero, anchor_travelled: 0.0, last: zero };
-        Route { path: Self { segments: vec![behind] }, end: start, heading_turns }
+        Route { path: Self { segments: vec![behind] }, end: start, heading_turns, remainders: None }
     }
 
     fn push(&mut self, segment: Segment, anchor: Coordinate, last: Coordinate, length: f64) {
@@ -273,7 +274,7 @@ impl Path {
         rest + between + self.segment(to).arc_length(self.segments[to.segment].anchor, to.at)
     }
 
-    /// Returns the largest summand of the points of lines and arcs, metres, for handles up to `behind` metres behind
+    /// Returns the largest summand of the points of a route's curves, metres, for handles up to `behind` metres behind
     /// the start. Points nearer to the origin of coordinates are rounded as this number is.
     pub fn largest_summand(&self, behind: f64) -> f64 {
         let of = |placed: &Placed| {
@@ -282,6 +283,10 @@ impl Path {
                 Segment::Line(line) => line.origin.coords.amax(),
                 Segment::Arc(arc) => arc.origin.coords.amax().max(length.min(2.0 * arc.radius)),
                 Segment::Spiral(_) => 0.0,
+                Segment::PlacedSpiral(spiral) => {
+                    let widest = spiral.spiral().radius(placed.anchor).max(spiral.spiral().radius(placed.last));
+                    spiral.point(placed.anchor).coords.amax().max(length.min(2.0 * widest))
+                }
             }
         };
         self.segments.iter().map(of).fold(0.0, f64::max)
@@ -290,7 +295,8 @@ impl Path {
     /// Returns the greatest curvature between two distances of travel, 1/m: the tangent turns by at most this per
     /// metre.
     pub fn max_curvature_between(&self, from: f64, to: f64) -> f64 {
-        let met = self.segments.iter().filter(|placed| placed.begin <= to && placed.end >= from);
+        let first = self.segments.partition_point(|placed| placed.end < from);
+        let met = self.segments[first..].iter().take_while(|placed| placed.begin <= to);
         met.map(|placed| {
             let tightest = if placed.segment.tightens() { to } else { from.max(placed.begin) }.min(placed.end);
             placed.segment.curvature(placed.at(tightest))
@@ -323,6 +329,13 @@ impl Path {
                         first: first.high,
                         last: last.high,
                         curvature: f64::NAN,
+                    },
+                    Segment::PlacedSpiral(spiral) => OutlineKind::Spiral {
+                        direction: spiral.spiral().direction(),
+                        pitch: spiral.spiral().pitch(),
+                        first: first.high,
+                        last: last.high,
+                        curvature: spiral.signed_curvature(first),
                     },
                 };
                 let start = placed.segment.point(first);
@@ -362,31 +375,82 @@ pub struct Route {
     path: Path,
     end: Point,
     heading_turns: f64,
+    remainders: Option<Remainders>,
+}
+
+/// The rounding errors of the end, the heading and the length of a route so far.
+#[derive(Debug, Clone, Copy, Default)]
+struct Remainders {
+    end: Vector,
+    heading_turns: f64,
+    length: f64,
 }
 
 impl Route {
+    /// Returns the route with sums of twice the digits from here on, for a route of many pieces: their rounding errors
+    /// would add up. Short routes have plain sums.
+    pub fn of_many_pieces(self) -> Self {
+        Self { remainders: Some(Remainders::default()), ..self }
+    }
+
     /// Adds a straight line of `length` metres.
     pub fn line(self, length: f64) -> Self {
         let line = Line { origin: self.end, direction: self.direction() };
-        self.continued(Segment::Line(line), Coordinate { high: length, low: 0.0 }, length, 0.0)
+        self.continued(Segment::Line(line), Coordinate::ZERO, Coordinate { high: length, low: 0.0 }, length, 0.0)
     }
 
     /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
     pub fn arc(self, side: Side, radius: f64, turns: f64) -> Self {
         let arc = Arc::new(self.end, self.direction(), side, radius);
         let turned = if side == Side::Left { turns } else { -turns };
-        self.continued(Segment::Arc(arc), DoubleDouble::from_turns(turns), radius * TAU * turns, turned)
+        let last = DoubleDouble::from_turns(turns);
+        self.continued(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
+    }
+
+    /// Adds an Archimedean spiral of `pitch` metres per turn. It begins `radius` metres from its centre, which is on
+    /// one side, and leads `turns` turns around it.
+    ///
+    /// The tangent has the polar angle theta + atan(theta), but for a constant.
+    pub fn spiral(self, side: Side, direction: Direction, pitch: f64, radius: f64, turns: f64) -> Self {
+        let spiral = Spiral::new(pitch, direction);
+        let DoubleDouble { high, low } = DoubleDouble::quotient(radius, pitch);
+        let first = DoubleDouble::from_turns(high).plus(TAU * low);
+        let around = DoubleDouble::from_turns(turns);
+        let last = first.plus(spiral.sign() * around.high).plus(spiral.sign() * around.low);
+        let placed = PlacedSpiral::new(self.end, self.direction(), side, spiral, first);
+        let inclined = atan(around.high / (1.0 + first.high * last.high)) / TAU;
+        let turned = if side == Side::Left { turns + inclined } else { -turns - inclined };
+        self.continued(Segment::PlacedSpiral(placed), first, last, spiral.arc_length(first, last), turned)
     }
 
     fn direction(&self) -> Vector {
-        let (sine, cosine) = DoubleDouble::from_turns(self.heading_turns).sine_and_cosine();
+        let rest = self.remainders.map_or(0.0, |remainders| remainders.heading_turns);
+        let heading = DoubleDouble::from_turns(self.heading_turns);
+        let heading = if rest == 0.0 { heading } else { heading.plus(TAU * rest) };
+        let (sine, cosine) = heading.sine_and_cosine();
         Vector::new(cosine, sine)
     }
 
-    fn continued(mut self, segment: Segment, last: Coordinate, length: f64, turned: f64) -> Self {
-        self.path.push(segment, Coordinate::ZERO, last, length);
-        self.end = segment.point(last);
-        self.heading_turns += turned;
+    fn continued(mut self, segment: Segment, first: Coordinate, last: Coordinate, length: f64, turned: f64) -> Self {
+        let before = self.path.length();
+        self.path.push(segment, first, last, length);
+        let Some(rest) = &mut self.remainders else {
+            self.end = segment.point(last);
+            self.heading_turns += turned;
+            return self;
+        };
+        let add = |sum: &mut f64, rest: &mut f64, by: f64| {
+            DoubleDouble { high: *sum, low: *rest } = DoubleDouble { high: *sum, low: *rest }.plus(by);
+        };
+        let by = segment.displacement(first, last);
+        add(&mut self.end.x, &mut rest.end.x, by.x);
+        add(&mut self.end.y, &mut rest.end.y, by.y);
+        add(&mut self.heading_turns, &mut rest.heading_turns, turned);
+        let mut end = before;
+        add(&mut end, &mut rest.length, length);
+        if let Some(pushed) = self.path.segments.last_mut() {
+            pushed.end = end;
+        }
         self
     }
 

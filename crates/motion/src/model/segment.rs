@@ -3,6 +3,7 @@
 use super::arc::Arc;
 use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
 use super::line::Line;
+use super::placed_spiral::PlacedSpiral;
 use super::spiral::Spiral;
 use super::team::Team;
 use super::{Point, Vector};
@@ -14,8 +15,10 @@ pub enum Segment {
     Line(Line),
     /// Along a circle.
     Arc(Arc),
-    /// Along an Archimedean spiral, inward or outward.
+    /// Along an Archimedean spiral about the origin, inward or outward.
     Spiral(Spiral),
+    /// Along an Archimedean spiral about another centre.
+    PlacedSpiral(PlacedSpiral),
 }
 
 /// Forwards every method of [`Curve`] to the curve of the segment, by a match: frames call these methods per handle.
@@ -29,6 +32,7 @@ macro_rules! forward {
                         Self::Line(line) => Curve::$name(line $(, $argument)*),
                         Self::Arc(arc) => Curve::$name(arc $(, $argument)*),
                         Self::Spiral(spiral) => Curve::$name(spiral $(, $argument)*),
+                        Self::PlacedSpiral(spiral) => Curve::$name(spiral $(, $argument)*),
                     }
                 }
             )*

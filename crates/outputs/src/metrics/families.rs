@@ -2,14 +2,16 @@
 //! Out: families of samples. Pure.
 //!
 //! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for counts. Every
-//! sample has the publisher's name as its label `name`. Only one sample has the run as a label, since each new value of
-//! a label makes a new series.
+//! sample has the publisher's name as its label `name`, and the name of one of several dragons as its label `dragon`.
+//! Only one sample has the run as a label, since each new value of a label makes a new series; for the same reason an
+//! alert has labels with dragons and obstacles, and none with the number of a bench.
 
 use super::exposition::{Family, Kind};
 use crate::monitor::{IntervalReport, Presence};
 use bench_dragon_messages::chase::ChaseState;
-use bench_dragon_messages::state::{FrameState, PlaybackState};
-use bench_dragon_messages::{ChaseStatus, CollisionAlert, FrameHeader, LoopStatus};
+use bench_dragon_messages::sentence::obstacle_name;
+use bench_dragon_messages::state::{EventKind, FrameState, PlaybackState};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, FrameHeader, HandlePose, LoopStatus, NO_BENCH, Stage};
 
 /// Returns all families of the publisher `name`. Without a running publisher most of them have no samples.
 pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
@@ -20,9 +22,12 @@ pub fn families(name: &str, report: &IntervalReport) -> Vec<Family> {
     }
     if let Some(header) = report.present_header() {
         all.extend(families.of_frame(&header));
+        all.extend(report.stage.iter().flat_map(|stage| families.of_dragons(stage, &header, &report.heads)));
     }
     if let Some(alert) = &report.alert {
         all.push(families.of_alert(alert));
+        let named = report.stage.iter().filter(|stage| stage.run_id == alert.run_id);
+        all.extend(named.flat_map(|stage| families.of_alert_names(alert, stage)));
     }
     if let Some((status, has_died)) = &report.chase {
         all.extend(families.of_chase(status, *has_died));
@@ -244,6 +249,67 @@ impl Families<'_> {
         families
     }
 
+    /// Returns a family of one sample for each dragon.
+    fn of_each(&self, family: Family, stage: &Stage, values: impl Iterator<Item = f64>) -> Family {
+        let sample = |(dragon, value): (&str, f64)| {
+            let further = [("dragon", dragon)];
+            (self.labels(if dragon.is_empty() { &[] } else { &further }), value)
+        };
+        let names = stage.dragons.iter().map(|dragon| dragon.name.as_str());
+        Family { samples: names.zip(values).map(sample).collect(), ..family }
+    }
+
+    fn of_dragons(&self, stage: &Stage, header: &FrameHeader, heads: &[HandlePose]) -> Vec<Family> {
+        let benches = self.gauge("bench_dragon_benches", "Benches of a dragon.", 0.0);
+        let mut families =
+            vec![self.of_each(benches, stage, stage.dragons.iter().map(|dragon| f64::from(dragon.benches)))];
+        let speed = |head: &HandlePose| head.vx.hypot(head.vy) * header.time_scale;
+        if heads.iter().all(|head| !speed(head).is_nan()) {
+            let family = self.gauge(
+                "bench_dragon_head_speed_meters_per_second",
+                "Speed of the head of a dragon, per second of wall time; 0 while it stands.",
+                0.0,
+            );
+            families.push(self.of_each(family, stage, heads.iter().map(speed)));
+        }
+        families
+    }
+
+    /// Returns the names of an alert: of the nearest boards or obstacle, and of its event. Empty for one dragon on
+    /// empty ground, which has no names.
+    fn of_alert_names(&self, alert: &CollisionAlert, stage: &Stage) -> Vec<Family> {
+        if stage.dragons.len() <= 1 && stage.obstacles.is_empty() {
+            return Vec::new();
+        }
+        let named = |name, help, event: Option<EventKind>, pair: [u32; 2]| {
+            let dragon = |number: u32| stage.owner(number).map_or("", |(dragon, _)| dragon.name.as_str());
+            let obstacle = obstacle_name(stage, pair[1]).unwrap_or_default();
+            let event = event.map(|event| ("event", event.name()));
+            let labels = [("dragon", dragon(pair[0])), ("other", dragon(pair[1])), ("obstacle", obstacle)];
+            let labels: Vec<_> =
+                event.into_iter().chain(labels.into_iter().filter(|(_, name)| !name.is_empty())).collect();
+            Family { name, kind: Kind::Info, unit: None, help, samples: vec![(self.labels(&labels), 1.0)] }
+        };
+        let mut families = Vec::new();
+        if alert.bench_a != NO_BENCH {
+            families.push(named(
+                "bench_dragon_nearest",
+                "What is nearest in the latest alert: the dragons of two boards, or of a board, and an obstacle.",
+                None,
+                [alert.bench_a, alert.bench_b],
+            ));
+        }
+        if let Some(event) = alert.event_kind() {
+            families.push(named(
+                "bench_dragon_alert_event",
+                "The event of the latest alert: its kind, its dragons, its obstacle.",
+                Some(event),
+                [alert.event_bench_a, alert.event_bench_b],
+            ));
+        }
+        families
+    }
+
     fn of_chase(&self, status: &ChaseStatus, has_died: bool) -> Vec<Family> {
         let state = status.chase_state().filter(|_| !has_died).unwrap_or(ChaseState::Ended);
         let mut families = vec![
@@ -280,9 +346,11 @@ impl Families<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::exposition::{Format, render};
     use crate::monitor::Monitor;
     use bench_dragon_client::feed::FeedEvent;
     use bench_dragon_messages::state::Level;
+    use bench_dragon_messages::{List, SceneName, StageDragon, StageObstacle};
 
     #[test]
     fn nothing_of_a_publisher_that_is_gone_is_served_but_that_it_is_down() {
@@ -317,6 +385,53 @@ mod tests {
             (value(&gone, "bench_dragon_up"), value(&gone, "bench_dragon_metrics_frames_missed")),
             (Some(0.0), Some(3.0))
         );
+    }
+
+    #[test]
+    fn dragons_and_obstacles_are_labels() {
+        let dragon = |name, first_handle| StageDragon {
+            first_handle,
+            benches: 60,
+            name: SceneName::new(name),
+            ..StageDragon::default()
+        };
+        let well = StageObstacle { name: SceneName::new("well"), ..StageObstacle::default() };
+        let stage = Stage {
+            dragons: List::of([dragon("gold", 0), dragon("jade", 61)]),
+            obstacles: List::of([well]),
+            ..Stage::default()
+        };
+        let header = FrameHeader { time_scale: 2.0, ..FrameHeader::default() };
+        let mut handles = vec![HandlePose::default(); 122];
+        handles[61] = HandlePose { vx: 0.6, vy: -0.8, ..HandlePose::default() };
+        let alert = CollisionAlert {
+            bench_a: 70,
+            bench_b: 122,
+            event: FrameState::Contact as u32,
+            event_bench_a: 3,
+            event_bench_b: 61,
+            ..CollisionAlert::default()
+        };
+        let mut monitor = Monitor::default();
+        for event in [
+            FeedEvent::Stage { stage: &stage, segments: &[] },
+            FeedEvent::Frame { header: &header, handles: &handles, missed: 0 },
+            FeedEvent::Alert(&alert),
+        ] {
+            monitor.handle(&event, 0);
+        }
+        let text = render(&families("night", &monitor.report()), Format::OpenMetrics);
+        for line in [
+            "bench_dragon_benches{name=\"night\",dragon=\"jade\"} 60",
+            "bench_dragon_head_speed_meters_per_second{name=\"night\",dragon=\"gold\"} 0",
+            "bench_dragon_head_speed_meters_per_second{name=\"night\",dragon=\"jade\"} 2",
+            "bench_dragon_nearest_info{name=\"night\",dragon=\"jade\",obstacle=\"well\"} 1",
+            "bench_dragon_alert_event_info{name=\"night\",event=\"contact\",dragon=\"gold\",other=\"jade\"} 1",
+        ] {
+            assert!(text.lines().any(|printed| printed == line), "{line} in\n{text}");
+        }
+        monitor.handle(&FeedEvent::Gone, 0);
+        assert!(!render(&families("night", &monitor.report()), Format::OpenMetrics).contains("jade"));
     }
 
     #[test]

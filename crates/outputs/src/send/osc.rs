@@ -42,8 +42,9 @@ impl Addresses {
     }
 
     /// `/alert ,sisffffiii`: the level and its number, the event, simulated seconds until the event, the clearance, the
-    /// place and the benches of the event, the latest cue.
-    pub fn alert(&self, alert: &CollisionAlert, cue: u32) -> OscMessage {
+    /// place and the benches of the event, the latest cue. Benches count within their dragon.
+    pub fn alert(&self, alert: &CollisionAlert, stage: Option<&Stage>, cue: u32) -> OscMessage {
+        let bench = |number: u32| bench(stage.and_then(|stage| stage.owner(number)).map_or(number, |(_, own)| own));
         let level = alert.alert_level().map_or("unknown", Level::name);
         let event = alert.event_kind().map_or("none", EventKind::name);
         self.message(
@@ -68,6 +69,13 @@ impl Addresses {
         self.message("obstacle", vec![text(obstacle_in(stage, alert).unwrap_or_default())])
     }
 
+    /// `/dragons ,ss`: the names of the dragons of the benches of an alert's event; empty for no bench and for an
+    /// obstacle.
+    pub fn dragons(&self, stage: &Stage, alert: &CollisionAlert) -> OscMessage {
+        let name = |number: u32| stage.owner(number).map_or("", |(dragon, _)| dragon.name.as_str());
+        self.message("dragons", [alert.event_bench_a, alert.event_bench_b].map(|number| text(name(number))).to_vec())
+    }
+
     /// `/countdown ,fs`: seconds of wall time until the next event, and its name.
     pub fn countdown(&self, coming: Option<(f64, &'static str)>) -> OscMessage {
         let (seconds, event) = coming.unwrap_or((f64::NAN, "none"));
@@ -90,10 +98,12 @@ impl Addresses {
         self.message("cue", args)
     }
 
-    /// `/head ,fffff`: x, y, heading, and the velocity in metres per second of wall time.
-    pub fn head(&self, header: &FrameHeader, head: &HandlePose) -> OscMessage {
+    /// `/head ,fffff`: x, y, heading, and the velocity in metres per second of wall time; of one of several dragons
+    /// `/gold/head`. The `dragon` is empty for a single one.
+    pub fn head(&self, dragon: &str, header: &FrameHeader, head: &HandlePose) -> OscMessage {
         let [vx, vy] = [head.vx, head.vy].map(|speed| or_zero(speed * header.time_scale));
-        self.message("head", vec![float(head.x), float(head.y), float(head.heading), vx, vy])
+        let address = if dragon.is_empty() { "head".to_owned() } else { format!("{dragon}/head") };
+        self.message(&address, vec![float(head.x), float(head.y), float(head.heading), vx, vy])
     }
 
     /// `/sim_time ,f`: simulated seconds.
@@ -172,7 +182,7 @@ mod tests {
 
     #[test]
     fn an_alert_about_nothing_fires_no_threshold_and_names_no_bench() {
-        let message = Addresses::new("bench_dragon").alert(&CollisionAlert::default(), 0);
+        let message = Addresses::new("bench_dragon").alert(&CollisionAlert::default(), None, 0);
         assert_eq!(message.addr, "/bench_dragon/alert");
         let (never, none) = (OscType::Float(1e6), OscType::Int(-1));
         let expected = [text("clear"), OscType::Int(0), text("none"), never.clone(), never];

@@ -10,7 +10,7 @@ use super::osc::{Addresses, State, datagrams, next_event};
 use super::{Arrivals, Pace};
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_client::polling::Handler;
-use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage};
+use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageDragon};
 
 /// The most bundles of frames per second.
 pub const MOST_RATE: u32 = 60;
@@ -56,9 +56,11 @@ pub struct OscSender {
     outlet: Outlet,
     pace: Pace,
     arrivals: Arrivals,
-    stage: Option<Stage>,
-    /// The latest frame of the run, and the period and the time of the first one that came.
-    latest: Option<(FrameHeader, HandlePose)>,
+    /// The stage, with the dragons; frames wait for it.
+    stage: Option<Box<Stage>>,
+    /// The latest frame of the run, the heads in it, and the period and the time of the first frame that came.
+    latest: Option<FrameHeader>,
+    heads: Vec<HandlePose>,
     first_tick: u64,
     first_stamp_ns: u64,
     due: bool,
@@ -83,6 +85,7 @@ impl OscSender {
             arrivals: Arrivals::default(),
             stage: None,
             latest: None,
+            heads: Vec::new(),
             first_tick: 0,
             first_stamp_ns: 0,
             due: false,
@@ -118,10 +121,13 @@ impl OscSender {
             return;
         }
         self.last_alert = Some(*alert);
-        let header = self.latest.map(|(header, _)| header).filter(|header| header.run_id == alert.run_id);
-        self.pending.push(self.addresses.alert(alert, header.map_or(0, |header| header.cue)));
-        let stage = self.stage.as_ref().filter(|stage| stage.run_id == alert.run_id && !stage.obstacles.is_empty());
-        self.pending.extend(stage.map(|stage| self.addresses.obstacle(stage, alert)));
+        let header = self.latest.filter(|header| header.run_id == alert.run_id);
+        let stage = self.stage.as_deref().filter(|stage| stage.run_id == alert.run_id);
+        self.pending.push(self.addresses.alert(alert, stage, header.map_or(0, |header| header.cue)));
+        let on_ground = stage.filter(|stage| !stage.obstacles.is_empty());
+        self.pending.extend(on_ground.map(|stage| self.addresses.obstacle(stage, alert)));
+        let of_several = stage.filter(|stage| stage.dragons.len() > 1);
+        self.pending.extend(of_several.map(|stage| self.addresses.dragons(stage, alert)));
         self.summary.alerts += 1;
     }
 
@@ -129,7 +135,7 @@ impl OscSender {
     fn take_cue(&mut self, cue: &Cue) {
         let of = |cue: &Cue| (cue.run_id, cue.tick, cue.number);
         let is_known = self.last_cue.as_ref().is_some_and(|last| of(last) == of(cue));
-        let of_this_run = self.latest.is_some_and(|(header, _)| header.run_id == cue.run_id);
+        let of_this_run = self.latest.is_some_and(|header| header.run_id == cue.run_id);
         // Stamps alone do not suffice: the clock may have been set back since the first frame.
         let is_old = cue.tick < self.first_tick && cue.stamp_ns.saturating_add(CUE_GRACE_NS) < self.first_stamp_ns;
         if is_known || !of_this_run || is_old {
@@ -147,13 +153,18 @@ impl OscSender {
         self.arrivals.handle(&event, Instant::now());
         match event {
             FeedEvent::Frame { header, handles, .. } => {
-                if self.latest.is_none_or(|(latest, _)| latest.run_id != header.run_id) {
+                let Some(stage) = &self.stage else { return };
+                if self.latest.is_none_or(|latest| latest.run_id != header.run_id) {
                     (self.first_tick, self.first_stamp_ns) = (header.tick, header.stamp_ns);
                 }
-                self.latest = Some((*header, handles.first().copied().unwrap_or_default()));
+                self.latest = Some(*header);
+                let head =
+                    |dragon: &StageDragon| handles.get(dragon.first_handle as usize).copied().unwrap_or_default();
+                self.heads.clear();
+                self.heads.extend(stage.dragons.iter().map(head));
                 self.due |= self.pace.is_due(header);
             }
-            FeedEvent::Stage { stage, .. } => self.stage = Some(*stage),
+            FeedEvent::Stage { stage, .. } => self.stage = Some(Box::new(*stage)),
             FeedEvent::Alert(alert) => self.take_alert(alert),
             FeedEvent::Cue(cue) => self.take_cue(cue),
             FeedEvent::Gone => self.stage = None,
@@ -166,7 +177,7 @@ impl OscSender {
     fn send_due(&mut self, now: Instant) {
         let mut messages = std::mem::take(&mut self.pending);
         let due = std::mem::take(&mut self.due);
-        if let Some((header, head)) = &self.latest {
+        if let Some(header) = &self.latest {
             let stopped = self.arrivals.stopped_since(now).is_some();
             let state = if stopped { Some(State::Stopped) } else { State::of(header) };
             // A change is sent at once, and so is the end of a countdown.
@@ -174,7 +185,7 @@ impl OscSender {
                 messages.push(self.addresses.state(state));
                 (self.told_state, self.next_state) = (Some(state), now + STATE_INTERVAL);
             }
-            let stage = self.stage.as_ref().filter(|stage| stage.run_id == header.run_id && !stopped);
+            let stage = self.stage.as_deref().filter(|stage| stage.run_id == header.run_id && !stopped);
             let coming = stage.and_then(|stage| next_event(stage, header));
             let is_due = if coming.is_some() { due && now >= self.next_countdown } else { self.told_countdown };
             if is_due {
@@ -183,7 +194,12 @@ impl OscSender {
             }
             if due {
                 self.summary.frames += 1;
-                messages.extend([self.addresses.sim_time(header), self.addresses.head(header, head)]);
+                messages.push(self.addresses.sim_time(header));
+                let dragons = self.stage.iter().flat_map(|stage| stage.dragons.iter());
+                let head = |(dragon, head): (&StageDragon, &HandlePose)| {
+                    self.addresses.head(dragon.name.as_str(), header, head)
+                };
+                messages.extend(dragons.zip(&self.heads).map(head));
             }
         }
         self.send_all(messages);
@@ -231,6 +247,7 @@ mod tests {
         let discard = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 9);
         let outlet = Outlet::open(&[discard], Route { interface: None, multicast_ttl: 1 }).unwrap();
         let mut sender = OscSender::new(Addresses::new("show"), 10.0, outlet);
+        sender.take(FeedEvent::Stage { stage: &Stage::default(), segments: &[] });
         let header = FrameHeader { run_id: 1, tick: 1000, stamp_ns: 100 * HOUR_NS, ..FrameHeader::default() };
         sender.take(FeedEvent::Frame { header: &header, handles: &[], missed: 0 });
         let cue = |number, tick, stamp_ns| Cue { run_id: 1, number, tick, stamp_ns, ..Cue::default() };

@@ -155,6 +155,9 @@ impl<'a> PsnSender<'a> {
             self.summary.passed_over += 1;
             return;
         }
+        if !source.knows_dragons() {
+            return;
+        }
         if std::mem::take(&mut source.stopped) {
             (self.notify)(publisher, Notice::Resumed);
         }

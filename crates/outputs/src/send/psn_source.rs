@@ -9,7 +9,7 @@ use super::psn::{Tracker, TrackerName};
 use super::trackers::{Numbers, Selection};
 use bench_dragon_client::clock::monotonic_ns;
 use bench_dragon_client::feed::FeedEvent;
-use bench_dragon_messages::{FrameHeader, HandlePose};
+use bench_dragon_messages::{FrameHeader, HandlePose, Stage};
 
 /// The trackers of one publisher.
 pub(super) struct Source {
@@ -17,6 +17,8 @@ pub(super) struct Source {
     arrivals: Arrivals,
     /// True if the deadlines are of this machine's clock.
     pub(super) shares_clock: bool,
+    /// The dragons of the show; frames wait for them.
+    dragons: Option<Vec<Dragon>>,
     team: Option<Team>,
     /// The positions in the latest frame.
     pub(super) trackers: Vec<Tracker>,
@@ -28,7 +30,17 @@ pub(super) struct Source {
     sent: Option<usize>,
 }
 
+/// A dragon of the show: its name, which is empty for a single one, and its handles.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Dragon {
+    name: String,
+    first_handle: u32,
+    handles: u32,
+}
+
+/// The chosen handles of all dragons, in the order of a frame, and their trackers.
 struct Team {
+    dragons: Vec<Dragon>,
     handles: u32,
     chosen: Vec<u32>,
     names: Vec<TrackerName>,
@@ -41,6 +53,7 @@ impl Source {
             numbers,
             arrivals: Arrivals::default(),
             shares_clock: true,
+            dragons: None,
             team: None,
             trackers: Vec::new(),
             unsent: false,
@@ -71,9 +84,14 @@ impl Source {
         &names[..self.sent.unwrap_or(names.len()).min(names.len())]
     }
 
-    /// Updates the arrivals by an event.
+    /// Updates the arrivals and the dragons by an event.
     pub(super) fn arrived(&mut self, event: &FeedEvent<'_>, now: Instant) {
         self.arrivals.handle(event, now);
+        match event {
+            FeedEvent::Stage { stage, .. } => self.dragons = Some(dragons_of(stage)),
+            FeedEvent::Gone => self.dragons = None,
+            _ => (),
+        }
     }
 
     /// See [`Arrivals::stopped_since`]; `None` without trackers.
@@ -81,30 +99,63 @@ impl Source {
         self.arrivals.stopped_since(now).filter(|_| self.is_known())
     }
 
-    /// Chooses the trackers of a new team. Returns a sentence for each kind of handles that is left out, or `None` if
-    /// the team is known.
+    /// Returns true if the dragons of the show are known: frames wait for that.
+    pub(super) fn knows_dragons(&self) -> bool {
+        self.dragons.is_some()
+    }
+
+    /// Chooses the trackers of a new team in a frame of `handles` handles. Returns a sentence for each kind of handles
+    /// that is left out, or `None` if the team is known.
     pub(super) fn meet(&mut self, handles: u32, selection: &Selection) -> Option<Vec<String>> {
-        if self.team.as_ref().is_some_and(|team| team.handles == handles) {
+        let mut dragons = self.dragons.clone()?;
+        if let [only] = &mut dragons[..] {
+            // A publisher may leave out handles.
+            only.handles = handles;
+        }
+        if self.team.as_ref().is_some_and(|team| team.handles == handles && team.dragons == dragons) {
             return None;
         }
-        let mut sentences = Vec::new();
-        let mut chosen = selection.of(handles);
-        let names = self.numbers.trackers(&chosen, handles);
-        let of = self.of();
-        if let Some(beyond) = selection.beyond(handles) {
-            sentences.push(format!("there is no handle {beyond}{of}: the team has {handles}"));
+        let (mut sentences, mut chosen, mut names) = (Vec::new(), Vec::new(), Vec::new());
+        for (place, dragon) in dragons.iter().enumerate() {
+            let numbers = match &dragon.name[..] {
+                "" => Some(self.numbers.clone()),
+                name => self.numbers.of_dragon(place, name, dragon.first_handle),
+            };
+            let own = selection.of(dragon.handles);
+            let trackers = numbers.as_ref().map_or(Vec::new(), |numbers| numbers.trackers(&own, dragon.handles));
+            sentences.extend(self.left_out(dragon, numbers.as_ref(), selection, (trackers.len(), own.len())));
+            chosen.extend(own[..trackers.len()].iter().map(|handle| dragon.first_handle + handle));
+            names.extend(trackers);
         }
-        if names.len() < chosen.len() {
-            let (sent, chosen, last) = (names.len(), chosen.len(), self.numbers.last);
+        self.team = Some(Team { dragons, handles, chosen, names, announced: false });
+        self.sent = None;
+        Some(sentences)
+    }
+
+    /// Returns a sentence for each kind of a dragon's handles that is left out: those that it does not have, and those
+    /// without a number, by the count of trackers and of chosen handles.
+    fn left_out(
+        &self,
+        dragon: &Dragon,
+        numbers: Option<&Numbers>,
+        selection: &Selection,
+        (sent, chosen): (usize, usize),
+    ) -> Vec<String> {
+        let name =
+            numbers.unwrap_or(&self.numbers).of.as_deref().or(Some(&dragon.name[..]).filter(|of| !of.is_empty()));
+        let of = name.map_or(String::new(), |of| format!(" of \"{of}\""));
+        let mut sentences = Vec::new();
+        if let Some(beyond) = selection.beyond(dragon.handles) {
+            sentences.push(format!("there is no handle {beyond}{of}: the team has {}", dragon.handles));
+        }
+        if sent < chosen {
+            let last = numbers.unwrap_or(&self.numbers).last;
             let (whose, advice) =
                 if of.is_empty() { ("trackers'", "") } else { ("its", "; --id-step leaves room for more") };
             sentences
                 .push(format!("only {sent} of {chosen} handles{of} are sent: {whose} numbers end at {last}{advice}"));
         }
-        chosen.truncate(names.len());
-        self.team = Some(Team { handles, chosen, names, announced: false });
-        self.sent = None;
-        Some(sentences)
+        sentences
     }
 
     /// Takes the positions of a frame, made at `timestamp_us`. Returns true if it replaces a frame that was not sent.
@@ -155,13 +206,61 @@ impl Source {
     }
 }
 
+/// Returns the dragons of a show.
+fn dragons_of(stage: &Stage) -> Vec<Dragon> {
+    let dragon = |of: &bench_dragon_messages::StageDragon| Dragon {
+        name: of.name.as_str().to_owned(),
+        first_handle: of.first_handle,
+        handles: of.benches + 1,
+    };
+    stage.dragons.iter().map(dragon).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::{List, SceneName, StageDragon};
+
+    /// A source that knows the dragons of a show.
+    fn source(numbers: Numbers, dragons: &[(&str, u32)]) -> Source {
+        let mut source = Source::new(numbers);
+        let mut stage = Stage::default();
+        let mut first_handle = 0;
+        for &(name, benches) in dragons {
+            let dragon = StageDragon { first_handle, benches, name: SceneName::new(name), ..StageDragon::default() };
+            first_handle += benches + 1;
+            stage.dragons = List::of(stage.dragons.iter().copied().chain([dragon]));
+        }
+        source.arrived(&FeedEvent::Stage { stage: &stage, segments: &[] }, Instant::now());
+        source
+    }
+
+    #[test]
+    fn each_dragon_of_a_show_has_its_trackers() {
+        let mut source = source(Numbers::from(1, 100), &[("gold", 3), ("jade", 2)]);
+        let left_out = source.meet(7, &"head,2,tail,4".parse().unwrap()).unwrap();
+        assert_eq!(left_out, ["there is no handle 4 of \"jade\": the team has 3"]);
+        let poses = Vec::from_iter((0..7).map(|x| HandlePose { x: f64::from(x), ..HandlePose::default() }));
+        source.take(&FrameHeader::default(), &poses, Axes::default(), 0);
+        let seen = source.trackers.iter().zip(source.names()).map(|(it, name)| (it.id, it.position[0], &name.name[..]));
+        assert_eq!(
+            Vec::from_iter(seen),
+            [
+                (1, 0.0, "gold head"),
+                (2, 1.0, "gold handle 2"),
+                (4, 3.0, "gold tail"),
+                (101, 4.0, "jade head"),
+                (102, 5.0, "jade handle 2"),
+                (103, 6.0, "jade tail")
+            ]
+        );
+        assert_eq!(source.meet(7, &Selection::all()), None, "a known team");
+        assert!(!Source::new(Numbers::from(1, 100)).knows_dragons(), "before the stage");
+    }
 
     #[test]
     fn a_cut_is_told_when_it_changes() {
-        let mut source = Source::new(Numbers::from(1));
+        let mut source = source(Numbers::from(1, 1000), &[("", 3)]);
         source.meet(4, &Selection::all());
         source.take(&FrameHeader::default(), &[HandlePose::default(); 4], Axes::default(), 0);
         let cuts = [9, 3, 3, 2, 4, 3].map(|room| source.fit(room));
@@ -173,7 +272,7 @@ mod tests {
 
     #[test]
     fn a_frame_of_another_machine_counts_as_made_now() {
-        let mut source = Source::new(Numbers::from(1));
+        let mut source = Source::new(Numbers::from(1, 1000));
         let header = FrameHeader { deadline_ns: 7, ..FrameHeader::default() };
         assert_eq!(source.made_ns(&header), 7);
         source.shares_clock = false;

@@ -82,14 +82,18 @@ pub struct Numbers {
     pub first: u16,
     /// The last number of this team.
     pub last: u16,
-    /// The publisher's name, if several publishers send to one desk.
+    /// The name of the publisher, of the dragon, or of both, if there are several.
     pub of: Option<String>,
+    /// The distance of the heads' numbers of several dragons of one show; `None` if several publishers share the
+    /// numbers.
+    step: Option<u16>,
 }
 
 impl Numbers {
-    /// Returns the numbers of a single publisher.
-    pub fn from(first: u16) -> Self {
-        Self { first, last: u16::MAX, of: None }
+    /// Returns the numbers of a single publisher. If its show has several dragons, the numbers of their heads are
+    /// `step` apart.
+    pub fn from(first: u16, step: u16) -> Self {
+        Self { first, last: u16::MAX, of: None, step: Some(step) }
     }
 
     /// Returns the numbers of several publishers, whose heads' numbers are `step` apart even if some do not run.
@@ -104,8 +108,20 @@ impl Numbers {
             first,
             last: first.saturating_add(step - 1),
             of: Some(name.clone()),
+            step: None,
         });
         Some(numbers.collect())
+    }
+
+    /// Returns the numbers of one of several dragons of a show: its `place` among them, its name and its first handle.
+    /// Dragons of one of several publishers share the numbers of that publisher, in the order of all handles. Returns
+    /// `None` if no number is left.
+    pub fn of_dragon(&self, place: usize, name: &str, first_handle: u32) -> Option<Self> {
+        let offset = self.step.map_or(u64::from(first_handle), |step| place as u64 * u64::from(step));
+        let first = u16::try_from(u64::from(self.first) + offset).ok().filter(|first| *first <= self.last)?;
+        let last = self.step.map_or(self.last, |step| first.saturating_add(step - 1));
+        let of = self.of.as_ref().map_or_else(|| name.to_owned(), |publisher| format!("{publisher} {name}"));
+        Some(Self { first, last, of: Some(of), step: None })
     }
 
     /// Returns the trackers of the chosen handles, without those that would have a number above the last.
@@ -144,10 +160,10 @@ mod tests {
 
     #[test]
     fn one_team_has_numbers_from_its_first_to_the_greatest() {
-        let trackers = Numbers::from(301).trackers(&[0, 11, 223], 224);
+        let trackers = Numbers::from(301, 1000).trackers(&[0, 11, 223], 224);
         let names: Vec<_> = trackers.iter().map(|it| (it.id, it.name.as_str())).collect();
         assert_eq!(names, [(301, "head"), (312, "handle 12"), (524, "tail")]);
-        let trackers = Numbers::from(65_500).trackers(&Vec::from_iter(0..100), 100);
+        let trackers = Numbers::from(65_500, 1000).trackers(&Vec::from_iter(0..100), 100);
         assert_eq!(trackers.len(), 36, "numbers end at 65,535");
     }
 
@@ -173,6 +189,21 @@ mod tests {
     }
 
     fn numbers_at(first: u16) -> Numbers {
-        Numbers { first, last: first, of: Some("jade".to_owned()) }
+        Numbers { first, last: first, of: Some("jade".to_owned()), step: None }
+    }
+
+    #[test]
+    fn dragons_of_one_show_have_numbers_and_names_of_their_own() {
+        let ends = |numbers: &Numbers| (numbers.first, numbers.last, numbers.of.clone().unwrap());
+        let alone = Numbers::from(11, 1000);
+        let jade = alone.of_dragon(1, "jade", 61).unwrap();
+        assert_eq!(ends(&jade), (1011, 2010, "jade".to_owned()));
+        assert_eq!(jade.trackers(&[0], 61)[0].name, "jade head");
+        assert_eq!(alone.of_dragon(66, "jade", 61), None, "numbers end at 65,535");
+        // Beside another publisher: one after the other.
+        let night = &Numbers::of_several(&["night", "day"].map(str::to_owned), 1, 100).unwrap()[0];
+        let jade = night.of_dragon(1, "jade", 61).unwrap();
+        assert_eq!(ends(&jade), (62, 100, "night jade".to_owned()));
+        assert_eq!(night.of_dragon(2, "red", 122), None);
     }
 }

@@ -1,11 +1,13 @@
 // The words after # in the page's address, for a screen without a keyboard: #show,transparent or #dark&follow=12.
 
 /**
- * Words without a value, words with numbers (as many as named) or a word after `=`, and those of them that may have none.
+ * Words without a value, words with numbers (as many as named) or a word after `=`, and those of them that may have
+ * none.
  */
 const ALONE = ["show", "moon", "hands", "desk", "tell", "transparent", "nolabels", "keys", "dark", "light", "sound"];
 const OPTIONAL = ["follow", "seat"];
-const WITH = { follow: /^[1-9]\d*$/, bench: /^[1-9]\d*$/, rotate: /^-?\d+(\.\d+)?$/, view: /^-?[\d.]+,-?[\d.]+,[\d.]+$/, lang: /^(en|zh)$/, seat: /^-?[\d.]+(,[\d.]+){0,2}$/ };
+const WITH = { follow: /^[1-9]\d*$/, bench: /^[1-9]\d*$/, rotate: /^-?\d+(\.\d+)?$/,
+    view: /^-?[\d.]+,-?[\d.]+,[\d.]+$/, lang: /^(en|zh)$/, seat: /^-?[\d.]+(,[\d.]+){0,2}$/ };
 
 /** The decoded text of an address; the text itself if it cannot be decoded. */
 function textOf(address) {
@@ -25,7 +27,8 @@ export function wordsOf(hash) {
   for (const part of textOf(hash).replace(/^#/, "").split(/&|,(?![-\d.])/).filter(Boolean)) {
     const [word, value] = part.split("=");
     if (value === undefined && (ALONE.includes(word) || OPTIONAL.includes(word))) said[word] = true;
-    else if (value !== undefined && Object.hasOwn(WITH, word) && WITH[word].test(value)) said[word] = word === "lang" ? value : value.split(",").map(Number);
+    else if (value !== undefined && Object.hasOwn(WITH, word) && WITH[word].test(value)) said[word] = word === "lang"
+        ? value : value.split(",").map(Number);
     else said.unknown.push(part);
   }
   return said;

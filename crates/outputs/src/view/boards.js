@@ -20,7 +20,8 @@ export function rectangle(stage, places, bench) {
 export function benchAt(stage, places, x, y, most) {
   let best = most, found = -1;
   for (let bench = 0; bench < places.length / STRIDE - 1; bench++) {
-    const r = rectangle(stage, places, bench), along = (x - r.x) * r.c + (y - r.y) * r.s, across = (y - r.y) * r.c - (x - r.x) * r.s;
+    const r = rectangle(stage, places, bench), along = (x - r.x) * r.c + (y - r.y) * r.s,
+        across = (y - r.y) * r.c - (x - r.x) * r.s;
     const away = Math.hypot(Math.max(0, Math.abs(along) - r.l), Math.max(0, Math.abs(across) - r.w));
     if (away < best || (away === 0 && best === 0)) [best, found] = [away, bench];
   }
@@ -30,7 +31,9 @@ export function benchAt(stage, places, x, y, most) {
 /** The number of a dragon's boards. */
 const countOf = ({ places }) => places.length / STRIDE - 1;
 
-/** Returns the dragon of a bench among several, by its number through all handles; undefined for none of their benches. */
+/**
+ * Returns the dragon of a bench among several, by its number through all handles; undefined for none of their benches.
+ */
 export const ownerOf = (dragons, number) =>
   dragons.find((dragon) => number >= dragon.first && number < dragon.first + countOf(dragon));
 
@@ -41,17 +44,19 @@ function boardOf(dragons, number) {
 }
 
 /**
- * Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap; with these
- * points as `ends`, and their distance `away`, m. The boards are of any dragons, numbered through all handles.
+ * Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap; with
+ * these points as `ends`, and their distance `away`, m. The boards are of any dragons, numbered through all handles.
  */
 export function nearest(dragons, ...pair) {
   const [a, b] = pair.map((number) => boardOf(dragons, number));
   let best = Infinity, place = null;
   for (const [one, other] of [[a, b], [b, a]]) {
     for (const [along, across] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
-      const x = one.x + along * one.l * one.c - across * one.w * one.s, y = one.y + along * one.l * one.s + across * one.w * one.c;
+      const x = one.x + along * one.l * one.c - across * one.w * one.s,
+          y = one.y + along * one.l * one.s + across * one.w * one.c;
       const dx = x - other.x, dy = y - other.y, u = dx * other.c + dy * other.s, v = dy * other.c - dx * other.s;
-      const nu = Math.max(-other.l, Math.min(other.l, u)), nv = Math.max(-other.w, Math.min(other.w, v)), away = Math.hypot(u - nu, v - nv);
+      const nu = Math.max(-other.l, Math.min(other.l, u)), nv = Math.max(-other.w, Math.min(other.w, v)),
+          away = Math.hypot(u - nu, v - nv);
       if (away >= best) continue;
       best = away;
       const foot = { x: other.x + nu * other.c - nv * other.s, y: other.y + nu * other.s + nv * other.c };
@@ -76,12 +81,13 @@ function gap(a, b) {
 }
 
 /**
- * Calls `found` with each two boards that share no handle and whose gap is at most `most` metres, and with that gap. Boards
- * are compared with those of the same and the adjacent squares of a grid. They are numbered through all handles: the last
- * handle of a dragon has no bench, so boards of two dragons differ by more than one.
+ * Calls `found` with each two boards that share no handle and whose gap is at most `most` metres, and with that gap.
+ * Boards are compared with those of the same and the adjacent squares of a grid. They are numbered through all handles:
+ * the last handle of a dragon has no bench, so boards of two dragons differ by more than one.
  */
 function eachWithin(dragons, most, found) {
-  const longest = Math.max(...dragons.map(({ stage }) => Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width)));
+  const longest = Math.max(
+      ...dragons.map(({ stage }) => Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width)));
   const side = longest + Math.max(0, most), squares = new Map(), boards = new Map();
   for (const dragon of dragons) {
     const { stage, places, first } = dragon, count = countOf(dragon);

@@ -10,7 +10,10 @@ const BOARDS_FOLLOWED = 2.5;
 const LEAST_FILLED = 0.75;
 /** The time in which the camera moves most of the way to a new frame, ms. */
 const EASING = 700;
-/** The room ahead of a head that moves outward: metres, at most a head's board, and at least this share of the shorter side. */
+/**
+ * The room ahead of a head that moves outward: metres, at most a head's board, and at least this share of the shorter
+ * side.
+ */
 const LEAD = 3, LEAD_SHARE = 0.12;
 /** The distance of a head from the middle of the box, as a share of half the box, beyond which it needs room. */
 const OUTER = 0.7;
@@ -31,7 +34,8 @@ export class Camera {
 
   /** Turns the picture by degrees, counter-clockwise. */
   turn(degrees) {
-    [this.c, this.s] = degrees % 90 ? [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)] : [[1, 0], [0, 1], [-1, 0], [0, -1]][((degrees / 90) % 4 + 4) % 4];
+    [this.c, this.s] = degrees % 90 ? [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)]
+        : [[1, 0], [0, 1], [-1, 0], [0, -1]][((degrees / 90) % 4 + 4) % 4];
   }
 
   whole() {
@@ -59,8 +63,8 @@ export class Camera {
   }
 
   /**
-   * Updates the frame: all teams, each with `stage` and `places`, the team of the followed bench, and the simulated seconds
-   * per second of the fastest show, with which the camera keeps up.
+   * Updates the frame: all teams, each with `stage` and `places`, the team of the followed bench, and the simulated
+   * seconds per second of the fastest show, with which the camera keeps up.
    */
   update(teams, passed, followed = teams[0], rate = 1) {
     this.longest = Math.max(...teams.map(({ stage }) => Math.max(stage.head_length, stage.body_length)));
@@ -69,7 +73,8 @@ export class Camera {
     if (!this.goal || this.stale || outgrown(this.goal, box)) this.goal = grown(box);
     if (!this.frame || this.stale) this.frame = this.goal;
     this.stale = false;
-    const part = this.still ? 1 : 1 - Math.exp((-passed * Math.max(1, rate)) / EASING), close = Math.max(...this.frame.map((one, k) => Math.abs(one - this.goal[k]))) < 1e-4 * this.goal[2];
+    const part = this.still ? 1 : 1 - Math.exp((-passed * Math.max(1, rate)) / EASING),
+        close = Math.max(...this.frame.map((one, k) => Math.abs(one - this.goal[k]))) < 1e-4 * this.goal[2];
     this.frame = close ? this.goal : this.frame.map((one, k) => one + part * (this.goal[k] - one));
     if (this.mode === "whole") this.aim(this.frame);
     const k = STRIDE * Math.min(this.followed, places.length / STRIDE - 1);
@@ -109,7 +114,8 @@ export class Camera {
   /** Pixels of the screen (not of the canvas) for a metre. */
   get scale() {
     const shorter = Math.min(this.width, this.height);
-    if (this.mode === "whole" && this.frame) return this.zoom * Math.min(this.width / this.frame[2], this.height / this.frame[3]) / 2;
+    if (this.mode === "whole" && this.frame) return this.zoom * Math.min(this.width / this.frame[2],
+        this.height / this.frame[3]) / 2;
     if (this.mode === "bench") return (this.zoom * shorter) / (BOARDS_FOLLOWED * (this.longest ?? 1));
     return (this.zoom * shorter) / (this.metres || 10);
   }
@@ -127,8 +133,10 @@ export class Camera {
 
   /** Takes a kept camera; false if it is none. */
   recall({ mode, followed, x, y, zoom, metres, c, s }) {
-    const isPlace = [x, y, c, s].every(Number.isFinite) && Math.abs(Math.hypot(c, s) - 1) < 1e-9, isSize = zoom > 0 && zoom < Infinity && (metres === null || (metres > 0 && metres < Infinity));
-    if (!["whole", "bench", "free"].includes(mode) || !(Number.isInteger(followed) && followed >= 0) || !isPlace || !isSize) return false;
+    const isPlace = [x, y, c, s].every(Number.isFinite) && Math.abs(Math.hypot(c, s) - 1) < 1e-9,
+        isSize = zoom > 0 && zoom < Infinity && (metres === null || (metres > 0 && metres < Infinity));
+    if (!["whole", "bench", "free"].includes(mode) || !(Number.isInteger(followed) && followed >= 0) || !isPlace ||
+        !isSize) return false;
     Object.assign(this, { mode, followed, x, y, zoom, metres, c, s, stale: true });
     if (mode === "whole" && this.frame) this.aim(this.frame);
     return true;
@@ -166,7 +174,8 @@ export class Camera {
     if (this.mode === "whole") this.release();
     const [before, above] = this.toStage(x, y), { scale } = this;
     // From a millimetre across the screen to fifty times everything.
-    const most = Math.min(this.width, this.height) / 1e-3, least = Math.min(this.width, this.height) / (50 * this.reach);
+    const most = Math.min(this.width, this.height) / 1e-3, least = Math.min(this.width,
+        this.height) / (50 * this.reach);
     this.zoom *= Math.min(most, Math.max(least, by * scale)) / scale;
     if (this.mode === "bench") return;
     const [after, below] = this.toStage(x, y);
@@ -177,7 +186,8 @@ export class Camera {
 
 /** Returns the box around two boxes. */
 function around([x, y, wide, high], [bx, by, bw, bh]) {
-  const [left, right, low, top] = [Math.min(x - wide, bx - bw), Math.max(x + wide, bx + bw), Math.min(y - high, by - bh), Math.max(y + high, by + bh)];
+  const [left, right, low, top] = [Math.min(x - wide, bx - bw), Math.max(x + wide, bx + bw),
+      Math.min(y - high, by - bh), Math.max(y + high, by + bh)];
   return [(left + right) / 2, (low + top) / 2, (right - left) / 2, (top - low) / 2];
 }
 

@@ -8,8 +8,8 @@ const SHOWN = 2500;
 
 export class Cameras {
   /**
-   * `look` tells the cameras of one look from those of another; `note` is an element for a sentence; `isWanted` says of an
-   * event whether its key may act.
+   * `look` tells the cameras of one look from those of another; `note` is an element for a sentence; `isWanted` says of
+   * an event whether its key may act.
    */
   constructor(eye, look, note, isWanted) {
     Object.assign(this, { eye, note, isWanted, name: `bench-dragon cameras ${look}`, timer: null });
@@ -19,7 +19,8 @@ export class Cameras {
   press(event) {
     const { code, shiftKey, ctrlKey, metaKey, altKey, repeat, target } = event;
     const number = /^(?:Digit|Numpad)([1-9])$/.exec(code)?.[1];
-    if (!number || ctrlKey || metaKey || altKey || repeat || target.closest?.("input, select, dialog") || !this.isWanted(event)) return;
+    if (!number || ctrlKey || metaKey || altKey || repeat || target.closest?.("input, select, dialog") ||
+        !this.isWanted(event)) return;
     const all = this.read();
     if (shiftKey) {
       const isKept = this.write({ ...all, [number]: this.eye.kept() });

@@ -1,5 +1,6 @@
-// The transport bar: sends commands if the server allows this page to. In: the streams' messages and frames. Out: commands
-// over the same WebSockets. One of several publishers may be selected; a hold and its release always go to all of them.
+// The transport bar: sends commands if the server allows this page to. In: the streams' messages and frames. Out:
+// commands over the same WebSockets. One of several publishers may be selected; a hold and its release always go to all
+// of them.
 
 import { answerTo, benchesIn, say, translate } from "./words.js";
 
@@ -25,7 +26,8 @@ const BAR = `
   <label><span data-word="rateInForce"></span> <select id="conduct-rate"></select></label>
   <span id="conduct-time"></span>
   <div id="conduct-line">
-    <input id="conduct-seek" type="range" min="0" max="1" step="any" value="0" data-label="timeLine" aria-describedby="conduct-events" title="← →">
+    <input id="conduct-seek" type="range" min="0" max="1" step="any" value="0"
+      data-label="timeLine" aria-describedby="conduct-events" title="← →">
     <div id="conduct-marks" aria-hidden="true"></div>
     <p id="conduct-events" class="unseen"></p>
   </div>
@@ -54,13 +56,16 @@ function takeToken() {
 const token = takeToken();
 
 /** Returns true if a certificate of exactly this scene proves the announced time of an event. */
-const isProved = (stage, { event, time }) => Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved" && outcome.time_lo <= time && time <= outcome.time_hi));
+const isProved = (stage, { event, time }) =>
+    Boolean(stage.proved?.some((outcome) => outcome.event === event && outcome.status === "proved" &&
+    outcome.time_lo <= time && time <= outcome.time_hi));
 
 /** An event on the time line; of several dragons, with its benches. */
 function eventWords(stage, { event, time, bench_a, bench_b }) {
   const numbers = stage.dragons.length > 1 ? [bench_a, bench_b].filter((number) => number !== null) : [];
   const kind = numbers.length ? `${say(event)} (${benchesIn(stage, numbers)})` : say(event);
-  return say("eventMark", { kind, time: time.toFixed(3), proved: isProved(stage, { event, time }) ? say("markProved") : "" });
+  return say("eventMark",
+      { kind, time: time.toFixed(3), proved: isProved(stage, { event, time }) ? say("markProved") : "" });
 }
 
 /** A cue on the time line. */
@@ -78,7 +83,8 @@ function canPause(streams) {
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
 
 /**
- * `keysConduct`: true if keys conduct; in the show look only on request. `keySwitch` says whether they do outside the bar.
+ * `keysConduct`: true if keys conduct; in the show look only on request. `keySwitch` says whether they do outside the
+ * bar.
  */
 export function conduct(publishers, keysConduct, keySwitch) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
@@ -156,7 +162,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
     [wanted, soughtAt] = [null, performance.now()];
   }
   function now() {
-    const { newest } = lead().playback, isBefore = landed?.stream === lead() && newest?.run === landed.run && newest.tick < landed.tick;
+    const { newest } = lead().playback, isBefore = landed?.stream === lead() && newest?.run === landed.run &&
+        newest.tick < landed.tick;
     return wanted ?? sought?.time ?? (isBefore ? landed.time : newest?.time) ?? 0;
   }
 
@@ -169,14 +176,16 @@ export function conduct(publishers, keysConduct, keySwitch) {
     const marksOf = (stream) => {
       const { stage } = stream, by = (text) => (all.length > 1 ? own(stream, text) : text);
       return [
-        ...stage.events.filter(({ time }) => time <= stage.freeze_time).map((event) => ({ kind: event.event, text: by(eventWords(stage, event)), time: event.time })),
+        ...stage.events.filter(({ time }) => time <= stage.freeze_time).map(
+            (event) => ({ kind: event.event, text: by(eventWords(stage, event)), time: event.time })),
         ...stage.cues.map((cue) => ({ kind: "cue", text: by(cueWords(cue)), time: cue.time })),
       ];
     };
     const marks = all.flatMap(marksOf);
     part("marks").replaceChildren(
       ...marks.map(({ kind, text, time }) => {
-        const mark = Object.assign(document.createElement("i"), { className: kind === "cue" ? "cue" : "event", title: text });
+        const mark = Object.assign(document.createElement("i"), { className: kind === "cue" ? "cue" : "event",
+            title: text });
         Object.assign(mark.dataset, { kind, time });
         mark.style.setProperty("--share", time / line.max);
         return mark;
@@ -218,7 +227,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
     if (at - sentenceAt > SENTENCE_TIME) put(part("answer"), "");
     if (bar.hidden) return;
     main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
-    for (const control of bar.querySelectorAll("button, input, select:not(#conduct-whom)")) control.disabled = !all.length;
+    for (const control of bar.querySelectorAll("button, input, select:not(#conduct-whom)")) control.disabled =
+        !all.length;
     // All shows can be held while the selected one is gone.
     part("hold").disabled = !streams.some(isThere);
     showHold();
@@ -226,7 +236,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
     const { playback } = isThere(lead()) ? lead() : all[0], { newest } = playback;
     sendSeek();
     showStages(all);
-    for (const stream of streams.filter(isThere)) if (stream.playback.newest.scale > 0) keepRate(stream, stream.playback.newest.scale);
+    for (const stream of streams.filter(isThere)) if (stream.playback.newest.scale > 0) keepRate(stream,
+        stream.playback.newest.scale);
     showRate(rateOf(isThere(lead()) ? lead() : all[0]));
     put(part("toggle"), say(canPause(all) ? "pause" : "play"));
     const time = dragged || sought !== null || wanted !== null ? now() : playback.time(at);
@@ -251,7 +262,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
     if (message.type === "answer") {
       if (message.sentence && message.command === "rate") known.delete(stream);
       if (message.id === sought?.id && stream === sought.stream) {
-        landed = message.code ? { stream, run: stream.playback.newest?.run, tick: message.tick, time: message.sim_time } : null;
+        landed = message.code ? { stream, run: stream.playback.newest?.run, tick: message.tick,
+            time: message.sim_time } : null;
         sought = null;
       }
       if (message.sentence) {
@@ -264,7 +276,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
   for (const stream of streams) stream.onmessage = receive(stream);
 
   if (several) {
-    part("whom").replaceChildren(new Option(say("all"), ""), ...publishers.map(({ name }, place) => new Option(name, place)));
+    part("whom").replaceChildren(new Option(say("all"), ""),
+        ...publishers.map(({ name }, place) => new Option(name, place)));
     part("whom").onchange = ({ target }) => {
       chosen = target.value === "" ? null : streams[target.value];
       [sought, wanted, landed] = [null, null, null];
@@ -307,7 +320,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
    * theirs.
    */
   const usedBy = (target, key) =>
-    target.closest("select, input:not([type=range]), dialog") || (key === " " && target.closest("button")) || (key.startsWith("Arrow") && target.closest("canvas"));
+    target.closest("select, input:not([type=range]), dialog") || (key === " " && target.closest("button")) ||
+        (key.startsWith("Arrow") && target.closest("canvas"));
   addEventListener("keydown", (event) => {
     const { key, target } = event;
     if (bar.hidden || !keysConduct || event.ctrlKey || event.metaKey || (event.altKey && !"[]".includes(key))) return;

@@ -1,5 +1,5 @@
-// One dragon of a publisher's show: its present pose, its path and colours, its lanterns and its part of the marks. Called
-// by publisher.js. Knows the words at its ends, and no canvas.
+// One dragon of a publisher's show: its present pose, its path and colours, its lanterns and its part of the marks.
+// Called by publisher.js. Knows the words at its ends, and no canvas.
 
 import { centreOf, obstaclesOf, pathOf } from "./drawing.js";
 import { STRIDE, speedOf } from "./hermite.js";
@@ -10,7 +10,8 @@ import { nameOf, say } from "./words.js";
 /** Returns the distance of the outermost bench from a place. */
 function reachOf(stage, handles, { x, y }) {
   let most = 0;
-  for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most, Math.hypot(handles[k] - x, handles[k + 1] - y));
+  for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most,
+      Math.hypot(handles[k] - x, handles[k + 1] - y));
   return most + stage.width + stage.hole_inset || 1;
 }
 
@@ -33,8 +34,14 @@ export class Dragon {
     this.marks = [];
   }
 
-  /** The name by which people know it. */
+  /** The name by which people know it; after the publisher's for one of several dragons of several publishers. */
   get name() {
+    const { part, publisher } = this;
+    return part && publisher.several ? `${publisher.name} ${part}` : this.ownName;
+  }
+
+  /** Its name in its show, or that of its publisher for a single dragon. */
+  get ownName() {
     return this.part || this.publisher.name;
   }
 
@@ -98,7 +105,8 @@ export class Dragon {
   /** Updates its lanterns: the situation, the alert, whether an event has happened, and what is shown. */
   light({ now, sight, alert, happened, shown, epoch }) {
     if (!this.show) return;
-    const { places } = this, benches = [alert?.event_bench_a, alert?.event_bench_b].map((number) => this.within(number));
+    const { places } = this,
+        benches = [alert?.event_bench_a, alert?.event_bench_b].map((number) => this.within(number));
     this.show.breathe(now, sight.stale);
     // The place of an event is with its first bench.
     const isFirst = this.isOnly || benches[0] >= 0, x = alert?.event_x ?? places[0], y = alert?.event_y ?? places[1];
@@ -135,9 +143,11 @@ export class Dragon {
 
   /** For tests and measurements; empty for a publisher that is gone. */
   report(camera) {
-    const { newest, shown } = this.publisher, there = this.isThere && !this.sight.trouble, life = this.show?.life ?? null;
+    const { newest, shown } = this.publisher, there = this.isThere && !this.sight.trouble,
+        life = this.show?.life ?? null;
     const { name } = this;
-    if (!there) return { name, life, state: null, run: null, sequence: null, head: null, shown: null, time: newest?.time ?? null };
+    if (!there) return { name, life, state: null, run: null, sequence: null, head: null, shown: null,
+        time: newest?.time ?? null };
     const head = camera.toPixel(this.places[0], this.places[1]), { state, run, sequence, time } = newest;
     return { name, life, state, run, sequence, time, head, shown: { ...shown, handles: this.places } };
   }

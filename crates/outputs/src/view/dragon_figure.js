@@ -1,6 +1,6 @@
-// The dragon's head and tail in three dimensions, for the view from a seat: balls of lit paper and tapered tufts. Called
-// by seat.js. Metres: `u` forward, `v` to the left, `w` up; of the head from 1.1 m behind the end of its board, of the
-// tail from the end of its board.
+// The dragon's head and tail in three dimensions, for the view from a seat: balls of lit paper and tapered tufts.
+// Called by seat.js. Metres: `u` forward, `v` to the left, `w` up; of the head from 1.1 m behind the end of its board,
+// of the tail from the end of its board.
 
 import { hash } from "./sprites.js";
 
@@ -13,7 +13,8 @@ const GILT = ["#ffb43a", "#ffdf90", "#fff6d8"], GILT_RIM = "#5a2404";
 const RIM = 0.014, LEAST_RIM = 0.7;
 
 /** The profile of skull and muzzle: forward, up, radius. */
-const SKULL = [[-0.12, 2.13, 0.4], [0.04, 2.18, 0.44], [0.2, 2.22, 0.41], [0.36, 2.23, 0.34], [0.54, 2.18, 0.285], [0.72, 2.13, 0.25], [0.9, 2.1, 0.235], [1.04, 2.11, 0.215], [1.19, 2.13, 0.165]];
+const SKULL = [[-0.12, 2.13, 0.4], [0.04, 2.18, 0.44], [0.2, 2.22, 0.41], [0.36, 2.23, 0.34], [0.54, 2.18, 0.285],
+    [0.72, 2.13, 0.25], [0.9, 2.1, 0.235], [1.04, 2.11, 0.215], [1.19, 2.13, 0.165]];
 /** Balls of the profile. */
 const SMOOTH = 30;
 
@@ -52,8 +53,10 @@ export function headFigure(time) {
   }
   bothSides((side) => cheek(figure, side));
   // The ridge of the nose, and the mouth with its lower jaw and its tongue of fire.
-  for (let k = 0; k < 10; k++) figure.ball(0.42 + 0.082 * k, 0, 2.47 - 0.031 * k + (k > 6 ? 0.024 * (k - 6) : 0), 0.058, "gold");
-  for (let k = 0; k < 9; k++) figure.ball(0.34 + (0.68 * k) / 8, 0, 1.85 - jaw * (0.4 + (1.2 * k) / 8), 0.2 - (0.075 * k) / 8, "skin");
+  for (let k = 0; k < 10; k++) figure.ball(0.42 + 0.082 * k, 0, 2.47 - 0.031 * k + (k > 6 ? 0.024 * (k - 6) : 0),
+      0.058, "gold");
+  for (let k = 0; k < 9; k++) figure.ball(0.34 + (0.68 * k) / 8, 0, 1.85 - jaw * (0.4 + (1.2 * k) / 8),
+      0.2 - (0.075 * k) / 8, "skin");
   for (let k = 0; k < 6; k++) figure.ball(0.6 + 0.1 * k, 0, 1.94 - jaw * (0.8 + 0.25 * k), 0.09 - 0.009 * k, "flame");
   bothSides((side) => teeth(figure, side, jaw));
   bothSides((side) => eye(figure, side));
@@ -62,14 +65,17 @@ export function headFigure(time) {
   bothSides((side) => greens(figure, side, time, jaw));
   bothSides((side) => {
     // A whisker from the nostril, forward, then back.
-    const at = (q) => [1.18 + 0.42 * Math.sin(2.8 * q) - 0.55 * q, (0.17 + 0.95 * q) * side, 2.08 + 0.4 * q * Math.sin(3.6 * q + 1.5 * time), 0.03 * (1 - 0.75 * q)];
+    const at = (q) => [1.18 + 0.42 * Math.sin(2.8 * q) - 0.55 * q, (0.17 + 0.95 * q) * side,
+        2.08 + 0.4 * q * Math.sin(3.6 * q + 1.5 * time), 0.03 * (1 - 0.75 * q)];
     figure.tuft(16, at, GILT, GILT_RIM);
   });
   return figure;
 }
 
 function neck(figure, time) {
-  for (let k = 0; k < 18; k++) figure.ball(-1.75 + 0.097 * k, 0, 1.36 + 0.036 * (k * k) / 14 + 0.02 * Math.sin(3 * time + 0.55 * k), 0.2 + 0.009 * k, k % 4 === 1 ? "gold" : "skin");
+  for (let k = 0; k < 18;
+      k++) figure.ball(-1.75 + 0.097 * k, 0, 1.36 + 0.036 * (k * k) / 14 + 0.02 * Math.sin(3 * time + 0.55 * k),
+      0.2 + 0.009 * k, k % 4 === 1 ? "gold" : "skin");
 }
 
 function cheek(figure, side) {
@@ -82,8 +88,10 @@ function cheek(figure, side) {
 }
 
 function teeth(figure, side, jaw) {
-  for (let k = 0; k < 7; k++) figure.ball(0.64 + 0.08 * k, (0.216 - 0.012 * k) * side, 1.94, k === 5 ? 0.056 : 0.036, "white");
-  for (let k = 0; k < 6; k++) figure.ball(0.62 + 0.075 * k, (0.15 - 0.01 * k) * side, 1.99 - jaw * (1.15 + 0.13 * k), 0.028, "white");
+  for (let k = 0; k < 7; k++) figure.ball(0.64 + 0.08 * k, (0.216 - 0.012 * k) * side, 1.94, k === 5 ? 0.056 : 0.036,
+      "white");
+  for (let k = 0; k < 6; k++) figure.ball(0.62 + 0.075 * k, (0.15 - 0.01 * k) * side, 1.99 - jaw * (1.15 + 0.13 * k),
+      0.028, "white");
 }
 
 function eye(figure, side) {
@@ -94,9 +102,12 @@ function eye(figure, side) {
 }
 
 function horns(figure, side) {
-  figure.tuft(10, (q) => [0.02 - 0.95 * q, (0.18 + 0.34 * q) * side, 2.5 + 0.7 * Math.sin(1.75 * q), 0.092 * (1 - 0.8 * q)], HORN, HORN_RIM);
-  figure.tuft(5, (q) => [-0.36 - 0.02 * q, (0.31 + 0.24 * q) * side, 2.88 + 0.36 * q, 0.06 * (1 - 0.8 * q)], HORN.slice(1), HORN_RIM);
-  figure.tuft(5, (q) => [-0.62 + 0.1 * q, (0.4 + 0.1 * q) * side, 3.05 + 0.3 * q, 0.046 * (1 - 0.8 * q)], HORN.slice(1), HORN_RIM);
+  figure.tuft(10, (q) => [0.02 - 0.95 * q, (0.18 + 0.34 * q) * side, 2.5 + 0.7 * Math.sin(1.75 * q),
+      0.092 * (1 - 0.8 * q)], HORN, HORN_RIM);
+  figure.tuft(5, (q) => [-0.36 - 0.02 * q, (0.31 + 0.24 * q) * side, 2.88 + 0.36 * q, 0.06 * (1 - 0.8 * q)],
+      HORN.slice(1), HORN_RIM);
+  figure.tuft(5, (q) => [-0.62 + 0.1 * q, (0.4 + 0.1 * q) * side, 3.05 + 0.3 * q, 0.046 * (1 - 0.8 * q)],
+      HORN.slice(1), HORN_RIM);
 }
 
 /** Three rings of flames behind the skull, the innermost the lightest. */
@@ -105,7 +116,8 @@ const RINGS = [[1.25, 0.46, FIRE.slice(0, 3)], [0.95, 0.4, FIRE.slice(1, 4)], [0
 function mane(figure, time) {
   RINGS.forEach(([reach, out, colours], ring) => {
     for (let flame = 0; flame < FLAMES; flame++) {
-      const angle = -0.75 + ((flame + (ring % 2) / 2) / 16) * (Math.PI + 1.5), long = reach * (0.8 + 0.4 * hash(flame + 20 * ring)), c = Math.cos(angle), s = Math.sin(angle);
+      const angle = -0.75 + ((flame + (ring % 2) / 2) / 16) * (Math.PI + 1.5),
+          long = reach * (0.8 + 0.4 * hash(flame + 20 * ring)), c = Math.cos(angle), s = Math.sin(angle);
       const at = (q) => [
         0.1 * ring - 0.08 - long * q, c * (out + 0.34 * q * q) + 0.1 * q * Math.sin(4 * time - 3.4 * q + flame),
         2.16 + s * (out + 0.38 * q * q) + 0.06 * q * Math.cos(3.3 * time - 3 * q + flame), 0.1 * (1 - q ** 1.4),
@@ -117,9 +129,15 @@ function mane(figure, time) {
 
 /** Brow, beard and ear. */
 function greens(figure, side, time, jaw) {
-  for (let k = 0; k < 3; k++) figure.tuft(7, (q) => [0.66 - 0.64 * q - 0.05 * k, (0.3 + 0.05 * q) * side, 2.5 + 0.05 * k + (0.1 + 0.1 * k) * q, 0.07 * Math.sin(Math.PI * (0.2 + 0.8 * q))], LEAF.slice(k === 2 ? 1 : 0), LEAF_RIM);
-  for (let k = 0; k < 5; k++) figure.tuft(7, (q) => [0.95 - 0.13 * k - 0.18 * q, (0.1 + 0.02 * k) * side, 1.74 - 1.4 * jaw - (0.42 - 0.04 * k) * q + 0.03 * Math.sin(3 * time + k + 2 * q), 0.05 * (1 - 0.95 * q)], LEAF, LEAF_RIM);
-  figure.tuft(7, (q) => [-0.05 - 0.44 * q, (0.4 + 0.36 * q) * side, 2.2 + 0.24 * q, 0.1 * Math.sin(Math.PI * (0.3 + 0.7 * q))], LEAF, LEAF_RIM);
+  for (let k = 0; k < 3;
+      k++) figure.tuft(7, (q) => [0.66 - 0.64 * q - 0.05 * k, (0.3 + 0.05 * q) * side, 2.5 + 0.05 * k +
+      (0.1 + 0.1 * k) * q, 0.07 * Math.sin(Math.PI * (0.2 + 0.8 * q))], LEAF.slice(k === 2 ? 1 : 0), LEAF_RIM);
+  for (let k = 0; k < 5;
+      k++) figure.tuft(7, (q) => [0.95 - 0.13 * k - 0.18 * q, (0.1 + 0.02 * k) * side,
+      1.74 - 1.4 * jaw - (0.42 - 0.04 * k) * q + 0.03 * Math.sin(3 * time + k + 2 * q), 0.05 * (1 - 0.95 * q)], LEAF,
+      LEAF_RIM);
+  figure.tuft(7, (q) => [-0.05 - 0.44 * q, (0.4 + 0.36 * q) * side, 2.2 + 0.24 * q,
+      0.1 * Math.sin(Math.PI * (0.3 + 0.7 * q))], LEAF, LEAF_RIM);
 }
 
 /** The tail at a show time. */
@@ -187,7 +205,8 @@ function tuft(context, { places, points, colours, rim }) {
 function outline(context, places, points, share) {
   const last = places.length - 1, sides = [[], []];
   for (let k = 0; k <= last; k++) {
-    const from = places[Math.max(0, k - 1)], to = places[Math.min(last, k + 1)], long = Math.hypot(to.x - from.x, to.y - from.y) || 1, { x, y, k: scale } = places[k];
+    const from = places[Math.max(0, k - 1)], to = places[Math.min(last, k + 1)],
+        long = Math.hypot(to.x - from.x, to.y - from.y) || 1, { x, y, k: scale } = places[k];
     const half = (share * points[k][3] * scale) / long, across = half * (to.y - from.y), along = half * (to.x - from.x);
     sides[0].push([x + across, y - along]);
     sides[1].push([x - across, y + along]);

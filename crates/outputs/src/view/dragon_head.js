@@ -43,7 +43,8 @@ function mane(context) {
     const count = 6 - rank;
     for (let k = 0; k < count; k++) {
       const angle = (0.1 + (0.9 * k) / count) * 1.15, long = 0.62 - 0.1 * rank - (rank < 2 ? 0.05 * k : 0);
-      const base = [-0.78 - 0.05 * k - 0.16 * Math.cos(angle), 0.24 * Math.sin(angle)], tip = [-0.84 - 1.35 * long * Math.cos(angle), long * Math.sin(angle) + 0.02];
+      const base = [-0.78 - 0.05 * k - 0.16 * Math.cos(angle), 0.24 * Math.sin(angle)],
+          tip = [-0.84 - 1.35 * long * Math.cos(angle), long * Math.sin(angle) + 0.02];
       flame(context, base, tip, 0.07 - 0.008 * rank, 0.05);
       paint(context, colour, edge, 0.008);
     }
@@ -75,7 +76,8 @@ function ears(context) {
 }
 
 /** Half of the skull's outline, from the snout to the neck. */
-const SKULL = [[0, 0.1, -0.05, 0.15, -0.13, 0.155], [-0.2, 0.16, -0.24, 0.11, -0.3, 0.13], [-0.36, 0.16, -0.38, 0.27, -0.52, 0.27], [-0.68, 0.27, -0.78, 0.2, -0.86, 0.1]];
+const SKULL = [[0, 0.1, -0.05, 0.15, -0.13, 0.155], [-0.2, 0.16, -0.24, 0.11, -0.3, 0.13],
+    [-0.36, 0.16, -0.38, 0.27, -0.52, 0.27], [-0.68, 0.27, -0.78, 0.2, -0.86, 0.1]];
 
 function skull(context) {
   context.beginPath();
@@ -92,10 +94,12 @@ function lacquer(context) {
   skull(context);
   Object.assign(context, { strokeStyle: "#4a0608", lineWidth: 0.036 });
   context.stroke();
-  paint(context, gradient(context, "line", [-0.86, 0, 0, 0], [0, "#8f0d14"], [0.35, "#d8261c"], [0.7, "#ff8a24"], [1, "#ffd77a"]));
+  paint(context, gradient(context, "line", [-0.86, 0, 0, 0], [0, "#8f0d14"], [0.35, "#d8261c"], [0.7, "#ff8a24"],
+      [1, "#ffd77a"]));
   context.save();
   context.clip();
-  context.fillStyle = gradient(context, "disc", [-0.42, 0, 0.02, -0.42, 0, 0.36], [0, "rgba(255,246,200,.95)"], [0.35, "rgba(255,205,100,.6)"], [1, "rgba(255,120,30,0)"]);
+  context.fillStyle = gradient(context, "disc", [-0.42, 0, 0.02, -0.42, 0, 0.36], [0, "rgba(255,246,200,.95)"],
+      [0.35, "rgba(255,205,100,.6)"], [1, "rgba(255,120,30,0)"]);
   context.fillRect(-1, -0.4, 1, 0.8);
   Object.assign(context, { strokeStyle: "rgba(110,16,8,.55)", lineWidth: 0.008 });
   for (let row = 0; row < 6; row++) {
@@ -127,7 +131,8 @@ function face(context) {
   ellipse(context, -0.058, 0.088, 0.022, 0.017, 0.4, "#2a0404");
   // An eye is a lamp under a brow of jade.
   ellipse(context, -0.415, 0.165, 0.1, 0.072, 0.3, "#3a0506");
-  ellipse(context, -0.4, 0.168, 0.074, 0.052, 0.3, gradient(context, "disc", [-0.395, 0.17, 0.005, -0.4, 0.168, 0.075], [0, "#fffbe0"], [0.45, "#ffe27a"], [1, "#ff9a1e"]));
+  ellipse(context, -0.4, 0.168, 0.074, 0.052, 0.3, gradient(context, "disc", [-0.395, 0.17, 0.005, -0.4, 0.168, 0.075],
+      [0, "#fffbe0"], [0.45, "#ffe27a"], [1, "#ff9a1e"]));
   ellipse(context, -0.378, 0.174, 0.03, 0.022, 0.3, "#120202");
   ellipse(context, -0.37, 0.166, 0.008, 0.008, 0, "#ffffff");
   for (const [colour, wide, up] of [["#053d2c", 0.05, 0], ["#17a57e", 0.042, 0.004], ["#8df0c4", 0.014, 0.012]]) {
@@ -138,7 +143,8 @@ function face(context) {
 
 /** The head: a canvas of `long` by `wide` metres, whose snout ends `front` metres from its left edge. */
 export function headPicture() {
-  const long = 2.1, wide = 1.4, front = long - 0.06, perMetre = 260, [canvas, context] = blank(long * perMetre, wide * perMetre);
+  const long = 2.1, wide = 1.4, front = long - 0.06, perMetre = 260, [canvas, context] = blank(long * perMetre,
+      wide * perMetre);
   const both = (part) => {
     for (const side of [1, -1]) {
       context.save();
@@ -160,7 +166,8 @@ export function headPicture() {
 
 /** The tail: flames in four shades, whose root is `front` metres from the left edge. */
 export function tailPicture() {
-  const long = 1.5, wide = 1, front = long - 0.3, perMetre = 200, [canvas, context] = blank(long * perMetre, wide * perMetre);
+  const long = 1.5, wide = 1, front = long - 0.3, perMetre = 200, [canvas, context] = blank(long * perMetre,
+      wide * perMetre);
   context.scale(perMetre, perMetre);
   context.translate(front, wide / 2);
   for (const [part, colour] of [[1, "#7c0d12"], [0.82, "#c3161a"], [0.62, "#f0701a"], [0.4, "#ffcf5a"]]) {

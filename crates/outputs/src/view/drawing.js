@@ -32,8 +32,9 @@ function onSpiral(a, angle) {
 }
 
 /**
- * How a segment's spiral stands on the stage: its centre `x`, `y`, and the direction `c`, `s` of its x axis; `side` is -1
- * where it is mirrored. Its beginning and the side to which it bends say so; without a curvature it is about the origin.
+ * How a segment's spiral stands on the stage: its centre `x`, `y`, and the direction `c`, `s` of its x axis; `side` is
+ * -1 where it is mirrored. Its beginning and the side to which it bends say so; without a curvature it is about the
+ * origin.
  */
 export function spiralFrame({ kind, x, y, heading, curvature, theta_first, pitch }) {
   if (curvature === null) return { x: 0, y: 0, c: 1, s: 0, side: 1 };
@@ -44,17 +45,17 @@ export function spiralFrame({ kind, x, y, heading, curvature, theta_first, pitch
   return { x: x - c * px + s * side * py, y: y - s * px - c * side * py, c, s, side };
 }
 
-/** The place of the centre of a stage's spirals; the origin where it has none. */
-export function centreOf({ path }) {
+/** The place of the centre of the spiral on which a team comes in; the origin of a team that comes in on a line. */
+export function centreOf({ path, start_turn }) {
   const spiral = path.find(({ kind }) => kind.endsWith("_spiral"));
-  return spiral ? spiralFrame(spiral) : { x: 0, y: 0 };
+  return spiral && start_turn !== null ? spiralFrame(spiral) : { x: 0, y: 0 };
 }
 
 /**
  * The path of a stage, in metres. A spiral on which the team comes in is drawn as far out as `reach` from its centre,
  * where the team stands.
  */
-export function pathOf({ path: segments }, reach) {
+export function pathOf({ path: segments, start_turn }, reach) {
   const path = new Path2D();
   for (const segment of segments) {
     const { kind, x, y, heading, length, curvature, theta_first, theta_last, pitch } = segment;
@@ -67,7 +68,8 @@ export function pathOf({ path: segments }, reach) {
       path.moveTo(x, y);
       path.arc(cx, cy, 1 / Math.abs(curvature), from, from + curvature * length, curvature < 0);
     } else if (kind === "inward_spiral") {
-      addSpiral(path, spiralFrame(segment), pitch, theta_last, Math.max(theta_first, (2 * Math.PI * reach) / pitch));
+      const first = start_turn === null ? theta_first : Math.max(theta_first, (2 * Math.PI * reach) / pitch);
+      addSpiral(path, spiralFrame(segment), pitch, theta_last, first);
     } else {
       addSpiral(path, spiralFrame(segment), -pitch, theta_first, theta_last);
     }
@@ -77,31 +79,67 @@ export function pathOf({ path: segments }, reach) {
 
 /** The obstacles of a stage, each with its shape in metres, its keep-out, its name and a place on its outline. */
 export function obstaclesOf({ obstacles }) {
-  return obstacles.filter(({ outline }) => outline.length).map(({ name, kind, keep_out, outline }) => {
+  const drawn = obstacles.filter(({ outline }) => outline.length);
+  return drawn.map(({ name, kind, keep_out, outline }) => {
     const shape = new Path2D(), { x, y, heading, curvature } = outline[0], last = outline.at(-1);
-    if (kind === "circle") shape.arc(x - Math.sin(heading) / curvature, y + Math.cos(heading) / curvature, 1 / curvature, 0, 2 * Math.PI);
+    if (kind === "circle") shape.arc(x - Math.sin(heading) / curvature, y + Math.cos(heading) / curvature,
+        1 / curvature, 0, 2 * Math.PI);
     else {
       for (const side of outline) shape.lineTo(side.x, side.y);
-      if (kind === "line") shape.lineTo(last.x + last.length * Math.cos(last.heading), last.y + last.length * Math.sin(last.heading));
+      if (kind === "line") shape.lineTo(last.x + last.length * Math.cos(last.heading),
+          last.y + last.length * Math.sin(last.heading));
       else shape.closePath();
     }
-    return { shape, name, keepOut: keep_out, isFull: kind === "circle" || kind === "polygon", isBoundary: kind === "boundary", x, y };
+    return { shape, rim: rimOf(kind, outline, keep_out), name, keepOut: keep_out,
+        isFull: kind === "circle" || kind === "polygon", isBoundary: kind === "boundary", x, y };
   });
 }
 
-/** The obstacles on the ground: the keep-out as a pale band about the outline. */
-function paintObstacles(context, palette, pixel, obstacles) {
+/** The dashes around a keep-out, pixels. */
+const KEEP_OUT_DASHES = [7, 5];
+
+/** The outline of a keep-out: those of its sides one over the other, of which the band covers the inner parts. */
+function rimOf(kind, outline, keepOut) {
+  const rim = new Path2D(), quarter = Math.PI / 2;
+  for (const { x, y, heading, length, curvature } of outline) {
+    const c = Math.cos(heading), s = Math.sin(heading);
+    if (kind === "circle") {
+      rim.arc(x - s / curvature, y + c / curvature, 1 / curvature + keepOut, 0, 2 * Math.PI);
+      continue;
+    }
+    const [endX, endY] = [x + length * c, y + length * s];
+    rim.moveTo(x + keepOut * s, y - keepOut * c);
+    rim.arc(endX, endY, keepOut, heading - quarter, heading + quarter);
+    rim.arc(x, y, keepOut, heading + quarter, heading + 3 * quarter);
+    rim.closePath();
+  }
+  return rim;
+}
+
+/** The obstacles on the ground: each keep-out is a pale band about the outline, with dashes around all of them. */
+function paintObstacles(context, palette, pixel, obstacles, transparent) {
+  const kept = obstacles.filter(({ keepOut }) => keepOut > 0);
   context.lineJoin = context.lineCap = "round";
+  Object.assign(context, { strokeStyle: palette.ink, lineWidth: 2 * pixel, globalAlpha: 0.6 });
+  context.setLineDash(KEEP_OUT_DASHES.map((dash) => dash * pixel));
+  for (const { rim } of kept) context.stroke(rim);
   context.setLineDash([]);
-  for (const { shape, keepOut, isFull } of obstacles) {
-    context.strokeStyle = context.fillStyle = palette.faint;
-    context.globalAlpha = 0.25;
-    context.lineWidth = 2 * keepOut;
-    if (keepOut > 0) context.stroke(shape);
-    context.globalAlpha = 1;
+  const bands = (colour, alpha) => {
+    Object.assign(context, { strokeStyle: colour, globalAlpha: alpha });
+    for (const { shape, keepOut } of kept) {
+      context.lineWidth = 2 * keepOut;
+      context.stroke(shape);
+    }
+  };
+  if (transparent) context.globalCompositeOperation = "destination-out";
+  bands(palette.ground, 1);
+  context.globalCompositeOperation = "source-over";
+  bands(palette.faint, 0.25);
+  context.globalAlpha = 1;
+  context.fillStyle = palette.faint;
+  Object.assign(context, { strokeStyle: palette.ink, lineWidth: 1.5 * pixel });
+  for (const { shape, isFull } of obstacles) {
     if (isFull) context.fill(shape);
-    context.strokeStyle = palette.ink;
-    context.lineWidth = 1.5 * pixel;
     context.stroke(shape);
   }
   context.lineJoin = "miter";
@@ -147,9 +185,13 @@ export class Ground {
     this.x = this.y = 0;
   }
 
-  /** Covers another context's canvas: the ground with paths on it, each with its `lines`, its `obstacles` and `dashes` in pixels. */
+  /**
+   * Covers another context's canvas: the ground with paths on it, each with its `lines`, its `obstacles` and `dashes`
+   * in pixels.
+   */
   cover(other, camera, palette, paths) {
-    const { width, height } = other.canvas, { c, s, unit } = camera, scale = camera.scale * camera.ratio, right = width >> 2, down = height >> 2;
+    const { width, height } = other.canvas, { c, s, unit } = camera, scale = camera.scale * camera.ratio,
+        right = width >> 2, down = height >> 2;
     const look = [width, height, camera.scale, camera.ratio, c, s, palette.ground, palette.faint].join();
     const moved = () => {
       const dx = (this.x - camera.x) * scale, dy = (this.y - camera.y) * scale;
@@ -159,7 +201,8 @@ export class Ground {
     const isSame = this.paths.length === paths.length && paths.every(({ lines }, k) => lines === this.paths[k].lines);
     if (!isSame || this.look !== look || Math.abs(away[0]) > right || Math.abs(away[1]) > down) {
       Object.assign(this, { paths, look, x: camera.x, y: camera.y });
-      this.paint(width + 2 * right, height + 2 * down, () => inMetres(this.context, camera, right, down), palette, unit / camera.scale);
+      this.paint(width + 2 * right, height + 2 * down, () => inMetres(this.context, camera, right, down), palette,
+          unit / camera.scale);
     }
     const [x, y] = moved();
     this.at = [x - right, y - down];
@@ -193,7 +236,7 @@ export class Ground {
     context.fillStyle = palette.ground;
     if (!this.transparent) context.fillRect(0, 0, width, height);
     metres();
-    for (const { obstacles } of this.paths) paintObstacles(context, palette, pixel, obstacles);
+    for (const { obstacles } of this.paths) paintObstacles(context, palette, pixel, obstacles, this.transparent);
     context.lineWidth = 1.2 * pixel;
     context.strokeStyle = palette.faint;
     for (const { lines, dashes } of this.paths) {
@@ -205,22 +248,25 @@ export class Ground {
 }
 
 /**
- * Draws everything. `scene` has: ground, labels (null: no words are written), and dragons, each with stage, places (STRIDE
- * numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench, or -1),
- * its chosenName, its endNames, stale (true if it is stale beside live ones), and identity (see
- * palette.js; null for a single dragon); the measure, and whether the picture has the focus. Returns the words written, as
- * boxes in pixels.
+ * Draws everything. `scene` has: ground, labels (null: no words are written), and dragons, each with stage, places
+ * (STRIDE numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench,
+ * or -1), its chosenName, its endNames, stale (true if it is stale beside live ones), and identity (see
+ * palette.js; null for a single dragon); the measure, and whether the picture has the focus. Returns the words written,
+ * as boxes in pixels.
  */
 export function draw(context, camera, palette, { ground, dragons, labels, measure, hasFocus }) {
-  ground.cover(context, camera, palette, dragons.map(({ path, obstacles, identity }) => ({ lines: path, obstacles, dashes: identity?.dashes ?? [] })));
+  ground.cover(context, camera, palette,
+      dragons.map(({ path, obstacles, identity }) => ({ lines: path, obstacles, dashes: identity?.dashes ?? [] })));
   const stale = dragons.filter((dragon) => dragon.stale);
   for (const dragon of stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (stale.length) ground.dim(context, DIMMED);
   for (const dragon of dragons) if (!dragon.stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   const measured = measure.draw(context, camera, palette, hasFocus);
   if (!labels) return measured;
-  const keep = [scaleBar(context, camera, palette), ...measured], { items, rings, marked } = wordsOf(dragons, palette, camera.width < NARROW);
-  return labels.draw(context, camera, palette, { dragons, items, rings: rings.map(({ x, y }) => camera.toPixel(x, y)), marked, keep });
+  const keep = [scaleBar(context, camera, palette), ...measured], { items, rings, marked } = wordsOf(dragons, palette,
+      camera.width < NARROW);
+  return labels.draw(context, camera, palette, { dragons, items, rings: rings.map(({ x, y }) => camera.toPixel(x, y)),
+      marked, keep });
 }
 
 function drawDragon(context, camera, palette, transparent, dragon) {
@@ -243,7 +289,8 @@ function drawDragon(context, camera, palette, transparent, dragon) {
   mark(0, palette.ink, 2);
   if (count > 1) mark(count - 1, palette.ink, 1);
   // The first in the list lies on top.
-  for (const { pair, ink, dashes } of marks.toReversed()) pair.filter((bench) => bench < count).forEach((bench) => mark(bench, palette[ink], 3.5, dashes));
+  for (const { pair, ink, dashes } of marks.toReversed()) pair.filter((bench) => bench < count).forEach(
+      (bench) => mark(bench, palette[ink], 3.5, dashes));
   if (chosen >= 0 && chosen < count) mark(chosen, palette.ink, 3, [7, 4]);
   for (const { kind, place, line, ink, ghost } of marks.toReversed()) {
     if (place && kind !== "nearest") target(context, place, palette, pixel, palette[ink], ghost);
@@ -289,7 +336,8 @@ function wordsOf(dragons, palette, isNarrow) {
     for (const { place } of marks) if (place) rings.push(place);
   });
   each(({ marks }, _) => {
-    for (const { kind, place, ink, text } of marks) if (place && text) items.push({ key: `${kind} ${items.length}`, text: isNarrow ? halved(text) : text, ink: palette[ink], large: 1.25, ...place });
+    for (const { kind, place, ink, text } of marks) if (place && text) items.push({ key: `${kind} ${items.length}`,
+        text: isNarrow ? halved(text) : text, ink: palette[ink], large: 1.25, ...place });
   });
   each((dragon, count) => {
     for (const { pair, ink, names } of dragon.marks) {
@@ -311,7 +359,8 @@ function wordsOf(dragons, palette, isNarrow) {
   });
   // The least important: the names of the obstacles.
   each(({ obstacles }) => {
-    for (const { name: text, isBoundary, x, y } of obstacles) if (!isBoundary) items.push({ key: `obstacle ${text}`, text, ink: palette.ink, x, y });
+    for (const { name: text, isBoundary, x, y } of obstacles) if (!isBoundary) items.push({ key: `obstacle ${text}`,
+        text, ink: palette.ink, x, y });
   });
   return { items, rings, marked };
 }
@@ -329,7 +378,8 @@ function halved(text) {
 function inSight(camera, stage, places) {
   const count = places.length / STRIDE - 1, reach = Math.max(stage.head_length, stage.body_length), seen = [];
   const across = camera.width / camera.scale / 2, down = camera.height / camera.scale / 2, { c, s } = camera;
-  const wide = Math.abs(c) * across + Math.abs(s) * down + reach, high = Math.abs(s) * across + Math.abs(c) * down + reach;
+  const wide = Math.abs(c) * across + Math.abs(s) * down + reach, high = Math.abs(s) * across + Math.abs(c) * down +
+      reach;
   for (let bench = 0; bench < count; bench++) {
     const x = places[STRIDE * bench] - camera.x, y = places[STRIDE * bench + 1] - camera.y;
     if (x > -wide && x < wide && y > -high && y < high) seen.push(bench);

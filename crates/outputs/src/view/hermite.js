@@ -80,7 +80,8 @@ export class HermiteReader {
 
 /** Returns true if simulated time runs without a jump from a frame to a later one. */
 function continues(from, to) {
-  return from.run === to.run && from.epoch === to.epoch && from.handles.length === to.handles.length && to.time > from.time;
+  return from.run === to.run && from.epoch === to.epoch && from.handles.length === to.handles.length &&
+      to.time > from.time;
 }
 
 /** The simulated time at a moment between two frames. */

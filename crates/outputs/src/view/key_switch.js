@@ -1,5 +1,5 @@
-// The switch of the keys (WCAG 2.1.4): letters typed anywhere act only where the user has switched them on. The choice is
-// kept in the browser.
+// The switch of the keys (WCAG 2.1.4): letters typed anywhere act only where the user has switched them on. The choice
+// is kept in the browser.
 
 const STORED = "bench-dragon keys";
 

@@ -1,8 +1,8 @@
 // The places of words on the picture, so that none can be read as those of another board: each stands at its own board,
 // or a line leads from it to that board. Pixels of the screen; knows no canvas and no page.
 //
-// A board is { x, y, c, s, l, w, free }: middle, direction, half length, half width, and the share of the half length on
-// which no other board of the chain lies. A box is { x, y, half, tall }: middle, half
+// A board is { x, y, c, s, l, w, free }: middle, direction, half length, half width, and the share of the half length
+// on which no other board of the chain lies. A box is { x, y, half, tall }: middle, half
 // width, half height. A line is { from, to }.
 
 /** The side of the squares of the map of boards (px). */
@@ -30,26 +30,33 @@ export const along = ({ x, y, c, s, l }, share) => ({ x: x + share * l * c, y: y
 /** Returns the distance from a board to a box, sampled. */
 function boardToBox(board, { x, y, half, tall }) {
   let least = Infinity;
-  for (let i = -6; i <= 6; i++) for (let j = -2; j <= 2; j++) least = Math.min(least, toBoard(board, x + (i / 6) * half, y + (j / 2) * tall));
+  for (let i = -6; i <= 6; i++) for (let j = -2; j <= 2; j++) least = Math.min(least,
+      toBoard(board, x + (i / 6) * half, y + (j / 2) * tall));
   return least;
 }
 
-const areApart = (a, b, gap) => Math.abs(a.x - b.x) > a.half + b.half + gap || Math.abs(a.y - b.y) > a.tall + b.tall + gap;
+const areApart = (a, b, gap) => Math.abs(a.x - b.x) > a.half + b.half + gap ||
+    Math.abs(a.y - b.y) > a.tall + b.tall + gap;
 const side = (a, b, p) => (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
-const cross = (p, q) => side(p.from, p.to, q.from) * side(p.from, p.to, q.to) < 0 && side(q.from, q.to, p.from) * side(q.from, q.to, p.to) < 0;
+const cross = (p, q) => side(p.from, p.to, q.from) * side(p.from, p.to, q.to) < 0 &&
+    side(q.from, q.to, p.from) * side(q.from, q.to, p.to) < 0;
 
 /** Returns true if a predicate holds somewhere along a line, sampled. */
 function someAlong({ from, to }, count, holds) {
-  for (let k = 0; k <= count; k++) if (holds(from.x + ((to.x - from.x) * k) / count, from.y + ((to.y - from.y) * k) / count)) return true;
+  for (let k = 0; k <= count;
+      k++) if (holds(from.x + ((to.x - from.x) * k) / count, from.y + ((to.y - from.y) * k) / count)) return true;
   return false;
 }
-const meetsBox = (line, { x, y, half, tall }, gap = 2) => someAlong(line, 24, (px, py) => Math.abs(px - x) < half + gap && Math.abs(py - y) < tall + gap);
+const meetsBox = (line, { x, y, half, tall }, gap = 2) => someAlong(line, 24, (px, py) => Math.abs(px - x) < half +
+    gap && Math.abs(py - y) < tall + gap);
 const meetsBoard = (line, board) => someAlong(line, 40, (px, py) => toBoard(board, px, py) < 1.5);
 function meetsRing({ from, to }, { x, y, radius }) {
-  const dx = to.x - from.x, dy = to.y - from.y, part = Math.max(0, Math.min(1, ((x - from.x) * dx + (y - from.y) * dy) / (dx * dx + dy * dy || 1)));
+  const dx = to.x - from.x, dy = to.y - from.y,
+      part = Math.max(0, Math.min(1, ((x - from.x) * dx + (y - from.y) * dy) / (dx * dx + dy * dy || 1)));
   return Math.hypot(from.x + part * dx - x, from.y + part * dy - y) < radius;
 }
-const coversRing = (box, { x, y, radius }) => Math.hypot(Math.max(0, Math.abs(x - box.x) - box.half), Math.max(0, Math.abs(y - box.y) - box.tall)) < radius;
+const coversRing = (box, { x, y, radius }) => Math.hypot(Math.max(0, Math.abs(x - box.x) - box.half),
+    Math.max(0, Math.abs(y - box.y) - box.tall)) < radius;
 
 /** Which squares of the picture boards cover. */
 class BoardMap {
@@ -59,8 +66,10 @@ class BoardMap {
     this.covered = new Uint8Array(this.columns * this.rows);
     for (const board of boards) {
       const reach = board.l + board.w, { x, y } = board;
-      for (let row = Math.max(0, Math.floor((y - reach) / SQUARE)); row <= Math.min(this.rows - 1, (y + reach) / SQUARE); row++) {
-        for (let column = Math.max(0, Math.floor((x - reach) / SQUARE)); column <= Math.min(this.columns - 1, (x + reach) / SQUARE); column++) {
+      for (let row = Math.max(0, Math.floor((y - reach) / SQUARE));
+          row <= Math.min(this.rows - 1, (y + reach) / SQUARE); row++) {
+        for (let column = Math.max(0, Math.floor((x - reach) / SQUARE));
+            column <= Math.min(this.columns - 1, (x + reach) / SQUARE); column++) {
           if (toBoard(board, column * SQUARE, row * SQUARE) === 0) this.covered[row * this.columns + column] = 1;
         }
       }
@@ -74,7 +83,8 @@ class BoardMap {
       for (let px = x - half; px <= x + half; px += SQUARE) {
         const column = Math.round(px / SQUARE), row = Math.round(py / SQUARE);
         all++;
-        if (column >= 0 && row >= 0 && column < this.columns && row < this.rows) covered += this.covered[row * this.columns + column];
+        if (column >= 0 && row >= 0 && column < this.columns && row < this.rows) covered += this.covered[
+            row * this.columns + column];
       }
     }
     return covered / all;
@@ -82,8 +92,8 @@ class BoardMap {
 }
 
 /**
- * Places labels in the order of their importance. `items`: each with a `key`, the size of its box `half` and `tall`, and
- * either `board` (an index among `boards`) or the place `x`, `y` of an event. `marked`: indices of outlined boards;
+ * Places labels in the order of their importance. `items`: each with a `key`, the size of its box `half` and `tall`,
+ * and either `board` (an index among `boards`) or the place `x`, `y` of an event. `marked`: indices of outlined boards;
  * `rings`: { x, y, radius }; `keep`: boxes that are taken; `last`: the earlier offsets by key.
  *
  * Returns a label for each item: `box`, its `line` (null for a badge), the end `share` of the line on the board, and
@@ -95,37 +105,46 @@ export function layout({ boards, items, rings, marked, keep, width, height, unit
   const uncovered = [...new Set([...marked, ...items.flatMap(({ board }) => board ?? [])])];
   const spine = (board) => ({ from: along(board, 1), to: along(board, -1) });
   for (const item of items) {
-    const own = item.board === undefined ? null : boards[item.board], others = marked.filter((k) => k !== item.board).map((k) => boards[k]);
-    const ends = own ? [0, own.free, -own.free].map((share) => ({ share, ...along(own, share) })) : [{ share: 0, x: item.x, y: item.y }];
+    const own = item.board === undefined ? null : boards[item.board],
+        others = marked.filter((k) => k !== item.board).map((k) => boards[k]);
+    const ends = own ? [0, own.free, -own.free].map((share) => ({ share, ...along(own, share) }))
+        : [{ share: 0, x: item.x, y: item.y }];
     const foreign = own ? rings : rings.filter(({ x, y }) => Math.hypot(x - item.x, y - item.y) > 1);
     let best = null;
     // With `relaxed`, signs and lines may meet rings.
     const attempt = (end, angle, far, relaxed) => {
       const c = Math.cos(angle), s = Math.sin(angle), { half, tall } = item;
-      const box = { x: end.x + c * (far * unit + half * Math.abs(c)), y: end.y + s * (far * unit + tall * Math.abs(s)), half, tall };
+      const box = { x: end.x + c * (far * unit + half * Math.abs(c)), y: end.y + s * (far * unit + tall * Math.abs(s)),
+          half, tall };
       if (box.x - half < 2 || box.y - tall < 2 || box.x + half > width - 2 || box.y + tall > height - 2) return;
       if (boxes.some((one) => !areApart(box, one, 3 * unit))) return;
-      const dx = end.x - box.x, dy = end.y - box.y, away = Math.hypot(dx, dy) || 1, out = Math.min(1, half / Math.abs(dx || 1e-9), tall / Math.abs(dy || 1e-9));
-      const short = own ? 0 : (RING * unit) / away, line = { from: { x: box.x + dx * out, y: box.y + dy * out }, to: { x: end.x - dx * short, y: end.y - dy * short } };
+      const dx = end.x - box.x, dy = end.y - box.y, away = Math.hypot(dx, dy) || 1,
+          out = Math.min(1, half / Math.abs(dx || 1e-9), tall / Math.abs(dy || 1e-9));
+      const short = own ? 0 : (RING * unit) / away, line = { from: { x: box.x + dx * out, y: box.y + dy * out },
+          to: { x: end.x - dx * short, y: end.y - dy * short } };
       const length = Math.hypot(line.from.x - line.to.x, line.from.y - line.to.y) / unit;
       if (best && length >= best.cost) return;
       if (uncovered.some((k) => meetsBox(spine(boards[k]), box, boards[k].w))) return;
-      if (lines.some((one) => cross(line, one) || meetsBox(one, box)) || boxes.some((one) => meetsBox(line, one))) return;
+      if (lines.some((one) => cross(line, one) || meetsBox(one, box)) ||
+          boxes.some((one) => meetsBox(line, one))) return;
       if ((!relaxed || own) && others.some((board) => meetsBoard(line, board))) return;
       const onRing = foreign.some((ring) => meetsRing(line, ring)) || rings.some((ring) => coversRing(box, ring));
       if (onRing && !relaxed) return;
-      const before = last.get(item.key), moved = before ? Math.hypot(before.x - (box.x - end.x), before.y - (box.y - end.y)) / unit : 0;
+      const before = last.get(item.key), moved = before ? Math.hypot(before.x - (box.x - end.x),
+          before.y - (box.y - end.y)) / unit : 0;
       const cost = length + COVERING * map.share(box) + (onRing ? ON_RING : 0) + Math.min(MOST_MOVING, MOVING * moved);
       if (!best || cost < best.cost) best = { cost, box, line, share: end.share };
     };
     for (const relaxed of [false, true]) {
       for (const end of best ? [] : ends) {
-        for (let turn = 0; turn < DIRECTIONS; turn++) for (const far of DISTANCES) attempt(end, (2 * Math.PI * turn) / DIRECTIONS, far, relaxed);
+        for (let turn = 0; turn < DIRECTIONS; turn++) for (const far of DISTANCES) attempt(end,
+            (2 * Math.PI * turn) / DIRECTIONS, far, relaxed);
       }
     }
     if (!best) {
       // A number on the board itself cannot be read as another board's.
-      placed.push(own ? { item, box: { x: own.x, y: own.y, half: 0, tall: 0 }, line: null, share: 0, isBadge: true } : null);
+      placed.push(own ? { item, box: { x: own.x, y: own.y, half: 0, tall: 0 }, line: null, share: 0, isBadge: true }
+          : null);
       continue;
     }
     const { box, line, share } = best;

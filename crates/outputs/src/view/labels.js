@@ -35,12 +35,16 @@ export class Labels {
     const { width, height, ratio, unit } = camera, now = performance.now();
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     Object.assign(context, { textAlign: "center", textBaseline: "middle", lineJoin: "round", lineCap: "round" });
-    const starts = firsts(dragons), all = items.map((item) => this.measured(context, camera, item, starts)).filter(({ x, y }) => x >= 0 && y >= 0 && x <= width && y <= height);
+    const starts = firsts(dragons),
+        all = items.map((item) => this.measured(context, camera, item, starts)).filter(
+        ({ x, y }) => x >= 0 && y >= 0 && x <= width && y <= height);
     const key = [all.map((one) => one.key), width, height, camera.c, camera.s].join();
     if (key !== this.key || now - this.laidAt >= INTERVAL) {
       const last = new Map([...this.shown].map(([one, { x, y }]) => [one, { x, y }]));
-      const signs = rings.map(([x, y]) => ({ x, y, radius: RING * unit })), outlined = marked.map(({ dragon, bench }) => starts.get(dragon) + bench);
-      const boards = dragons.flatMap((dragon) => Array.from({ length: dragon.places.length / STRIDE - 1 }, (_, bench) => boardOf(dragon, bench, camera)));
+      const signs = rings.map(([x, y]) => ({ x, y, radius: RING * unit })),
+          outlined = marked.map(({ dragon, bench }) => starts.get(dragon) + bench);
+      const boards = dragons.flatMap((dragon) => Array.from({ length: dragon.places.length / STRIDE - 1 },
+          (_, bench) => boardOf(dragon, bench, camera)));
       this.placed = layout({ boards, items: all, rings: signs, marked: outlined, keep, width, height, unit, last });
       [this.key, this.laidAt] = [key, now];
     }
@@ -48,7 +52,9 @@ export class Labels {
     for (const label of labels) if (label.line) this.leader(context, palette, unit, label);
     for (const label of labels) this.plate(context, palette, unit, label);
     context.lineCap = "butt";
-    return [...keep, ...labels.map(({ item, box, line, isBadge }) => ({ ...box, text: item.text, bench: item.bench ?? null, dragon: item.bench === undefined ? null : dragons.indexOf(item.dragon), end: line?.to ?? null, isBadge }))];
+    return [...keep, ...labels.map(({ item, box, line, isBadge }) => (
+        { ...box, text: item.text, bench: item.bench ?? null, dragon: item.bench === undefined ? null
+        : dragons.indexOf(item.dragon), end: line?.to ?? null, isBadge }))];
   }
 
   measured(context, camera, item, starts) {
@@ -58,7 +64,8 @@ export class Labels {
       return Math.max(...rows.map((row) => context.measureText(row).width));
     };
     // On a phone a long sentence is smaller.
-    const size = large * Math.min(1, (width - 30 * unit) / wide(large)), half = wide(size) / 2 + 6 * unit, tall = (0.5 * LEADING * rows.length * size + 3) * unit;
+    const size = large * Math.min(1, (width - 30 * unit) / wide(large)), half = wide(size) / 2 + 6 * unit,
+        tall = (0.5 * LEADING * rows.length * size + 3) * unit;
     if (bench === undefined) {
       const [x, y] = camera.toPixel(item.x, item.y);
       return { ...item, rows, size, half, tall, x, y };
@@ -69,7 +76,8 @@ export class Labels {
 
   /** Moves the words of the last layout with their boards, and part of the way to a new place beside them. */
   move(now, items, camera, dragons) {
-    const passed = Math.min(100, now - this.drawnAt), part = this.isStill ? 1 : 1 - Math.exp((-3 * passed) / EASING), kept = new Map();
+    const passed = Math.min(100, now - this.drawnAt), part = this.isStill ? 1 : 1 - Math.exp((-3 * passed) / EASING),
+        kept = new Map();
     this.drawnAt = now;
     // The layout is of an earlier picture: another one follows.
     this.settled = this.laidAt === now;
@@ -79,9 +87,12 @@ export class Labels {
       if (!item) return [];
       const end = item.own ? along(item.own, share) : { x: item.x, y: item.y };
       // The place of a layout beside the end of its line.
-      const wanted = goal ?? (this.placed[index].goal = { x: box.x - end.x, y: box.y - end.y }), from = this.shown.get(key);
+      const wanted = goal ?? (this.placed[index].goal = { x: box.x - end.x, y: box.y - end.y }),
+          from = this.shown.get(key);
       const isOther = !from || from.share !== share || isBadge;
-      const far = isOther ? 0 : Math.hypot(wanted.x - from.x, wanted.y - from.y), offset = isOther || far < 0.5 ? wanted : { x: from.x + part * (wanted.x - from.x), y: from.y + part * (wanted.y - from.y) };
+      const far = isOther ? 0 : Math.hypot(wanted.x - from.x, wanted.y - from.y),
+          offset = isOther || far < 0.5 ? wanted : { x: from.x + part * (wanted.x - from.x),
+          y: from.y + part * (wanted.y - from.y) };
       if (far >= 0.5) this.settled = false;
       kept.set(key, { ...offset, share });
       const at = { x: end.x + offset.x, y: end.y + offset.y, half: item.half, tall: item.tall };
@@ -135,24 +146,29 @@ export class Labels {
 
 /** A line from the edge of a box to a place, or to `short` pixels before it. */
 function lineOf({ x, y, half, tall }, end, short) {
-  const dx = end.x - x, dy = end.y - y, away = Math.hypot(dx, dy) || 1, out = Math.min(1, half / Math.abs(dx || 1e-9), tall / Math.abs(dy || 1e-9));
-  return { from: { x: x + dx * out, y: y + dy * out }, to: { x: end.x - (dx * short) / away, y: end.y - (dy * short) / away } };
+  const dx = end.x - x, dy = end.y - y, away = Math.hypot(dx, dy) || 1,
+      out = Math.min(1, half / Math.abs(dx || 1e-9), tall / Math.abs(dy || 1e-9));
+  return { from: { x: x + dx * out, y: y + dy * out }, to: { x: end.x - (dx * short) / away,
+      y: end.y - (dy * short) / away } };
 }
 
 /** A board of a dragon in pixels of the screen. */
 function boardOf({ stage, places }, bench, camera) {
   const { scale, c, s } = camera, board = rectangle(stage, places, bench), [x, y] = camera.toPixel(board.x, board.y);
-  return { x, y, c: board.c * c - board.s * s, s: -(board.c * s + board.s * c), l: board.l * scale, w: board.w * scale, free: Math.max(0, FREE * (1 - (2 * stage.hole_inset) / board.l)) };
+  return { x, y, c: board.c * c - board.s * s, s: -(board.c * s + board.s * c), l: board.l * scale, w: board.w * scale,
+      free: Math.max(0, FREE * (1 - (2 * stage.hole_inset) / board.l)) };
 }
 
 /** The boards that may be taken for that of a box. */
 function boardsNear(dragons, camera, box, unit) {
   const [x, y] = camera.toStage(box.x, box.y), near = [];
   for (const dragon of dragons) {
-    const { stage, places } = dragon, reach = beyond(box, unit) / camera.scale + Math.max(stage.head_length, stage.body_length);
+    const { stage, places } = dragon, reach = beyond(box, unit) / camera.scale + Math.max(stage.head_length,
+        stage.body_length);
     for (let bench = 0; bench < places.length / STRIDE - 1; bench++) {
       const k = STRIDE * bench;
-      if (Math.abs(places[k] - x) < reach && Math.abs(places[k + 1] - y) < reach) near.push(boardOf(dragon, bench, camera));
+      if (Math.abs(places[k] - x) < reach && Math.abs(places[k + 1] - y) < reach) near.push(
+          boardOf(dragon, bench, camera));
     }
   }
   return near;

@@ -1,9 +1,9 @@
 // The lantern look: dragons at night, seen from above, in the light of their own lanterns. The boards stay the true
-// rectangles; the rest is ornament. In: a camera, the dragons' poses and their `Show`. Out: a canvas. No pixel beyond the
-// light is other than black.
+// rectangles; the rest is ornament. In: a camera, the dragons' poses and their `Show`. Out: a canvas. No pixel beyond
+// the light is other than black.
 //
 // Light is drawn small and enlarged: pools on the ground at an eighth of the size, halos at a quarter. The ground is
-// paving times light, and is made again in every third picture, or for another camera.
+// paving times light, and is made again in every third picture, or for another camera; so are the halos.
 
 import { headPicture, tailPicture } from "./dragon_head.js";
 import { STRIDE } from "./hermite.js";
@@ -19,8 +19,8 @@ const FINE = 22, CLOSE = 16;
 const ON_BODY = [-0.41, 0, 0.41], ON_HEAD = [-0.7, -0.44, -0.18, 0.09];
 /** The reach of halos from the middle of a board. */
 const HALO_REACH = 1.6;
-/** Pictures from one ground to the next, and from one picture of the halos. */
-const GROUND_EVERY = 3, AIR_EVERY = 2;
+/** Pictures from one ground to the next, and from one picture of the halos to the next, which is made between. */
+const LIGHT_EVERY = 3;
 /** The step of the sizes in which sprites are cut. */
 const SIZES = 1.06;
 /** Handles of a line of light that is drawn at once. */
@@ -44,7 +44,8 @@ export class Lanterns {
     this.transparent = transparent;
     this.ambient = day ? DAY : moon ? MOON.map((one) => one / 2) : null;
     this.kits = new OfLight((light) => ({
-      ...light, pools: light.pools.map((one) => pool(...one)), halo: halo(light.core.join(), light.glow.join()), barrel: barrel(light.barrel),
+      ...light, pools: light.pools.map((one) => pool(...one)), halo: halo(light.core.join(), light.glow.join()),
+          barrel: barrel(light.barrel),
     }));
     this.fire = this.kits.of(null);
     this.gold = halo("255,226,150", "255,160,60");
@@ -62,9 +63,10 @@ export class Lanterns {
 
   /** Draws the dragons, each with `stage`, `places` and `show`. */
   draw(context, camera, dragons) {
-    const view = viewOf(context.canvas, camera), teams = dragons.map((dragon) => ({ ...boardsOf(view, dragon), kit: this.kits.of(dragon.identity) }));
-    const isOther = this.lighted !== view.key, isNew = isOther || this.picture % GROUND_EVERY === 0;
-    const isAir = isOther || this.picture % (view.pixels >= FINE ? AIR_EVERY : GROUND_EVERY) === 0;
+    const view = viewOf(context.canvas, camera),
+        teams = dragons.map((dragon) => ({ ...boardsOf(view, dragon), kit: this.kits.of(dragon.identity) }));
+    const isOther = this.lighted !== view.key, isNew = isOther || this.picture % LIGHT_EVERY === 0;
+    const isAir = isOther || this.picture % LIGHT_EVERY === 1;
     this.lighted = view.key;
     this.picture++;
     view.fine = view.pixels >= FINE;
@@ -103,7 +105,8 @@ export class Lanterns {
 
   /** Draws a part of a canvas `share` times as large. */
   enlarge(context, canvas, share, [x, y, width, height]) {
-    if (width > 0 && height > 0) context.drawImage(canvas, x / share, y / share, width / share, height / share, x, y, width, height);
+    if (width > 0 && height > 0) context.drawImage(canvas, x / share, y / share, width / share, height / share, x, y,
+        width, height);
   }
 
   spot(context, picture, x, y, radius, alpha) {
@@ -131,7 +134,8 @@ export class Lanterns {
   layGround(view, teams) {
     this.pave(view);
     this.layLight(view, teams);
-    const [, context] = this.ground, whole = [0, 0, view.width, view.height], part = this.ambient ? whole : view.around(teams, POOL_RADIUS + 1.2, GROUND);
+    const [, context] = this.ground, whole = [0, 0, view.width, view.height],
+        part = this.ambient ? whole : view.around(teams, POOL_RADIUS + 1.2, GROUND);
     // Beyond the light both are black already.
     this.renewed = this.filled === view.key ? union(this.part, part) : whole;
     [this.part, this.filled] = [part, view.key];
@@ -153,16 +157,20 @@ export class Lanterns {
           this.thread(context, view, GROUND, dragon, 1.1, 1.2, `rgba(${kit.lit},${0.36 * exposure})`);
         } else {
           const radius = Math.max(POOL_RADIUS * metre, 3);
-          for (const { bench, x, y, lit, burn } of boards) this.spot(context, kit.pools[bench % 3 ? 0 : 1], x / GROUND, y / GROUND, radius, exposure * lit * (bench ? 1 : 1.3) * (1 + 1.4 * burn));
+          for (const { bench, x, y, lit, burn } of boards) this.spot(context, kit.pools[bench % 3 ? 0 : 1], x / GROUND,
+              y / GROUND, radius, exposure * lit * (bench ? 1 : 1.3) * (1 + 1.4 * burn));
         }
         for (const one of show.trail) {
           const [x, y] = view.place(one.x, one.y), left = Math.max(0, 1 - (show.time - one.time) / 4);
-          this.spot(context, kit.pools[0], x / GROUND, y / GROUND, 2.2 * metre, 0.3 * left ** 1.5 * show.lit(boards.count - 1, boards.count));
+          this.spot(context, kit.pools[0], x / GROUND, y / GROUND, 2.2 * metre,
+              0.3 * left ** 1.5 * show.lit(boards.count - 1, boards.count));
         }
         if (!head) continue;
         this.spot(context, this.fire.pools[1], pearl.x / GROUND, pearl.y / GROUND, 2.6 * metre, 0.75 * head.lit);
-        this.spot(context, kit.pools[0], (head.x + 1.1 * view.pixels * head.c) / GROUND, (head.y + 1.1 * view.pixels * head.s) / GROUND, 3 * metre, 0.6 * head.lit);
-        if (show.burst) this.spot(context, this.fire.pools[1], ...view.place(show.burst.place.x, show.burst.place.y).map((one) => one / GROUND), 4.5 * metre, (1 - show.burst.part) ** 2);
+        this.spot(context, kit.pools[0], (head.x + 1.1 * view.pixels * head.c) / GROUND,
+            (head.y + 1.1 * view.pixels * head.s) / GROUND, 3 * metre, 0.6 * head.lit);
+        if (show.burst) this.spot(context, this.fire.pools[1], ...view.place(show.burst.place.x,
+            show.burst.place.y).map((one) => one / GROUND), 4.5 * metre, (1 - show.burst.part) ** 2);
       }
     });
     if (view.pixels < 12) return;
@@ -175,11 +183,13 @@ export class Lanterns {
   thread(context, view, share, { places, show }, wide, least, colour) {
     const count = places.length / STRIDE, { a, b, e, f } = view.matrix;
     context.setTransform(a / share, b / share, b / share, -a / share, e / share, f / share);
-    Object.assign(context, { strokeStyle: colour, lineJoin: "round", lineWidth: Math.max(wide, (least * share) / view.pixels) });
+    Object.assign(context,
+        { strokeStyle: colour, lineJoin: "round", lineWidth: Math.max(wide, (least * share) / view.pixels) });
     for (let first = 0; first < count - 1; first += THREAD) {
       context.globalAlpha = show.lit(first, count);
       context.beginPath();
-      for (let k = first; k <= Math.min(count - 1, first + THREAD); k++) context.lineTo(places[STRIDE * k], places[STRIDE * k + 1]);
+      for (let k = first; k <= Math.min(count - 1, first + THREAD); k++) context.lineTo(places[STRIDE * k],
+          places[STRIDE * k + 1]);
       context.stroke();
     }
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -198,13 +208,17 @@ export class Lanterns {
         } else {
           for (const { bench, x, y, dx, dy, lit, burn } of boards) {
             if (!lit) continue;
-            const flicker = 1 + 0.1 * Math.sin(4.1 * flames + 2.4 * bench) * Math.sin(1.7 * flames + bench), radius = usual * (1 + 1.2 * burn);
-            (bench ? ON_BODY : ON_HEAD).forEach((at, k) => this.spot(context, burn > 0.05 ? this.white : k === 1 ? this.gold : kit.halo, (x + at * dx) / AIR, (y + at * dy) / AIR, radius, 0.62 * flicker * lit * (1 + burn)));
+            const flicker = 1 + 0.1 * Math.sin(4.1 * flames + 2.4 * bench) * Math.sin(1.7 * flames + bench),
+                radius = usual * (1 + 1.2 * burn);
+            (bench ? ON_BODY : ON_HEAD).forEach((at, k) => this.spot(context,
+                burn > 0.05 ? this.white : k === 1 ? this.gold : kit.halo, (x + at * dx) / AIR, (y + at * dy) / AIR,
+                radius, 0.62 * flicker * lit * (1 + burn)));
           }
         }
         if (!head) continue;
         this.spot(context, this.gold, pearl.x / AIR, pearl.y / AIR, Math.max(1.1 * metre, 5), 0.9 * head.lit);
-        this.spot(context, kit.halo, (head.x + 1.15 * view.pixels * head.c) / AIR, (head.y + 1.15 * view.pixels * head.s) / AIR, 1.5 * metre, 0.55 * head.lit);
+        this.spot(context, kit.halo, (head.x + 1.15 * view.pixels * head.c) / AIR,
+            (head.y + 1.15 * view.pixels * head.s) / AIR, 1.5 * metre, 0.55 * head.lit);
         if (show.burst) this.burst(context, view, show.burst);
       }
     });
@@ -232,7 +246,7 @@ export class Lanterns {
   boards(context, view, { boards, dragon, kit }) {
     const wide = dragon.stage.width * view.pixels, edge = Math.max(0.02 * view.pixels, 0.9);
     const coats = wide > 7 ? [[kit.edge, wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
-    if (wide > 16) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
+    if (wide > 24) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
     context.globalAlpha = Math.min(1, dragon.show.life * 1.5);
     for (const [strokeStyle, lineWidth, inset] of coats) {
       Object.assign(context, { strokeStyle, lineWidth });
@@ -251,11 +265,13 @@ export class Lanterns {
   }
 
   dancers(context, view, { boards, show }) {
-    const people = this.sprites("dancers", 0.32 * view.pixels, (size) => this.people.map((one) => turned(one, size, 32, 2 * Math.PI)));
+    const people = this.sprites("dancers", 0.32 * view.pixels, (size) =>
+        this.people.map((one) => turned(one, size, 32, 2 * Math.PI)));
     for (const { bench, c, s, ax, ay, lit } of boards) {
       if (!lit) continue;
       const sway = show.still ? 0 : 0.12 * Math.sin(5.2 * show.time + 1.7 * bench);
-      const one = people[bench === 0 || bench % 9 === 4 ? 2 : bench % 2][step(Math.atan2(s, c) + sway, 32, 2 * Math.PI)];
+      const one = people[bench === 0 || bench % 9 === 4 ? 2 : bench % 2][
+          step(Math.atan2(s, c) + sway, 32, 2 * Math.PI)];
       if (lit < 1) context.globalAlpha = lit;
       context.drawImage(one, Math.round(ax - one.width / 2), Math.round(ay - one.width / 2));
     }
@@ -275,14 +291,16 @@ export class Lanterns {
       return;
     }
     const radius = Math.max(0.5 * Math.min(0.3, dragon.stage.width) * view.pixels, 2.2);
-    const [round] = this.sprites(`barrel ${kit.number}`, radius, (size) => turned(kit.barrel, size, 1, 1)), boxes = this.sprites("box", radius, (size) => turned(this.box, size, 16, Math.PI / 2));
+    const [round] = this.sprites(`barrel ${kit.number}`, radius, (size) => turned(kit.barrel, size, 1, 1)),
+        boxes = this.sprites("box", radius, (size) => turned(this.box, size, 16, Math.PI / 2));
     for (const { bench, x, y, c, s, dx, dy, lit, burn } of boards) {
       if (!lit) continue;
       (bench ? ON_BODY : ON_HEAD).forEach((at, k) => {
         const one = k === 1 ? boxes[step(Math.atan2(s, c), 16, Math.PI / 2)] : round;
         context.globalAlpha = lit;
         context.drawImage(one, Math.round(x + at * dx - one.width / 2), Math.round(y + at * dy - one.width / 2));
-        if (burn > 0.05) this.blend(context, "lighter", () => this.spot(context, this.white, x + at * dx, y + at * dy, 1.7 * radius, burn * lit));
+        if (burn > 0.05) this.blend(context, "lighter", () => this.spot(context, this.white, x + at * dx, y + at * dy,
+            1.7 * radius, burn * lit));
       });
     }
     context.globalAlpha = 1;
@@ -292,7 +310,8 @@ export class Lanterns {
   crown(context, view, { head, tail, pearl, show }) {
     const size = Math.max(1.3 * view.pixels, 26);
     const place = (board, end, turn, { canvas, long, wide, front }) => {
-      const c = board.c * Math.cos(turn) - board.s * Math.sin(turn), s = board.s * Math.cos(turn) + board.c * Math.sin(turn);
+      const c = board.c * Math.cos(turn) - board.s * Math.sin(turn), s = board.s * Math.cos(turn) + board.c *
+          Math.sin(turn);
       context.setTransform(c, s, -s, c, board.x + end * board.dx, board.y + end * board.dy);
       context.globalAlpha = board.lit;
       context.drawImage(canvas, -front * size, (-wide / 2) * size, long * size, wide * size);
@@ -302,7 +321,8 @@ export class Lanterns {
       place(head, 1, show.still ? 0 : 0.03 * Math.sin(2.6 * show.time), this.head);
       Object.assign(context, { strokeStyle: "#ffcf6a", lineWidth: 0.026 * size, lineCap: "round" });
       for (const side of [1, -1]) {
-        const sway = show.still ? 0 : 0.07 * Math.sin(2.2 * show.time + side), at = (x, y) => [x * size, y * side * size];
+        const sway = show.still ? 0 : 0.07 * Math.sin(2.2 * show.time + side),
+            at = (x, y) => [x * size, y * side * size];
         context.beginPath();
         context.moveTo(...at(-0.12, 0.14));
         context.bezierCurveTo(...at(0.16, 0.34 + sway), ...at(-0.1, 0.6 - sway), ...at(-0.48, 0.62 + sway));
@@ -313,7 +333,8 @@ export class Lanterns {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.globalAlpha = 1;
     if (!head?.lit) return;
-    const radius = 0.15 * size, { x, y } = pearl, ball = context.createRadialGradient(x - radius / 3, y - radius / 3, 0, x, y, radius);
+    const radius = 0.15 * size, { x, y } = pearl, ball = context.createRadialGradient(x - radius / 3, y - radius / 3,
+        0, x, y, radius);
     this.blend(context, "lighter", () => this.spot(context, this.white, x, y, 0.6 * size, head.lit));
     for (const [at, colour] of [[0, "#fffef6"], [0.55, "#ffe9b0"], [1, "#ff9a3a"]]) ball.addColorStop(at, colour);
     context.globalAlpha = head.lit;
@@ -330,10 +351,12 @@ export class Lanterns {
     if (!(show.embers > 0) || show.life < 1) return;
     for (let spark = Math.floor(time * SPARKS); spark > (time - SPARK_LIFE) * SPARKS; spark--) {
       const age = time - spark / SPARKS, left = 1 - age / SPARK_LIFE;
-      const [startX, startY] = behindHead(places, age * speed), turn = 2 * Math.PI * hash(spark + 1), drift = (0.12 + 0.5 * hash(spark + 2)) * age, swirl = 0.16 * age;
+      const [startX, startY] = behindHead(places, age * speed), turn = 2 * Math.PI * hash(spark + 1),
+          drift = (0.12 + 0.5 * hash(spark + 2)) * age, swirl = 0.16 * age;
       const x = startX + Math.cos(turn) * drift + swirl * Math.sin(3 * age + turn);
       const y = startY + Math.sin(turn) * drift + swirl * Math.cos(2.6 * age + turn);
-      const [px, py] = view.place(x, y), size = Math.max((0.014 + 0.022 * hash(spark + 3)) * view.pixels * (0.5 + 0.5 * left), 1);
+      const [px, py] = view.place(x, y),
+          size = Math.max((0.014 + 0.022 * hash(spark + 3)) * view.pixels * (0.5 + 0.5 * left), 1);
       const alpha = Math.max(0, left * show.embers * (0.6 + 0.4 * Math.sin(17 * time + spark)));
       if (size > 2) {
         this.spot(context, left > 0.55 ? this.white : left > 0.3 ? this.gold : kit.halo, px, py, 2 * size, alpha);

@@ -8,7 +8,9 @@ const ROUNDING = 1e-6;
 /** The interval of searches for overlapping boards in a team of more benches than `SMALL`, ms. */
 const SEARCH_INTERVAL = 200;
 const SMALL = 500;
-/** The clearance up to which the nearest two boards of a show that stands are searched, m: beyond it nothing is near. */
+/**
+ * The clearance up to which the nearest two boards of a show that stands are searched, m: beyond it nothing is near.
+ */
 const FAR = 5;
 
 /** The benches among these numbers, which count through all handles: those of obstacles follow the handles. */
@@ -46,32 +48,38 @@ export class Nearest {
 }
 
 /**
- * The marks of a state: each with the benches it concerns (`pair`, numbers through all handles), a place, a colour of the
- * palette, whether the place is a ghost (in the future), whether the outlines are dashed, and a `line` between the two. The
- * caller, which knows the language, sets `text` and `names`. `near` are the nearest two boards of a show that stands, or
- * null.
+ * The marks of a state: each with the benches it concerns (`pair`, numbers through all handles), a place, a colour of
+ * the palette, whether the place is a ghost (in the future), whether the outlines are dashed, and a `line` between the
+ * two. The caller, which knows the language, sets `text` and `names`. `near` are the nearest two boards of a show that
+ * stands, or null.
  */
 export function marksOf({ state, alert, dragons, overlap, near }) {
-  const still = near && !overlap ? [{ kind: "nearest", pair: [], place: near.place, line: near.place.ends, ink: "ink" }] : [];
+  const still = near && !overlap
+      ? [{ kind: "nearest", pair: [], place: near.place, line: near.place.ends, ink: "ink" }] : [];
   if (state.severity === "ok" || !alert) return still;
   if (!state.happened) {
-    const event = benchesAmong(dragons, alert.event_bench_a, alert.event_bench_b), now = benchesAmong(dragons, alert.bench_a, alert.bench_b);
+    const event = benchesAmong(dragons, alert.event_bench_a, alert.event_bench_b),
+        now = benchesAmong(dragons, alert.bench_a, alert.bench_b);
     const marks = [];
     if (now.length === 2) {
       const place = nearest(dragons, ...now);
-      marks.push({ kind: "now", pair: now, place, line: place.away > 0 ? place.ends : null, ink: "warning", dashes: [7, 5] });
+      marks.push({ kind: "now", pair: now, place, line: place.away > 0 ? place.ends : null, ink: "warning",
+          dashes: [7, 5] });
     }
-    if (alert.event_x !== null) marks.push({ kind: "coming", pair: event, place: { x: alert.event_x, y: alert.event_y }, ink: "danger", ghost: true });
+    if (alert.event_x !== null) marks.push({ kind: "coming", pair: event,
+        place: { x: alert.event_x, y: alert.event_y }, ink: "danger", ghost: true });
     return marks.reverse();
   }
   const marks = [];
   if (overlap) marks.push({ kind: "overlap", pair: overlap.pair, place: overlap.place, ink: "danger" });
   if (state.name === "obstacle") {
     // The point of the board that met the obstacle, as it was then.
-    if (alert.event_x !== null) marks.push({ kind: "link", pair: benchesAmong(dragons, alert.event_bench_a), place: { x: alert.event_x, y: alert.event_y }, ink: "danger" });
+    if (alert.event_x !== null) marks.push({ kind: "link", pair: benchesAmong(dragons, alert.event_bench_a),
+        place: { x: alert.event_x, y: alert.event_y }, ink: "danger" });
   } else if (state.name !== "contact" && alert.event_bench_a !== null) {
     // A link that stalls or locks is marked at the present place of its rear handle.
-    const owner = ownerOf(dragons, alert.event_bench_a), rear = STRIDE * (alert.event_bench_a + 1 - (owner?.first ?? 0));
+    const owner = ownerOf(dragons, alert.event_bench_a), rear = STRIDE *
+        (alert.event_bench_a + 1 - (owner?.first ?? 0));
     const place = owner && { x: owner.places[rear], y: owner.places[rear + 1] };
     if (place) marks.push({ kind: "link", pair: [alert.event_bench_a], place, ink: "danger" });
   }

@@ -1,5 +1,5 @@
-// The measure: the distance of two places of the stage. In: places by click, or by key at the middle of the picture. Out: a
-// line and its length on the picture.
+// The measure: the distance of two places of the stage. In: places by click, or by key at the middle of the picture.
+// Out: a line and its length on the picture.
 
 import { doubled, plate } from "./signs.js";
 import { say } from "./words.js";
@@ -43,7 +43,10 @@ export class Measure {
     return [this.on, this.places].join();
   }
 
-  /** Draws the places and the line; while the picture has the focus, a cross at its middle too. Returns the box of the words. */
+  /**
+   * Draws the places and the line; while the picture has the focus, a cross at its middle too. Returns the box of the
+   * words.
+   */
   draw(context, camera, palette, hasFocus) {
     if (!this.on) return [];
     const { ratio, unit } = camera, points = this.places.map(([x, y]) => camera.toPixel(x, y));
@@ -64,6 +67,7 @@ export class Measure {
     });
     if (points.length < 2) return [];
     const [[ax, ay], [bx, by]] = points;
-    return [plate(context, camera, palette, (ax + bx) / 2, (ay + by) / 2, say("distance", { metres: this.metres.toFixed(3) }))];
+    return [plate(context, camera, palette, (ax + bx) / 2, (ay + by) / 2,
+        say("distance", { metres: this.metres.toFixed(3) }))];
   }
 }

@@ -1,7 +1,9 @@
-// The pace of a costly look: pictures in motion, or a still that is renewed, on a computer that draws too slowly. Knows no
-// canvas and no page.
+// The pace of a costly look: pictures in motion, or a still that is renewed, on a computer that draws too slowly. Knows
+// no canvas and no page.
 
-/** Milliseconds a picture from which the look is a still, below which it moves again, and from one still to the next. */
+/**
+ * Milliseconds a picture from which the look is a still, below which it moves again, and from one still to the next.
+ */
 const SLOW = 100, FAST = 60, RENEWED = 4000;
 /** The pictures over which the mean is taken, in motion and of stills. */
 const MOVING = 20, STILLS = 3;

@@ -18,8 +18,8 @@ const AT_REST = 0.5;
 
 /**
  * The identities of several dragons, besides their names: dashes (pixels of ink and of gap in turn), a colour that is
- * visible on a light and on a dark ground, and the light of its lanterns. Without colour vision two dragons differ in their
- * dashes.
+ * visible on a light and on a dark ground, and the light of its lanterns. Without colour vision two dragons differ in
+ * their dashes.
  */
 const IDENTITIES = [
   { colour: "#1f6fb5", dashes: [], light: [84, 150, 255] },
@@ -42,16 +42,18 @@ const IDENTITIES = [
 
 /** The places of identities whose colours are words. */
 const NAMED = {
-  blue: 0, orange: 1, jade: 2, green: 2, pink: 3, gold: 4, yellow: 4, violet: 5, purple: 5, teal: 6, red: 7, lime: 8, silver: 9, white: 9,
+  blue: 0, orange: 1, jade: 2, green: 2, pink: 3, gold: 4, yellow: 4, violet: 5, purple: 5, teal: 6, red: 7, lime: 8,
+      silver: 9, white: 9,
 };
 
 /**
- * Returns the identities of dragons with these names: a name that is a colour has that colour, the others have the first that
- * are free.
+ * Returns the identities of dragons with these names: a name that is a colour has that colour, the others have the
+ * first that are free.
  */
 export function identitiesOf(names) {
   const own = names.map((name, k) => (names.indexOf(name) === k && Object.hasOwn(NAMED, name) ? NAMED[name] : null));
-  const first = own.map((place, k) => (own.indexOf(place) === k ? place : null)), free = IDENTITIES.filter((_, place) => !first.includes(place));
+  const first = own.map((place, k) => (own.indexOf(place) === k ? place : null)),
+      free = IDENTITIES.filter((_, place) => !first.includes(place));
   let next = 0;
   return first.map((place) => (place === null ? free[next++ % free.length] : IDENTITIES[place]));
 }
@@ -89,27 +91,34 @@ class MeanSpeeds {
 
   /** Adds a frame of a show that plays, and returns the mean speeds. */
   take(frame) {
-    const { frame: last } = this, { handles, time } = frame, count = handles.length / STRIDE, next = Float64Array.from({ length: count }, (_, k) => speedOf(handles, k));
+    const { frame: last } = this, { handles, time } = frame, count = handles.length / STRIDE,
+        next = Float64Array.from({ length: count }, (_, k) => speedOf(handles, k));
     this.frame = frame;
-    if (!(last?.run === frame.run && last.epoch === frame.epoch && last.handles.length === handles.length && time >= last.time)) this.clear();
+    if (!(last?.run === frame.run && last.epoch === frame.epoch && last.handles.length === handles.length &&
+        time >= last.time)) this.clear();
     if (!this.travelled) this.travelled = new Float64Array(count);
-    else for (let k = 0; k < count; k++) this.travelled[k] += 0.5 * (time - last.time) * (next[k] + speedOf(last.handles, k));
-    const k = STRIDE * Math.max(0, count - 2), passage = Math.hypot(handles[k] - handles[k + STRIDE], handles[k + 1] - handles[k + STRIDE + 1]) / next[0];
-    if (!(time - this.earlier.at(-1)?.time < passage / SAMPLES)) this.earlier.push({ time, travelled: this.travelled.slice() });
+    else for (let k = 0; k < count; k++) this.travelled[k] += 0.5 * (time - last.time) * (
+        next[k] + speedOf(last.handles, k));
+    const k = STRIDE * Math.max(0, count - 2), passage = Math.hypot(handles[k] - handles[k + STRIDE],
+        handles[k + 1] - handles[k + STRIDE + 1]) / next[0];
+    if (!(time - this.earlier.at(-1)?.time < passage / SAMPLES)) this.earlier.push(
+        { time, travelled: this.travelled.slice() });
     while (this.earlier.length > 1 && time - this.earlier[1].time >= passage) this.earlier.shift();
     // The beginning of the passage lies between two earlier frames.
     const [first, second = first] = this.earlier, begin = Math.max(first.time, time - passage);
     const share = second.time > first.time ? Math.min(1, (begin - first.time) / (second.time - first.time)) : 0;
     if (!(time > begin)) return next;
-    return this.travelled.map((metres, k) => (metres - first.travelled[k] - share * (second.travelled[k] - first.travelled[k])) / (time - begin));
+    return this.travelled.map(
+        (metres, k) => (metres - first.travelled[k] - share * (second.travelled[k] - first.travelled[k])) / (
+        time - begin));
   }
 }
 
 /**
  * The scale of the colours for a run: from rest to twice the head's speed, logarithmic in the difference from it, since
  * most shows have differences of a thousandth for minutes and of a half for seconds. It is only widened, so that a
- * colour keeps its meaning within a run. A bench has the colour of its mean speed over one link passage. The scale keeps
- * the speeds of the last moving frame. The crate `drawing` has the same scale.
+ * colour keeps its meaning within a run. A bench has the colour of its mean speed over one link passage. The scale
+ * keeps the speeds of the last moving frame. The crate `drawing` has the same scale.
  */
 export class SpeedScale {
   constructor() {
@@ -163,7 +172,8 @@ export class SpeedScale {
 
   /** Returns the shade of a bench; SHADES if its speed is not sent. */
   shade(bench) {
-    if (this.unseen) return bench === 0 ? SHADES - 1 : bench === this.frame.handles.length / STRIDE - 2 ? 0 : SHADES >> 1;
+    if (this.unseen) return bench === 0 ? SHADES - 1 : bench === this.frame.handles.length / STRIDE - 2 ? 0
+        : SHADES >> 1;
     const speed = this.speeds ? this.speeds[bench] : NaN;
     if (Number.isNaN(speed)) return SHADES;
     return Math.min(SHADES - 1, Math.floor(this.place(speed / this.head - 1) * SHADES));

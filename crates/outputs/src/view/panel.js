@@ -48,8 +48,8 @@ export function showSituation({ state, alert, trouble, silent, stale, of, second
 const spokenTransport = new Map();
 
 /**
- * The transport state at a moment: its sign and word, and its detail, in which `keys` lets keys be named. Each change is
- * spoken once; a hold, at once.
+ * The transport state at a moment: its sign and word, and its detail, in which `keys` lets keys be named. Each change
+ * is spoken once; a hold, at once.
  */
 export function showTransport(transport, { now, of, keys }) {
   document.body.dataset.transport = transport.kind;
@@ -60,7 +60,8 @@ export function showTransport(transport, { now, of, keys }) {
   spokenTransport.set(of, transport.key);
   // Frames of a show that plays are announced by the motion's sentence.
   if (transport.kind === "playing" && (last === undefined || last.startsWith("lost"))) return;
-  put(transport.kind === "held" ? "spoken-at-once" : "spoken", of ? `${of}: ${transport.sentence}` : transport.sentence);
+  put(transport.kind === "held" ? "spoken-at-once" : "spoken", of ? `${of}: ${transport.sentence}`
+      : transport.sentence);
   if (transport.kind !== "held") put("spoken-at-once", "");
 }
 
@@ -83,7 +84,8 @@ function countdown({ state, seconds, ahead, stands }, last, own) {
     element("left").append(Object.assign(document.createElement("small"), { textContent: unit }));
   }
   const mark = near ? ([10, 5, 3].findLast((mark) => seconds <= mark) ?? Infinity) : Infinity;
-  if (mark < last.mark && state.severity !== "ok" && !stands) put("spoken", own(say("seconds", { seconds: Math.ceil(seconds) })));
+  if (mark < last.mark && state.severity !== "ok" && !stands) put("spoken",
+      own(say("seconds", { seconds: Math.ceil(seconds) })));
   last.mark = mark;
 }
 
@@ -92,7 +94,8 @@ const CHASE_SILENCE = 2000;
 
 /** The chase of the dragon of the header, as long as one runs; `of` is its name, or null for a single dragon. */
 export function showChase(chase, now, of) {
-  const { dataset } = document.body, runs = Boolean(chase) && chase.state !== "ended", hasDied = runs && now - chase.at > CHASE_SILENCE;
+  const { dataset } = document.body, runs = Boolean(chase) && chase.state !== "ended",
+      hasDied = runs && now - chase.at > CHASE_SILENCE;
   element("chase").hidden = !runs;
   if (!runs) return (dataset.chase = "");
   const words = hasDied ? say("chaseDied") : chaseOf(chase), state = hasDied ? "died" : chase.state;
@@ -104,7 +107,8 @@ export function showChase(chase, now, of) {
 /** Clearance, speeds and time; empty without frames. */
 export function showFigures({ clearance, colours, time, scale }) {
   const known = Number.isFinite(clearance), metres = Math.max(0, clearance);
-  put("metres", !known ? say("notComputed") : clearance < -0.0005 ? say("overlap", { metres: (-clearance).toFixed(3) }) : `${metres.toFixed(3)} m`);
+  put("metres", !known ? say("notComputed") : clearance < -0.0005 ? say("overlap", { metres: (-clearance).toFixed(3) })
+      : `${metres.toFixed(3)} m`);
   const within = Math.min(MOST_CLEARANCE, Math.max(LEAST_CLEARANCE, known ? metres : 0));
   const share = Math.log(within / LEAST_CLEARANCE) / Math.log(MOST_CLEARANCE / LEAST_CLEARANCE), bar = element("meter");
   bar.firstElementChild.style.width = `${(100 * share).toFixed(1)}%`;
@@ -129,7 +133,8 @@ export function showProofs(stage) {
   for (const id of ["proofs", "beyond"]) {
     const own = lines.filter(({ canCome }) => canCome === (id === "proofs"));
     element(id).hidden = !own.length;
-    element(id).replaceChildren(...own.map(({ text }) => Object.assign(document.createElement("li"), { textContent: text })));
+    element(id).replaceChildren(
+        ...own.map(({ text }) => Object.assign(document.createElement("li"), { textContent: text })));
   }
 }
 
@@ -138,7 +143,9 @@ let scaleShown = "";
 function showScale({ ticks, width, unseen }) {
   const digits = Math.max(2, Math.ceil(-Math.log10(width / 10)));
   const parts = ["tail", "body", "head"].map((part, k) => ({ at: (50 * k).toFixed(1), text: say(part).toLowerCase() }));
-  const shown = unseen ? parts : ticks.map(({ at, speed }) => ({ at: (100 * at).toFixed(1), text: String(+speed.toPrecision(digits + 1)) })), key = JSON.stringify(shown);
+  const shown = unseen ? parts
+      : ticks.map(({ at, speed }) => ({ at: (100 * at).toFixed(1), text: String(+speed.toPrecision(digits + 1)) })),
+      key = JSON.stringify(shown);
   if (key === scaleShown) return;
   scaleShown = key;
   const spans = shown.map(({ at, text }) => {
@@ -175,7 +182,8 @@ export function showBench(chosen, handles, dragon) {
  * the sign of a show that does not play, or empty.
  */
 export function showNames({ scene, publisher }, several, sign) {
-  const name = several ? say("titleSeveral", { publishers: several.join(", ") }) : scene ? say("title", { scene, publisher }) : say("stage");
+  const name = several ? say("titleSeveral", { publishers: several.join(", ") }) : scene
+      ? say("title", { scene, publisher }) : say("stage");
   const title = [sign, name].filter(Boolean).join(" ");
   if (document.title !== title) document.title = title;
   put("name", [scene, publisher].filter(Boolean).join(" · "));

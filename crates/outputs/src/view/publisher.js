@@ -1,5 +1,6 @@
-// One publisher: its stream, its situation, its transport, and the dragons of its show, which share them. In: the name of
-// the publisher. Out: for each picture the present poses and marks of its dragons. Knows the words for marks, no canvas.
+// One publisher: its stream, its situation, its transport, and the dragons of its show, which share them. In: the name
+// of the publisher. Out: for each picture the present poses and marks of its dragons. Knows the words for marks, no
+// canvas.
 
 import { ownerOf } from "./boards.js";
 import { Dragon } from "./dragon.js";
@@ -30,8 +31,8 @@ function pathEnd(stage, alert) {
 
 export class Publisher {
   /**
-   * `name` is written before its words if there are `several` publishers; `show` selects the show look, `still` stops its
-   * motion.
+   * `name` is written before its words if there are `several` publishers; `show` selects the show look, `still` stops
+   * its motion.
    */
   constructor(name, { several, show, still }) {
     Object.assign(this, { name, several, look: { show, still } });
@@ -75,13 +76,15 @@ export class Publisher {
    * whether the show stands.
    */
   situation(now) {
-    const { playback, stage, alert, trouble } = this.stream, { newest } = playback, silence = newest ? now - newest.at : 0;
+    const { playback, stage, alert, trouble } = this.stream, { newest } = playback,
+        silence = newest ? now - newest.at : 0;
     const patience = Math.max(SILENCE, 3 * (playback.isPaced ? playback.interval : LONGEST_PERIOD));
     const silent = !trouble && newest && silence > patience ? Math.floor(silence / 1000) : null;
     const lost = trouble ?? (newest && stage ? null : "noStage");
     const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
     const stand = this.stream.facts?.loop_stand ?? null;
-    this.transport.look(now, newest, lost ?? (silent === null ? null : "silent"), (number) => this.cueOf(number), stand);
+    this.transport.look(now, newest, lost ?? (silent === null ? null : "silent"), (number) => this.cueOf(number),
+        stand);
     let [seconds, ahead] = [NaN, null];
     if (!lost && silent === null && newest.playback !== ENDED && !current.happened) {
       ahead = alert?.event ?? "path_end";
@@ -98,8 +101,8 @@ export class Publisher {
   }
 
   /**
-   * Updates the situation and the dragons. Returns true for another scene, for which earlier choices do not fit. `struck`
-   * is then true if something has just happened.
+   * Updates the situation and the dragons. Returns true for another scene, for which earlier choices do not fit.
+   * `struck` is then true if something has just happened.
    */
   update(now) {
     const before = this.state, { playback } = this.stream, { newest, stage } = this;
@@ -114,7 +117,8 @@ export class Publisher {
     this.mark(now, stage.states[newest.state] ?? UNKNOWN);
     const happened = this.state.happened && this.state.severity === "error";
     this.struck = happened && before !== WAITING && before.name !== this.state.name;
-    const lighting = { now, sight: this.sight, alert: this.stream.alert, happened, shown: this.shown, epoch: this.epoch };
+    const lighting = { now, sight: this.sight, alert: this.stream.alert, happened, shown: this.shown,
+        epoch: this.epoch };
     this.dragons.forEach((dragon) => dragon.light(lighting));
     this.epoch = this.shown.from.epoch;
     return isOther;
@@ -138,12 +142,14 @@ export class Publisher {
     const near = newest.playing || this.look.show ? null : this.nearest.look(dragons, newest);
     this.sight.now = deepest && !this.sight.trouble ? this.overlapWords(deepest) : "";
     // Marks are for the crew; an audience sees lanterns that burn white.
-    const all = this.look.show ? [] : this.named(marksOf({ state: known, alert, dragons, overlap: deepest, near }), deepest);
+    const all = this.look.show ? [] : this.named(marksOf({ state: known, alert, dragons, overlap: deepest, near }),
+        deepest);
     for (const dragon of dragons) {
       dragon.marks = all.flatMap((mark) => {
         const isOwn = dragon === (ownerOf(dragons, mark.pair[0]) ?? dragons[0]);
         const names = mark.names.filter((_, k) => ownerOf(dragons, mark.pair[k]) === dragon);
-        const pair = mark.pair.filter((number) => ownerOf(dragons, number) === dragon).map((number) => number - dragon.first);
+        const pair = mark.pair.filter((number) => ownerOf(dragons, number) === dragon).map(
+            (number) => number - dragon.first);
         if (isOwn) return [{ ...mark, pair, names }];
         return pair.length ? [{ ...mark, pair, names, place: null, line: null, text: undefined }] : [];
       });

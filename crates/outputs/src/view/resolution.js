@@ -26,7 +26,10 @@ export class Resolution {
     this.isLow ||= this.pictures >= ENOUGH && this.mean > SLOW;
   }
 
-  /** Returns the canvas's pixels for one of the page, where the screen has `ratio` and the picture is `width` x `height`. */
+  /**
+   * Returns the canvas's pixels for one of the page, where the screen has `ratio` and the picture is `width` x
+   * `height`.
+   */
   ratio(ratio, width, height) {
     return this.isLow ? Math.min(ratio, MOST / Math.max(width, height, 1)) : ratio;
   }

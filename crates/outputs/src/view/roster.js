@@ -1,5 +1,5 @@
-// The list of several dragons beside the picture: the name and the state of each; of a publisher with one dragon also the
-// transport's sign, the countdown and the sentence. A single dragon has no list.
+// The list of several dragons beside the picture: the name and the state of each; of a publisher with one dragon also
+// the transport's sign, the countdown and the sentence. A single dragon has no list.
 
 import { SIGNS, element } from "./panel.js";
 import { capital, remaining, say, sentenceOf } from "./words.js";
@@ -9,7 +9,8 @@ const SVG = "http://www.w3.org/2000/svg";
 /** A piece of the line around a dragon on the picture. */
 function swatch({ colour, dashes }) {
   const svg = document.createElementNS(SVG, "svg"), line = document.createElementNS(SVG, "line");
-  for (const [name, value] of Object.entries({ viewBox: "0 0 60 8", "aria-hidden": "true" })) svg.setAttribute(name, value);
+  for (const [name, value] of Object.entries({ viewBox: "0 0 60 8", "aria-hidden": "true" })) svg.setAttribute(name,
+      value);
   const look = { x1: 0, y1: 4, x2: 60, y2: 4, stroke: colour, "stroke-width": 5, "stroke-dasharray": dashes.join(" ") };
   for (const [name, value] of Object.entries(look)) line.setAttribute(name, value);
   svg.append(line);
@@ -43,8 +44,8 @@ export class Roster {
   }
 
   /**
-   * Shows the situation of each; `first` is the publisher of the header, which has its sentence there, `selected` the dragon
-   * of the figures.
+   * Shows the situation of each; `first` is the publisher of the header, which has its sentence there, `selected` the
+   * dragon of the figures.
    */
   show(first, selected) {
     this.selected = selected;
@@ -52,9 +53,11 @@ export class Roster {
       const { sight, publisher } = dragon, { transport } = publisher, isOnly = !dragon.part;
       const words = isOnly ? ofPublisher(publisher) : ofDragon(dragon);
       // Dragons of one show have one transport, in the header.
-      const text = publisher === first || sight.stale || dragon !== publisher.dragons[0] ? "" : sentenceOf(sight.state, sight.alert, sight.stage);
+      const text = publisher === first || sight.stale || dragon !== publisher.dragons[0] ? ""
+          : sentenceOf(sight.state, sight.alert, sight.stage);
       const ownSign = isOnly || publisher.several ? transport.sign : "";
-      for (const [part, shown] of [[sign, ownSign], [state, words], [sentence, text]]) if (part.textContent !== shown) part.textContent = shown;
+      for (const [part, shown] of [[sign, ownSign], [state, words], [sentence, text]]) if (
+          part.textContent !== shown) part.textContent = shown;
       item.dataset.transport = transport.kind;
       item.dataset.severity = sight.stale ? "lost" : isOnly || isConcerned(dragon) ? sight.state.severity : "ok";
       button.setAttribute("aria-pressed", dragon === selected);
@@ -65,14 +68,16 @@ export class Roster {
 /** The state of a publisher with its only dragon, and its countdown. */
 function ofPublisher({ sight, transport }) {
   const stands = !["playing", "lost"].includes(transport.kind), { state, stale, seconds, ahead } = sight;
-  const words = [stands || stale ? capital(transport.word.toLowerCase()) : "", stale ? "" : `${SIGNS[state.severity]} ${say(state.name)}`];
+  const words = [stands || stale ? capital(transport.word.toLowerCase()) : "",
+      stale ? "" : `${SIGNS[state.severity]} ${say(state.name)}`];
   const left = seconds > -1 ? `, ${say(ahead)} ${remaining(Math.max(0, seconds)).join(" ")}` : "";
   return words.filter(Boolean).join(" ") + left;
 }
 
 /** Returns true if the alert of a show is about this dragon. */
 function isConcerned(dragon) {
-  const { alert } = dragon.sight, numbers = alert?.event ? [alert.event_bench_a, alert.event_bench_b] : [alert?.bench_a, alert?.bench_b];
+  const { alert } = dragon.sight, numbers = alert?.event ? [alert.event_bench_a, alert.event_bench_b]
+      : [alert?.bench_a, alert?.bench_b];
   return dragon.places !== null && numbers.some((number) => dragon.within(number) >= 0);
 }
 

@@ -1,8 +1,8 @@
-// The look from a seat: the dragon as a spectator sees it, carried by dancers before a village at night. Boards and places
-// are true; heights and people are ornament. In: a seat, the dragons' poses and their `Show`. Out: a canvas.
+// The look from a seat: the dragon as a spectator sees it, carried by dancers before a village at night. Boards and
+// places are true; heights and people are ornament. In: a seat, the dragons' poses and their `Show`. Out: a canvas.
 //
-// Light on the floor and the bloom of lanterns are drawn at a quarter of the size and enlarged. The floor is paving times
-// light, and is made again in every third picture, or for another seat.
+// Light on the floor and the bloom of lanterns are drawn at a quarter of the size and enlarged. The floor is paving
+// times light, and is made again in every third picture, or for another seat.
 
 import { drawFigure, headFigure, tailFigure } from "./dragon_figure.js";
 import { STRIDE, speedOf } from "./hermite.js";
@@ -39,7 +39,8 @@ function stageOf(teams) {
       [low, high] = [Math.min(low, places[k + 1]), Math.max(high, places[k + 1])];
     }
   }
-  return { x: Math.round((left + right) / 2), y: Math.round((low + high) / 2), reach: Math.max(right - left, high - low) / 2 + 1 };
+  return { x: Math.round((left + right) / 2), y: Math.round((low + high) / 2),
+      reach: Math.max(right - left, high - low) / 2 + 1 };
 }
 
 export class Seat {
@@ -49,12 +50,15 @@ export class Seat {
     this.home = { turns, distance, height };
     this.cuts = new Cuts();
     this.kits = new OfLight((light) => ({
-      ...light, pools: light.pools.map((one) => pool(...one)), halo: halo(...light.halo.map(String)), wet: reflection(light.wet),
+      ...light, pools: light.pools.map((one) => pool(...one)), halo: halo(...light.halo.map(String)),
+          wet: reflection(light.wet),
     }));
     this.fire = this.kits.of(null);
-    [this.gold, this.white, this.wet] = [halo("255,214,130", "255,140,44"), halo("255,250,232", "255,206,130"), reflection([255, 176, 76])];
+    [this.gold, this.white, this.wet] = [halo("255,214,130", "255,140,44"), halo("255,250,232", "255,206,130"),
+        reflection([255, 176, 76])];
     this.balls = {
-      skin: ball("#ffb066", "#ea4a1c", "#b3160f"), gold: ball("#fffbe0", "#ffc040", "#b0620e"), white: ball("#ffffff", "#fff4cf", "#d8a050"),
+      skin: ball("#ffb066", "#ea4a1c", "#b3160f"), gold: ball("#fffbe0", "#ffc040", "#b0620e"),
+          white: ball("#ffffff", "#fff4cf", "#d8a050"),
       dark: ball("#5a1a10", "#260606", "#0a0202"), flame: ball("#fff0a0", "#ff7a1a", "#a02a06"),
     };
     this.slabs = paving();
@@ -94,7 +98,8 @@ export class Seat {
 
   /** The seat that is taken: a usual distance follows from the stage. */
   get taken() {
-    return seatOf({ ...this.seat, distance: this.seat.distance ?? Math.max(LEAST_DISTANCE, DISTANCE * this.stage.reach) });
+    return seatOf({ ...this.seat, distance: this.seat.distance ?? Math.max(LEAST_DISTANCE,
+        DISTANCE * this.stage.reach) });
   }
 
   get key() {
@@ -112,12 +117,14 @@ export class Seat {
   draw(context, { ratio }, dragons) {
     this.ratio = ratio;
     const now = stageOf(dragons), { stage } = this, away = Math.hypot(now.x - stage.x, now.y - stage.y);
-    if (!this.measured || away + now.reach > OUTGROWN * stage.reach || now.reach < LEAST_FILLED * stage.reach) this.stage = now;
+    if (!this.measured || away + now.reach > OUTGROWN * stage.reach ||
+        now.reach < LEAST_FILLED * stage.reach) this.stage = now;
     this.measured = true;
     const view = (this.view = new SeatView(context.canvas, this.taken, this.stage)), isNew = this.build(view);
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.imageSmoothingQuality = "low";
-    const teams = dragons.map((dragon) => teamOf(view, dragon, this.kits.of(dragon.identity))), isBloom = isNew || this.picture % BLOOM_EVERY === 0;
+    const teams = dragons.map((dragon) => teamOf(view, dragon, this.kits.of(dragon.identity))),
+        isBloom = isNew || this.picture % BLOOM_EVERY === 0;
     if (isNew || this.picture % FLOOR_EVERY === 0) this.layFloor(view, teams);
     if (isBloom) this.layBloom(view, teams);
     this.picture++;
@@ -166,7 +173,8 @@ export class Seat {
 
   /** The floor in the light of the lanterns, below the night. */
   layFloor(view, teams) {
-    const [, light] = this.light, [, context] = this.ground, top = PART * Math.max(0, Math.floor((this.night.height - 2) / PART)), box = [0, top, view.width, view.height - top];
+    const [, light] = this.light, [, context] = this.ground, top = PART * Math.max(0,
+        Math.floor((this.night.height - 2) / PART)), box = [0, top, view.width, view.height - top];
     light.globalCompositeOperation = "source-over";
     light.globalAlpha = 1;
     light.fillStyle = "#0b0a10";
@@ -192,18 +200,21 @@ export class Seat {
   layLight(light, view, { things, middle, reach, life, kit }) {
     if (middle) {
       const radius = (2.3 * reach * middle.k) / PART;
-      this.spot(light, kit.pools[0], middle.x / PART, middle.y / PART, radius, radius * view.flat(middle) * 1.15, 0.34 * life);
+      this.spot(light, kit.pools[0], middle.x / PART, middle.y / PART, radius, radius * view.flat(middle) * 1.15,
+          0.34 * life);
     }
     const at = {};
     for (const { foot, bench, x, y, c, s, half, lit, burn, dancer } of things) {
       if (dancer || !lit) continue;
       const radius = (2.6 * foot.k) / PART;
       if (radius < 0.7 || foot.x < -4 * radius || foot.x > view.width + 4 * radius) continue;
-      this.spot(light, kit.pools[bench % 3 ? 0 : 1], foot.x / PART, foot.y / PART, radius, radius * view.flat(foot), (bench ? 0.4 : 0.6) * lit * (1 + burn));
+      this.spot(light, kit.pools[bench % 3 ? 0 : 1], foot.x / PART, foot.y / PART, radius, radius * view.flat(foot),
+          (bench ? 0.4 : 0.6) * lit * (1 + burn));
       if (foot.k < WET_FROM) continue;
       (bench ? ON_BODY : ON_HEAD).forEach((share, k) => {
         if (!view.to(x + share * half * c, y + share * half * s, -1.5, at)) return;
-        this.spot(light, k === 1 ? this.wet : kit.wet, at.x / PART, (at.y + 0.23 * at.k) / PART, (0.17 * at.k) / PART, (0.95 * at.k) / PART, 0.26 * lit);
+        this.spot(light, k === 1 ? this.wet : kit.wet, at.x / PART, (at.y + 0.23 * at.k) / PART, (0.17 * at.k) / PART,
+            (0.95 * at.k) / PART, 0.26 * lit);
       });
     }
   }
@@ -224,15 +235,19 @@ export class Seat {
     for (const { things, show, kit } of teams) {
       for (const { dancer, bench, x, y, c, s, half, lit, burn } of things) {
         if (dancer || !lit) continue;
-        const flicker = 1 + 0.1 * Math.sin(4.1 * show.flames + 2.4 * bench) * Math.sin(1.7 * show.flames + bench), alpha = 0.3 * thin * flicker * lit * (1 + 2.5 * burn);
+        const flicker = 1 + 0.1 * Math.sin(4.1 * show.flames + 2.4 * bench) * Math.sin(1.7 * show.flames + bench),
+            alpha = 0.3 * thin * flicker * lit * (1 + 2.5 * burn);
         (bench ? ON_BODY : ON_HEAD).forEach((share, k) => {
-          shine(burn > 0.05 ? this.white : k === 1 ? this.gold : kit.halo, x + share * half * c, y + share * half * s, BOARD + 0.3, 0.55 + 0.7 * burn, alpha);
+          shine(burn > 0.05 ? this.white : k === 1 ? this.gold : kit.halo, x + share * half * c, y + share * half * s,
+              BOARD + 0.3, 0.55 + 0.7 * burn, alpha);
         });
         if (bench) continue;
         const ahead = (metres) => [x + (half + metres) * c, y + (half + metres) * s];
         shine(this.white, ...ahead(PEARL), PEARL_HEIGHT, 1.3, 0.95 * lit);
-        for (const [metres, reach] of [[-1.1, 1.3], [-0.7, 0.9], [-0.2, 0.7]]) shine(kit.halo, ...ahead(metres), 2.15, reach, 0.25 * lit);
-        if (show.burst) shine(this.white, show.burst.place.x, show.burst.place.y, BOARD, 2 + 6 * show.burst.part, (1 - show.burst.part) ** 2);
+        for (const [metres, reach] of [[-1.1, 1.3], [-0.7, 0.9], [-0.2, 0.7]]) shine(kit.halo, ...ahead(metres), 2.15,
+            reach, 0.25 * lit);
+        if (show.burst) shine(this.white, show.burst.place.x, show.burst.place.y, BOARD, 2 + 6 * show.burst.part,
+            (1 - show.burst.part) ** 2);
       }
     }
     context.globalAlpha = 1;
@@ -254,10 +269,13 @@ export class Seat {
   }
 
   bench(context, view, thing) {
-    const { bench, last, foot, x, y, c, s, half, show } = thing, isAway = view.leads(c, s), time = show.still ? 0 : show.time;
+    const { bench, last, foot, x, y, c, s, half, show } = thing, isAway = view.leads(c, s),
+        time = show.still ? 0 : show.time;
     if (foot.k > BOARDS_FROM) this.board(context, view, thing);
-    const figure = bench === 0 ? () => headFigure(time) : bench === last ? () => tailFigure(time) : null, end = bench === 0 ? half - 1.1 : -half;
-    const crown = () => figure && drawFigure(context, view, figure(), { x: x + end * c, y: y + end * s, c, s }, this.balls);
+    const figure = bench === 0 ? () => headFigure(time) : bench === last ? () => tailFigure(time) : null,
+        end = bench === 0 ? half - 1.1 : -half;
+    const crown = () => figure && drawFigure(context, view, figure(), { x: x + end * c, y: y + end * s, c, s },
+        this.balls);
     // The head is at the front of its board, the tail at the rear: which is behind the lanterns?
     const isBehind = isAway === (bench === 0);
     if (isBehind) crown();
@@ -269,8 +287,10 @@ export class Seat {
   /** A board: its top, the side that is seen, and a gilded edge. */
   board(context, view, { x, y, c, s, half, w, kit }) {
     const corner = (along, across, z) => view.to(x + along * c - across * s, y + along * s + across * c, z);
-    const near = c * view.rightX + s * view.rightY > 0 ? -w : w, top = [[half, w], [-half, w], [-half, -w], [half, -w]].map(([along, across]) => corner(along, across, BOARD));
-    const edge = [half, -half].map((along) => corner(along, near, BOARD)), under = [-half, half].map((along) => corner(along, near, BOARD - THICK));
+    const near = c * view.rightX + s * view.rightY > 0 ? -w : w, top = [[half, w], [-half, w], [-half, -w],
+        [half, -w]].map(([along, across]) => corner(along, across, BOARD));
+    const edge = [half, -half].map((along) => corner(along, near, BOARD)),
+        under = [-half, half].map((along) => corner(along, near, BOARD - THICK));
     if (![...top, ...edge, ...under].every(Boolean)) return;
     for (const [points, colour] of [[top, kit.top], [[...edge, ...under], kit.side]]) {
       context.fillStyle = colour;
@@ -315,10 +335,14 @@ export class Seat {
     context.globalCompositeOperation = "lighter";
     for (let spark = Math.floor(show.time * SPARKS); spark > (show.time - SPARK_LIFE) * SPARKS; spark--) {
       const age = show.time - spark / SPARKS, left = 1 - age / SPARK_LIFE, [x, y] = behindHead(places, age * speed);
-      const turn = 2 * Math.PI * hash(spark + 1), drift = (0.1 + 0.4 * hash(spark + 2)) * age, up = (0.7 + 0.9 * hash(spark + 4)) * age;
-      if (!view.to(x + Math.cos(turn) * drift + 0.25 * Math.sin(2.2 * age + turn), y + Math.sin(turn) * drift, 2.4 + up, at)) continue;
-      const radius = 1.6 * Math.max(1, (0.02 + 0.025 * hash(spark + 3)) * at.k) * (0.4 + 0.6 * left), alpha = left * show.embers * (0.55 + 0.45 * Math.sin(15 * show.time + spark));
-      this.spot(context, left > 0.6 ? this.white : left > 0.3 ? this.gold : kit.halo, at.x, at.y, radius, radius, alpha);
+      const turn = 2 * Math.PI * hash(spark + 1), drift = (0.1 + 0.4 * hash(spark + 2)) * age,
+          up = (0.7 + 0.9 * hash(spark + 4)) * age;
+      if (!view.to(x + Math.cos(turn) * drift + 0.25 * Math.sin(2.2 * age + turn), y + Math.sin(turn) * drift,
+          2.4 + up, at)) continue;
+      const radius = 1.6 * Math.max(1, (0.02 + 0.025 * hash(spark + 3)) * at.k) * (0.4 + 0.6 * left),
+          alpha = left * show.embers * (0.55 + 0.45 * Math.sin(15 * show.time + spark));
+      this.spot(context, left > 0.6 ? this.white : left > 0.3 ? this.gold : kit.halo, at.x, at.y, radius, radius,
+          alpha);
     }
     context.globalAlpha = 1;
     context.globalCompositeOperation = "source-over";
@@ -331,21 +355,26 @@ function teamOf(view, { stage, places, show }, kit) {
   let [sumX, sumY] = [0, 0];
   for (let k = 0; k <= count; k++) {
     const at = STRIDE * k, link = STRIDE * Math.min(k, count - 1), [x, y] = [places[at], places[at + 1]];
-    const dx = places[link] - places[link + STRIDE], dy = places[link + 1] - places[link + STRIDE + 1], long = Math.hypot(dx, dy) || 1, c = dx / long, s = dy / long;
+    const dx = places[link] - places[link + STRIDE], dy = places[link + 1] - places[link + STRIDE + 1],
+        long = Math.hypot(dx, dy) || 1, c = dx / long, s = dy / long;
     [sumX, sumY] = [sumX + x, sumY + y];
     const foot = view.to(x + BESIDE * s, y - BESIDE * c, 0), lit = show.lit(Math.min(k, count - 1), count);
     // The margin is wider than a dancer is.
-    if (foot && foot.k >= BARS_FROM && isSeen(view, foot, 1)) things.push({ dancer: true, depth: foot.depth - 0.02, foot, k, yaw: view.facing(c, s), show, lit });
+    if (foot && foot.k >= BARS_FROM && isSeen(view, foot, 1)) things.push(
+        { dancer: true, depth: foot.depth - 0.02, foot, k, yaw: view.facing(c, s), show, lit });
     if (k === count) break;
     const middle = [x - dx / 2, y - dy / 2], below = view.to(...middle, 0);
     if (!below || !isSeen(view, below, 4)) continue;
     const half = (k ? stage.body_length : stage.head_length) / 2;
-    things.push({ dancer: false, depth: below.depth, foot: below, bench: k, last: count - 1, x: middle[0], y: middle[1], c, s, half, w: stage.width / 2, show, lit, burn: show.burning.get(k) ?? 0, kit });
+    things.push({ dancer: false, depth: below.depth, foot: below, bench: k, last: count - 1, x: middle[0],
+        y: middle[1], c, s, half, w: stage.width / 2, show, lit, burn: show.burning.get(k) ?? 0, kit });
   }
   const [x, y] = [sumX / (count + 1), sumY / (count + 1)];
   let reach = 1;
-  for (let at = 0; at < places.length; at += STRIDE) reach = Math.max(reach, Math.hypot(places[at] - x, places[at + 1] - y));
-  return { things, middle: view.to(x, y, 0), reach, show, places, kit, life: show.life, speed: Number.isFinite(speed) ? speed : 0 };
+  for (let at = 0; at < places.length; at += STRIDE) reach = Math.max(reach,
+      Math.hypot(places[at] - x, places[at + 1] - y));
+  return { things, middle: view.to(x, y, 0), reach, show, places, kit, life: show.life,
+      speed: Number.isFinite(speed) ? speed : 0 };
 }
 
 /** Returns true if a part of the circle of `metres` around a place is in the picture. */
@@ -359,9 +388,11 @@ function bloomBox({ width, height }, teams) {
   for (const { foot, dancer, bench } of teams.flatMap(({ things }) => things)) {
     if (dancer) continue;
     const reach = (bench ? 2.6 : 9) * foot.k;
-    [left, right, top, bottom] = [Math.min(left, foot.x - reach), Math.max(right, foot.x + reach), Math.min(top, foot.y - 1.2 * reach - 2 * foot.k), Math.max(bottom, foot.y)];
+    [left, right, top, bottom] = [Math.min(left, foot.x - reach), Math.max(right, foot.x + reach),
+        Math.min(top, foot.y - 1.2 * reach - 2 * foot.k), Math.max(bottom, foot.y)];
   }
-  const down = (one, most) => PART * Math.floor(Math.min(most, Math.max(0, one)) / PART), up = (one, most) => Math.min(most, PART * Math.ceil(Math.max(0, one) / PART));
+  const down = (one, most) => PART * Math.floor(Math.min(most, Math.max(0, one)) / PART),
+      up = (one, most) => Math.min(most, PART * Math.ceil(Math.max(0, one) / PART));
   const x = down(left, width), y = down(top, height);
   return [x, y, up(right, width) - x, up(bottom, height) - y];
 }

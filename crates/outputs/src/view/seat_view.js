@@ -2,7 +2,9 @@
 
 /** The height of the boards, which are carried, m. */
 export const BOARD = 1.18;
-/** The field of view across the picture; the height looked at, m; the share of the angle down to it that the eye tilts. */
+/**
+ * The field of view across the picture; the height looked at, m; the share of the angle down to it that the eye tilts.
+ */
 const FIELD = (54 * Math.PI) / 180, AIM = 0.9, TILT = 0.6;
 /** The nearest that is drawn, m. */
 const NEAREST = 0.5;
@@ -24,7 +26,8 @@ const spot = () => ({ x: 0, y: 0, k: 0, depth: 0 });
 export class SeatView {
   /** The picture in pixels, the seat, and the stage: its middle `x`, `y` and its `reach`, m. */
   constructor({ width, height }, seat, stage) {
-    const angle = 2 * Math.PI * seat.turns, c = Math.cos(angle), s = Math.sin(angle), pitch = TILT * Math.atan2(seat.height - AIM, seat.distance);
+    const angle = 2 * Math.PI * seat.turns, c = Math.cos(angle), s = Math.sin(angle),
+        pitch = TILT * Math.atan2(seat.height - AIM, seat.distance);
     Object.assign(this, { width, height, seat });
     this.eye = { x: stage.x + s * seat.distance, y: stage.y - c * seat.distance, z: seat.height };
     [this.rightX, this.rightY, this.awayX, this.awayY] = [c, s, -s, c];
@@ -52,7 +55,8 @@ export class SeatView {
 
   /** Returns how far away and how deep the floor is at a row of pixels, m; null above the horizon. */
   floorAt(row) {
-    const tangent = (row - this.cy) / this.f, away = (this.eye.z * (this.cos - tangent * this.sin)) / (this.sin + tangent * this.cos);
+    const tangent = (row - this.cy) / this.f,
+        away = (this.eye.z * (this.cos - tangent * this.sin)) / (this.sin + tangent * this.cos);
     const depth = away * this.cos + this.eye.z * this.sin;
     return depth > 0 ? { away, depth } : null;
   }
@@ -62,7 +66,9 @@ export class SeatView {
     return Math.min(1, this.eye.z / depth);
   }
 
-  /** Returns the direction of a dancer as seen: 0 towards the eye, then turning to the right of the picture, in turns. */
+  /**
+   * Returns the direction of a dancer as seen: 0 towards the eye, then turning to the right of the picture, in turns.
+   */
   facing(c, s) {
     const right = c * this.rightX + s * this.rightY, away = c * this.awayX + s * this.awayY;
     return Math.atan2(right, -away) / (2 * Math.PI);

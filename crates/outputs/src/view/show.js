@@ -46,8 +46,8 @@ export class Show {
 
   /**
    * Begins the next picture, at the show time `time`. `stands`: the show stands still; `jumped`: another epoch;
-   * `coming`: the benches of the next event and the seconds until then; `happened`: it is past; `flash`: its place then, if
-   * this dragon's flash shows it, or null.
+   * `coming`: the benches of the next event and the seconds until then; `happened`: it is past; `flash`: its place
+   * then, if this dragon's flash shows it, or null.
    */
   update({ time, places, stands, jumped, coming, happened, flash }) {
     const { now } = this, tail = places.length - STRIDE;
@@ -70,7 +70,8 @@ export class Show {
 
   /** Returns the flash as a share of its time, 1 after it, and its place; null without one. */
   get burst() {
-    return this.flash && { place: this.flash.place, part: this.still ? 1 : Math.min(1, (this.now - this.flash.at) / FLASH) };
+    return this.flash && { place: this.flash.place, part: this.still ? 1
+        : Math.min(1, (this.now - this.flash.at) / FLASH) };
   }
 
   /** The seconds that flames flicker by; they rest while the system wants no motion, and when a pause is long. */

@@ -5,7 +5,8 @@
  * vision. `trace` makes the path and strokes it; all widths in pixels.
  */
 export function doubled(context, palette, pixel, ink, width, trace, dashes = []) {
-  for (const [colour, wide, dashed] of [[palette.far, width + 4.5, []], [palette.near, width + 3, []], [ink, width, dashes]]) {
+  for (const [colour, wide, dashed] of [[palette.far, width + 4.5, []], [palette.near, width + 3, []],
+      [ink, width, dashes]]) {
     context.setLineDash(dashed.map((dash) => dash * pixel));
     context.strokeStyle = colour;
     context.lineWidth = wide * pixel;
@@ -81,7 +82,8 @@ export function scaleBar(context, camera, palette) {
 /** Writes words on a plate whose middle is at a pixel, moved into the picture; returns its box. */
 export function plate(context, camera, palette, x, y, text) {
   const { unit, width, height } = camera, size = 15 * unit, tall = size / 2 + 4 * unit;
-  Object.assign(context, { font: `600 ${size}px system-ui, sans-serif`, textAlign: "center", textBaseline: "middle", fillStyle: palette.ground });
+  Object.assign(context, { font: `600 ${size}px system-ui, sans-serif`, textAlign: "center", textBaseline: "middle",
+      fillStyle: palette.ground });
   const half = context.measureText(text).width / 2 + 6 * unit;
   const within = (at, most, edge) => Math.max(edge, Math.min(most - edge, at));
   const box = { x: within(x, width, half), y: within(y, height, tall), half, tall, text };

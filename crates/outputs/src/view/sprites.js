@@ -31,10 +31,12 @@ export const POOL_RADIUS = 3.2;
  */
 export function pool(red, green, blue) {
   const size = 128, [canvas, context] = blank(size, size), data = context.createImageData(size, size);
-  const lamp = (q, height) => (1 + (q / height) ** 2) ** -1.5, light = (q) => 0.72 * lamp(q, 0.5) + 0.28 * lamp(q, 1.3), end = light(POOL_RADIUS);
+  const lamp = (q, height) => (1 + (q / height) ** 2) ** -1.5, light = (q) => 0.72 * lamp(q, 0.5) + 0.28 * lamp(q,
+      1.3), end = light(POOL_RADIUS);
   for (let row = 0; row < size; row++) {
     for (let column = 0; column < size; column++) {
-      const q = (Math.hypot(column + 0.5 - size / 2, row + 0.5 - size / 2) / (size / 2)) * POOL_RADIUS, far = Math.min(1, q / 2.2);
+      const q = (Math.hypot(column + 0.5 - size / 2, row + 0.5 - size / 2) / (size / 2)) * POOL_RADIUS,
+          far = Math.min(1, q / 2.2);
       const alpha = q > POOL_RADIUS ? 0 : (light(q) - end) / (1 - end);
       data.data.set([red, green * (1 - 0.3 * far), blue * (1 - 0.45 * far), 255 * alpha], 4 * (row * size + column));
     }
@@ -46,8 +48,10 @@ export function pool(red, green, blue) {
 /** A halo: a bright core and a long soft skirt. Colours are "red,green,blue". */
 export function halo(core, skirt) {
   const size = 96, half = size / 2, [canvas, context] = blank(size, size);
-  const stops = [[0, core, 1], [0.12, core, 0.7], [0.26, skirt, 0.42], [0.5, skirt, 0.16], [0.75, skirt, 0.045], [1, skirt, 0]];
-  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, half), ...stops.map(([at, colour, alpha]) => [at, `rgba(${colour},${alpha})`]));
+  const stops = [[0, core, 1], [0.12, core, 0.7], [0.26, skirt, 0.42], [0.5, skirt, 0.16], [0.75, skirt, 0.045],
+      [1, skirt, 0]];
+  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, half),
+      ...stops.map(([at, colour, alpha]) => [at, `rgba(${colour},${alpha})`]));
   context.fillRect(0, 0, size, size);
   return canvas;
 }
@@ -59,7 +63,8 @@ export function barrel([flame, paper, shade, rim]) {
     context.beginPath();
     context.arc(half, half, share * radius, 0, 7);
   };
-  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, radius), [0, "#fffdf0"], [0.16, flame], [0.42, paper], [0.8, shade], [1, rim]);
+  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, radius), [0, "#fffdf0"],
+      [0.16, flame], [0.42, paper], [0.8, shade], [1, rim]);
   disc(1);
   context.fill();
   context.strokeStyle = "rgba(60,0,0,.28)";
@@ -82,7 +87,8 @@ export function barrel([flame, paper, shade, rim]) {
 /** A gold box: four panes, their posts, the flame. The canvas is 0.3 m wide. */
 export function box() {
   const size = 96, half = size / 2, a = 0.76 * half, [canvas, context] = blank(size, size);
-  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, 1.25 * a), [0, "#fffdf0"], [0.16, "#fffbe0"], [0.5, "#ffcf52"], [1, "#e8860f"]);
+  context.fillStyle = shaded(context.createRadialGradient(half, half, 0, half, half, 1.25 * a), [0, "#fffdf0"],
+      [0.16, "#fffbe0"], [0.5, "#ffcf52"], [1, "#e8860f"]);
   context.beginPath();
   context.roundRect(half - a, half - a, 2 * a, 2 * a, 0.18 * a);
   context.fill();
@@ -111,9 +117,11 @@ export function dancer([dark, cloth, rim], [fold, scarf, light]) {
   const size = 96, [canvas, context] = blank(size, size);
   context.translate(size / 2, size / 2);
   context.scale(size / 0.64, size / 0.64);
-  context.fillStyle = shaded(context.createRadialGradient(0, 0, 0.05, 0, 0, 0.3), [0, "rgba(0,0,0,.75)"], [0.6, "rgba(0,0,0,.5)"], [1, "rgba(0,0,0,0)"]);
+  context.fillStyle = shaded(context.createRadialGradient(0, 0, 0.05, 0, 0, 0.3), [0, "rgba(0,0,0,.75)"],
+      [0.6, "rgba(0,0,0,.5)"], [1, "rgba(0,0,0,0)"]);
   context.fillRect(-0.32, -0.32, 0.64, 0.64);
-  context.fillStyle = shaded(context.createLinearGradient(-0.14, 0, 0.14, 0), [0, rim], [0.16, cloth], [0.38, dark], [0.62, dark], [0.84, cloth], [1, rim]);
+  context.fillStyle = shaded(context.createLinearGradient(-0.14, 0, 0.14, 0), [0, rim], [0.16, cloth], [0.38, dark],
+      [0.62, dark], [0.84, cloth], [1, rim]);
   // The shoulders, from one arm around the back to the other.
   context.beginPath();
   context.moveTo(-0.06, -0.23);
@@ -138,7 +146,8 @@ export function dancer([dark, cloth, rim], [fold, scarf, light]) {
     context.fill();
   };
   oval(-0.006, 0.118, 0.105, "rgba(0,0,0,.5)");
-  oval(0, 0.106, 0.093, shaded(context.createLinearGradient(-0.11, 0, 0.11, 0), [0, light], [0.2, scarf], [0.5, fold], [0.8, scarf], [1, light]));
+  oval(0, 0.106, 0.093, shaded(context.createLinearGradient(-0.11, 0, 0.11, 0), [0, light], [0.2, scarf], [0.5, fold],
+      [0.8, scarf], [1, light]));
   // The knot of the scarf.
   context.fillStyle = scarf;
   context.beginPath();
@@ -158,10 +167,12 @@ export function paving() {
   for (let row = 0; row < PAVING / tall; row++) {
     const first = (row % 2) * 0.37 + hash(row + 900) * 0.2;
     for (let at = first, slab = 0; at < first + PAVING - 1e-6; slab++) {
-      const left = first + PAVING - at, usual = [0.8, 1.2, 1.6][Math.floor(3 * hash(row * 91 + slab))], long = left - usual < 0.6 ? left : usual;
+      const left = first + PAVING - at, usual = [0.8, 1.2, 1.6][Math.floor(3 * hash(row * 91 + slab))],
+          long = left - usual < 0.6 ? left : usual;
       const value = 0.56 + 0.3 * hash(row * 57 + slab * 13 + 5), warm = 10 * (hash(row * 31 + slab * 7) - 0.5);
       for (const shift of [0, -PAVING]) {
-        const x = (at + shift + joint / 2) * PER_METRE, y = (row * tall + joint / 2) * PER_METRE, wide = (long - joint) * PER_METRE, high = (tall - joint) * PER_METRE;
+        const x = (at + shift + joint / 2) * PER_METRE, y = (row * tall + joint / 2) * PER_METRE,
+            wide = (long - joint) * PER_METRE, high = (tall - joint) * PER_METRE;
         context.fillStyle = `rgb(${176 * value + warm} ${180 * value} ${186 * value - warm})`;
         context.beginPath();
         context.roundRect(x, y, wide, high, 0.03 * PER_METRE);
@@ -182,10 +193,12 @@ export function paving() {
   }
   context.putImageData(grain, 0, 0);
   for (let stain = 0; stain < 60; stain++) {
-    const radius = (0.2 + 0.8 * hash(stain + 9000)) * PER_METRE, colour = hash(stain) < 0.5 ? "rgba(0,0,0,.16)" : "rgba(255,240,220,.07)";
+    const radius = (0.2 + 0.8 * hash(stain + 9000)) * PER_METRE, colour = hash(stain) < 0.5 ? "rgba(0,0,0,.16)"
+        : "rgba(255,240,220,.07)";
     for (const [right, down] of [0, size, -size].flatMap((right) => [0, size, -size].map((down) => [right, down]))) {
       const x = hash(stain + 7000) * size + right, y = hash(stain + 8000) * size + down;
-      context.fillStyle = shaded(context.createRadialGradient(x, y, 0, x, y, radius), [0, colour], [1, "rgba(0,0,0,0)"]);
+      context.fillStyle = shaded(context.createRadialGradient(x, y, 0, x, y, radius), [0, colour],
+          [1, "rgba(0,0,0,0)"]);
       context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius);
     }
   }

@@ -17,7 +17,8 @@ import { Measure } from "./measure.js";
 import { Pace } from "./pace.js";
 import { attach } from "./pointer_input.js";
 import { identitiesOf, paletteOf } from "./palette.js";
-import { element, put, showBench, showChase, showFigures, showNames, showProofs, showSituation, showTransport } from "./panel.js";
+import { element, put, showBench, showChase, showFigures, showNames, showProofs, showSituation,
+    showTransport } from "./panel.js";
 import { Publisher } from "./publisher.js";
 import { publishers as names } from "./publishers.js";
 import { Resolution } from "./resolution.js";
@@ -31,7 +32,8 @@ const FIGURES_INTERVAL = 100;
 /** The seconds by which the countdown of another dragon must end earlier for the header to change to that dragon. */
 const HEADER_LEAD = 1;
 
-const words = wordsOf(location.hash), root = document.documentElement, stillness = matchMedia("(prefers-reduced-motion: reduce)");
+const words = wordsOf(location.hash), root = document.documentElement,
+    stillness = matchMedia("(prefers-reduced-motion: reduce)");
 // A seat is a place in the audience of a show.
 words.show ??= words.seat && true;
 setLanguage(words.lang ?? navigator.language);
@@ -40,10 +42,12 @@ for (const word of ["show", "transparent", "tell"]) root.toggleAttribute(`data-$
 if (words.dark || words.light || words.show) root.dataset.theme = words.light ? "light" : "dark";
 
 const canvas = element("stage"), context = canvas.getContext("2d", { alpha: "transparent" in words });
-const camera = new Camera(), resolution = new Resolution(), ground = new Ground("transparent" in words), sound = new Sound();
+const camera = new Camera(), resolution = new Resolution(), ground = new Ground("transparent" in words),
+    sound = new Sound();
 const labels = "nolabels" in words ? null : new Labels(stillness.matches);
 const seat = words.seat ? new Seat(words.seat === true ? [] : words.seat) : null, pace = seat ? new Pace() : null;
-const lanterns = seat ?? (words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null);
+const lanterns = seat ??
+    (words.show ? new Lanterns({ transparent: words.transparent, moon: words.moon, day: words.light }) : null);
 /** The eye that hands move. */
 const eye = seat ?? camera;
 const isOneOfMany = names.length > 1, look = { several: isOneOfMany, show: words.show, still: stillness.matches };
@@ -63,7 +67,8 @@ meet();
  * `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon of the figures, null for that of
  * the publisher of the header.
  */
-let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0, drawnAt = -Infinity;
+let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0,
+    drawnAt = -Infinity;
 
 /**
  * For tests and measurements: the received and drawn data. `shown` is the simulated time and the handles of the
@@ -71,7 +76,9 @@ let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = nul
  * it; `latency` and `ways` in ms since the frame was sent. With several dragons it is of the first, and `dragons`
  * has the same of each.
  */
-const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null, shown: null, range: null, marks: [], labels: [], latency: publishers[0].latency, ways: publishers[0].stream.ways, played: sound.played, toPixel: (...place) => eye.toPixel(...place), dragons: [] };
+const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null,
+    shown: null, range: null, marks: [], labels: [], latency: publishers[0].latency, ways: publishers[0].stream.ways,
+    played: sound.played, toPixel: (...place) => eye.toPixel(...place), dragons: [] };
 window.picture = picture;
 
 /** Lists the dragons that the publishers have now. Each of several has an identity. */
@@ -79,7 +86,7 @@ function meet() {
   const now = publishers.flatMap((one) => one.dragons), key = now.map(({ name }) => name).join(" ");
   if (now.length === dragons.length && now.every((one, k) => one === dragons[k]) && key === meet.key) return;
   [dragons, several, meet.key] = [now, now.length > 1, key];
-  const identities = several ? identitiesOf(now.map(({ name }) => name)) : [null];
+  const identities = several ? identitiesOf(now.map(({ ownName }) => ownName)) : [null];
   now.forEach((dragon, k) => (dragon.identity = identities[k]));
   root.toggleAttribute("data-several", several);
   roster.list(several ? dragons : []);
@@ -103,9 +110,11 @@ let header = publishers[0];
  * equal countdowns that of the header stays there, since the header is read aloud.
  */
 function foremost() {
-  const rank = ({ sight, isThere }) => (sight.stale ? (isThere ? -1 : -2) : { ok: 0, warning: 1, error: 2 }[sight.state.severity] ?? 0);
+  const rank = ({ sight, isThere }) => (sight.stale ? (isThere ? -1 : -2)
+      : { ok: 0, warning: 1, error: 2 }[sight.state.severity] ?? 0);
   const soon = ({ sight }) => (sight.seconds > -1 ? sight.seconds : Infinity);
-  const best = publishers.reduce((best, one) => (rank(one) > rank(best) || (rank(one) === rank(best) && soon(one) < soon(best)) ? one : best));
+  const best = publishers.reduce(
+      (best, one) => (rank(one) > rank(best) || (rank(one) === rank(best) && soon(one) < soon(best)) ? one : best));
   if (rank(best) > rank(header) || soon(best) + HEADER_LEAD < soon(header)) header = best;
   return header;
 }
@@ -126,10 +135,13 @@ function pass() {
     showText(now);
     return drawNothing();
   }
-  camera.update(there, passed, there.includes(whose) ? whose : there[0], Math.max(...there.map(({ newest }) => newest.scale)));
+  camera.update(there, passed, there.includes(whose) ? whose : there[0],
+      Math.max(...there.map(({ newest }) => newest.scale)));
   camera.reach = Math.max(...there.map(({ path }) => path.reach));
   showText(now);
-  const soonest = publishers.map(({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN : sight.seconds)).filter((seconds) => seconds > -1);
+  const soonest = publishers.map(
+      ({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN
+      : sight.seconds)).filter((seconds) => seconds > -1);
   sound.count(soonest.length ? Math.min(...soonest) : NaN);
   if (publishers.some(({ struck }) => struck)) sound.strike();
   paint(there);
@@ -140,15 +152,19 @@ function pass() {
 function paint(there) {
   if (lanterns) return light(there);
   const hasFocus = document.activeElement === canvas;
-  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen, whose.name, palette.ground, measure.key, hasFocus && measure.on, labels?.settled === false && performance.now()].join();
+  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen,
+      whose.name, palette.ground, measure.key, hasFocus && measure.on,
+      labels?.settled === false && performance.now()].join();
   if (look === last) return;
   if (last) resolution.take(passedAt - drawnAt);
   [last, drawnAt] = [look, passedAt];
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
-    const { stage, places, colours, path, obstacles, marks, sight, identity } = dragon, own = dragon === whose ? chosen : -1;
+    const { stage, places, colours, path, obstacles, marks, sight, identity } = dragon,
+        own = dragon === whose ? chosen : -1;
     const named = { chosen: own, chosenName: dragon.benchName(own), endNames: dragon.endNames() };
-    return { stage, places, colours, path: path.lines, obstacles, marks, ...named, stale: sight.stale && !allStale, identity };
+    return { stage, places, colours, path: path.lines, obstacles, marks, ...named, stale: sight.stale && !allStale,
+        identity };
   });
   const written = draw(context, camera, palette, { ground, dragons: scene, labels, measure, hasFocus });
   picture.drawn++;
@@ -158,7 +174,8 @@ function paint(there) {
 
 /** Draws the show look. */
 function light(there) {
-  const isDue = pace?.begin(passedAt) ?? true, look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, seat?.key].join();
+  const isDue = pace?.begin(passedAt) ?? true, look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y,
+      camera.scale, camera.c, camera.s, seat?.key].join();
   if (look === last || !isDue) return;
   if (last && !seat) resolution.take(passedAt - drawnAt);
   [last, drawnAt] = [look, passedAt];
@@ -231,7 +248,9 @@ function showText(now) {
 function showSeat() {
   element("seat-note").hidden = !seat || "nolabels" in words || publishers.every(({ sight }) => sight.stale);
   if (!seat) return;
-  put("seat-note", [say("notToScale"), pace.isStill ? say("still", { seconds: pace.seconds, rate: pace.rate.toFixed(1) }) : ""].filter(Boolean).join(" "));
+  put("seat-note", [say("notToScale"),
+      pace.isStill ? say("still", { seconds: pace.seconds, rate: pace.rate.toFixed(1) }) : ""].filter(Boolean).join(
+      " "));
 }
 
 // The user's input.
@@ -303,11 +322,14 @@ function help() {
 /** Says where the head is, for a screen reader; again if the words are the same. */
 function speak() {
   if (!whose.isThere) return;
-  const { handles } = whose.newest, speed = speedOf(handles, 0), values = { x: handles[0].toFixed(2), y: handles[1].toFixed(2), speed: Number.isNaN(speed) ? say("notSent") : say("perSecond", { speed: speed.toFixed(2) }), clearance: element("metres").textContent };
+  const { handles } = whose.newest, speed = speedOf(handles, 0), values = { x: handles[0].toFixed(2),
+      y: handles[1].toFixed(2), speed: Number.isNaN(speed) ? say("notSent") : say("perSecond",
+      { speed: speed.toFixed(2) }), clearance: element("metres").textContent };
   put("spoken", "");
   setTimeout(() => put("spoken", whose.own(say("spokenNow", values))), 100);
 }
-const measureMiddle = () => measure.on && document.activeElement === canvas && measure.take(camera.toStage(camera.width / 2, camera.height / 2));
+const measureMiddle = () => measure.on && document.activeElement === canvas &&
+    measure.take(camera.toStage(camera.width / 2, camera.height / 2));
 function escape() {
   if (measure.on) return measure.toggle(false);
   choose(-1);
@@ -316,12 +338,14 @@ function escape() {
 const zoom = (by) => () => eye.zoomAt(by);
 const keys = {
   "+": zoom(1.25), "=": zoom(1.25), "-": zoom(0.8), 0: whole, Home: whole,
-  f: follow, t: toggleTheme, p: fill, s: toggleSound, "?": help, i: speak, m: () => measure.toggle(), Enter: measureMiddle, Escape: escape,
+  f: follow, t: toggleTheme, p: fill, s: toggleSound, "?": help, i: speak, m: () => measure.toggle(),
+      Enter: measureMiddle, Escape: escape,
   ArrowLeft: () => pan(60, 0), ArrowRight: () => pan(-60, 0), ArrowUp: () => pan(0, 60), ArrowDown: () => pan(0, -60),
 };
 function tap(x, y) {
   if (measure.on) return measure.take(camera.toStage(x, y));
-  const there = dragons.filter(({ isThere, places }) => isThere && places), place = camera.toStage(x, y), reach = 16 / camera.scale;
+  const there = dragons.filter(({ isThere, places }) => isThere && places), place = camera.toStage(x, y),
+      reach = 16 / camera.scale;
   if (!there.length) return;
   // A hit board has priority over a near one.
   for (const most of [0, reach]) {
@@ -336,7 +360,8 @@ const isWanted = (event) => keySwitch.acts(event, canvas);
 // An audience's picture obeys no hand that happens to touch it.
 if (words.show) lock(() => `${say("locked")} · ${element("time").textContent} · ${element("playback").textContent}`);
 if (words.show) keys["?"] = () => null;
-if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys, zoomAt: (...to) => (eye.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench", isWanted });
+if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys,
+    zoomAt: (...to) => (eye.zoomAt(...to), showFollow()), isFree: () => camera.mode !== "bench", isWanted });
 if (!words.show || words.hands) new Cameras(eye, seat ? "seat" : "stage", element("camera-note"), isWanted);
 element("pick").oninput = ({ target }) => {
   chosen = target.value === "" ? -1 : Math.floor(target.value) - 1;
@@ -344,7 +369,8 @@ element("pick").oninput = ({ target }) => {
   if (several && chosen >= 0) [whose, selected] = [own, own];
   showFollow();
 };
-Object.entries({ follow, whole, theme: toggleTheme, full: fill, sound: toggleSound, help, measure: keys.m, nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
+Object.entries({ follow, whole, theme: toggleTheme, full: fill, sound: toggleSound, help, measure: keys.m,
+    nearer: keys["+"], farther: keys["-"] }).forEach(([id, act]) => (element(id).onclick = act));
 matchMedia("(prefers-color-scheme: dark)").onchange = dressed;
 stillness.onchange = () => dragons.forEach(({ show }) => show && (show.still = stillness.matches));
 // Sound set in the address begins with the first key or click, if the browser requires one.

@@ -56,7 +56,10 @@ export class Transport {
     this.since = now;
   }
 
-  /** An option of the publisher may give another time than the scene; one end alone may have been cut short by a command. */
+  /**
+   * An option of the publisher may give another time than the scene; one end alone may have been cut short by a
+   * command.
+   */
   learn(seconds) {
     if (Math.abs(seconds - this.seen) < ALIKE) this.stand = seconds;
     this.seen = seconds;
@@ -85,14 +88,17 @@ export class Transport {
 
   /** Returns the detail at a moment. `keys`: true if the keys of the transport bar work here. */
   detail(now, keys) {
-    const { kind, reason, frame, cue } = this, passed = minutes((now - this.since) / 1000), named = cue && say("cueNamed", cue);
-    if (kind === "lost") return frame ? say("pictureFrom", { time: frame.time.toFixed(1), ago: minutes((now - frame.at) / 1000) }) : say(reason);
+    const { kind, reason, frame, cue } = this, passed = minutes((now - this.since) / 1000),
+        named = cue && say("cueNamed", cue);
+    if (kind === "lost") return frame
+        ? say("pictureFrom", { time: frame.time.toFixed(1), ago: minutes((now - frame.at) / 1000) }) : say(reason);
     if (kind === "held") return say(keys ? "heldFor" : "sinceThen", { passed });
     if (kind === "go") return say("goDetail", { cue: named, passed });
     if (kind === "paused") return say("sinceThen", { passed });
     if (kind === "ended") {
       const time = frame.time.toFixed(1), left = this.stand - (now - this.since) / 1000;
-      return this.isWhole && this.stand !== null ? say("endedAgain", { time, seconds: Math.max(0, Math.ceil(left)) }) : say("endedAt", { time });
+      return this.isWhole && this.stand !== null ? say("endedAgain", { time, seconds: Math.max(0, Math.ceil(left)) })
+          : say("endedAt", { time });
     }
     const rate = frame.scale === 1 ? "" : say("times", { rate: +frame.scale.toPrecision(3) });
     return [rate, cue && now - this.cueAt < CUE_TIME ? named : ""].filter(Boolean).join(" · ");

@@ -1,6 +1,6 @@
 // What stands still in the view from a seat, drawn once for each seat: the stone floor, the night over the village, and
-// the heads of those who sit in front. Called by seat.js. The village stands on a ring around the stage, so that another
-// seat sees other houses.
+// the heads of those who sit in front. Called by seat.js. The village stands on a ring around the stage, so that
+// another seat sees other houses.
 
 import { blank, hash } from "./sprites.js";
 
@@ -19,7 +19,8 @@ function shade(context, place, ...stops) {
 
 /** The floor: one row of pixels at a time, each with the paving at its own scale. */
 export function floorOf(view, { canvas: slabs, perMetre }) {
-  const { width, height, eye } = view, [floor, context] = blank(width, height, { alpha: false }), pattern = context.createPattern(slabs, "repeat");
+  const { width, height, eye } = view, [floor, context] = blank(width, height, { alpha: false }),
+      pattern = context.createPattern(slabs, "repeat");
   const right = eye.x * view.rightX + eye.y * view.rightY, away = eye.x * view.awayX + eye.y * view.awayY;
   context.fillStyle = "#000";
   context.fillRect(0, 0, width, height);
@@ -27,7 +28,9 @@ export function floorOf(view, { canvas: slabs, perMetre }) {
     const here = view.floorAt(row + 0.5);
     if (!here || here.depth > 400) continue;
     const k = view.f / here.depth, part = k / perMetre;
-    pattern.setTransform(new DOMMatrix([part, 0, 0, part, view.cx - mod(right, PAVING) * k, row + 0.5 - mod(-(away + here.away), PAVING) * k]));
+    pattern.setTransform(
+        new DOMMatrix([part, 0, 0, part, view.cx - mod(right, PAVING) * k,
+        row + 0.5 - mod(-(away + here.away), PAVING) * k]));
     context.fillStyle = pattern;
     context.fillRect(0, row, width, 1);
     // Far slabs are finer than a pixel: one grey in their place.
@@ -42,8 +45,10 @@ export function floorOf(view, { canvas: slabs, perMetre }) {
 /** Sky, hills and village, down to the foot of the houses. */
 export function nightOf(view, lamp, glow) {
   const { eye, width } = view, foot = view.to(eye.x + view.awayX * view.village, eye.y + view.awayY * view.village, 0);
-  const high = Math.max(2, Math.min(view.height, Math.round(foot?.y ?? 2))), [canvas, context] = blank(width, high, { alpha: false });
-  context.fillStyle = shade(context, [0, 0, 0, high], [0, "#02030a"], [0.6, "#060816"], [0.9, "#120c16"], [1, "#1a0e12"]);
+  const high = Math.max(2, Math.min(view.height, Math.round(foot?.y ?? 2))),
+      [canvas, context] = blank(width, high, { alpha: false });
+  context.fillStyle = shade(context, [0, 0, 0, high], [0, "#02030a"], [0.6, "#060816"], [0.9, "#120c16"],
+      [1, "#1a0e12"]);
   context.fillRect(0, 0, width, high);
   stars(context, width, high, view.seat.turns);
   hills(context, width, high, view.seat.turns);
@@ -68,7 +73,8 @@ function hills(context, width, high, turns) {
     context.beginPath();
     context.moveTo(0, high);
     for (let step = 0; step <= 80; step++) {
-      const at = step / 80 - 6 * turns, wave = 0.5 + 0.25 * Math.sin(5.1 * at + seed) + 0.18 * Math.sin(11 * at + 2 * seed) + 0.07 * Math.sin(29 * at + seed);
+      const at = step / 80 - 6 * turns, wave = 0.5 + 0.25 * Math.sin(5.1 * at + seed) + 0.18 *
+          Math.sin(11 * at + 2 * seed) + 0.07 * Math.sin(29 * at + seed);
       context.lineTo((step / 80) * width, high * (foot - size * wave));
     }
     context.lineTo(width, high);
@@ -78,7 +84,8 @@ function hills(context, width, high, turns) {
 
 /** The width of a house of the ring and of the lane beside it, m. */
 const wideOf = (house) => 4 + 3.6 * hash(house + 40), laneOf = (house) => (hash(house + 70) < 0.3 ? 0.8 : 0);
-const RING = Array.from({ length: HOUSES }, (_, house) => wideOf(house) + laneOf(house)).reduce((sum, one) => sum + one);
+const RING = Array.from({ length: HOUSES }, (_, house) => wideOf(house) + laneOf(house)).reduce((sum, one) => sum +
+    one);
 
 function houses(context, { width, high, metre, turns, lamp, glow }) {
   // The house at the picture's left edge.
@@ -99,7 +106,8 @@ const STEPS = 3, STEP = 0.5;
 /** A house whose gables rise in steps, the horse's head of the region: white walls lit from below, black tiles. */
 function houseOf(context, house, lamp, glow) {
   const wide = wideOf(house), top = 2.9 + 1.5 * hash(house + 60), tread = wide / (2 * STEPS + 1);
-  context.fillStyle = shade(context, [0, 0, 0, top + STEPS * STEP], [0, "#7a3d1a"], [0.18, "#4e2714"], [0.45, "#2c1710"], [1, "#120b0e"]);
+  context.fillStyle = shade(context, [0, 0, 0, top + STEPS * STEP], [0, "#7a3d1a"], [0.18, "#4e2714"],
+      [0.45, "#2c1710"], [1, "#120b0e"]);
   context.beginPath();
   context.moveTo(0, 0);
   for (let step = 0; step <= STEPS; step++) {
@@ -113,9 +121,11 @@ function houseOf(context, house, lamp, glow) {
   context.lineTo(wide, 0);
   context.fill();
   for (let step = 0; step <= STEPS; step++) {
-    for (const left of step === STEPS ? [step * tread] : [step * tread, wide - (step + 1) * tread]) tiles(context, left, tread, top + step * STEP);
+    for (const left of step === STEPS ? [step * tread] : [step * tread, wide - (step + 1) * tread]) tiles(context,
+        left, tread, top + step * STEP);
   }
-  if (hash(house + 9) < 0.65) window_(context, wide * (0.3 + 0.24 * hash(house + 3)), top - 1.3, 0.4 + 0.4 * hash(house + 5));
+  if (hash(house + 9) < 0.65) window_(context, wide * (0.3 + 0.24 * hash(house + 3)), top - 1.3,
+      0.4 + 0.4 * hash(house + 5));
   door(context, wide / 2, lamp, glow);
 }
 
@@ -171,8 +181,10 @@ function door(context, x, lamp, glow) {
 /** Those who stand at the far side, lit by the dragon. */
 function watchers(context, width, high, metre) {
   for (let k = 0; k < width / (0.4 * metre); k++) {
-    const x = (k + 0.6 * hash(k + 11)) * 0.4 * metre, tall = (1.42 + 0.3 * hash(k + 12)) * (hash(k + 77) < 0.1 ? 1.22 : 1) * metre;
-    context.fillStyle = shade(context, [0, high - tall, 0, high], [0, "#8a4520"], [0.12, "#5a2a16"], [0.3, "#2a130d"], [1, "#0f0706"]);
+    const x = (k + 0.6 * hash(k + 11)) * 0.4 * metre, tall = (1.42 + 0.3 * hash(k + 12)) *
+        (hash(k + 77) < 0.1 ? 1.22 : 1) * metre;
+    context.fillStyle = shade(context, [0, high - tall, 0, high], [0, "#8a4520"], [0.12, "#5a2a16"], [0.3, "#2a130d"],
+        [1, "#0f0706"]);
     context.beginPath();
     context.ellipse(x, high - tall + 0.12 * metre, 0.095 * metre, 0.125 * metre, 0, 0, 7);
     context.fill();
@@ -187,7 +199,8 @@ function watchers(context, width, high, metre) {
 
 /** Those who sit in front: shadows with a rim of light. The canvas is as wide as the picture. */
 export function frontRow({ width, height }) {
-  const [canvas, context] = blank(width, Math.max(1, Math.round(0.2 * height))), size = 0.115 * height, apart = 0.92 * size;
+  const [canvas, context] = blank(width, Math.max(1, Math.round(0.2 * height))), size = 0.115 * height,
+      apart = 0.92 * size;
   const rim = Math.max(1.2, 0.0026 * height);
   for (let k = -1; k < width / apart + 1; k++) {
     const x = (k + 0.4 * hash(k + 500)) * apart, y = canvas.height - size * (0.5 + 0.24 * hash(k + 600));

@@ -7,7 +7,8 @@ const WORDS = {
   title: ["{scene} ({publisher}): stage picture", "{scene}（{publisher}）：舞台画面"],
   titleSeveral: ["{publishers}: stage picture", "{publishers}：舞台画面"],
   stage: ["Bench dragon: stage picture", "板凳龙：舞台画面"],
-  canvas: ["The stage from above. Arrow keys move the picture, plus and minus zoom, F follows the head, 0 shows all, question mark lists the keys.", "从上方看的舞台。方向键移动画面，加减号缩放，F 跟随龙头，0 显示全部，问号列出按键。"],
+  canvas: ["The stage from above. Arrow keys move the picture, plus and minus zoom, F follows the head, 0 shows " +
+      "all, question mark lists the keys.", "从上方看的舞台。方向键移动画面，加减号缩放，F 跟随龙头，0 显示全部，问号列出按键。"],
   stageRole: ["stage", "舞台"],
   dragons: ["All dragons", "全部舞龙队"],
   clearance: ["Clearance", "间距"],
@@ -42,8 +43,10 @@ const WORDS = {
   key_rate: ["half or twice the speed", "速度减半或加倍"],
   key_step: ["one step, while paused", "单步（暂停时）"],
   key_h: ["hold all, or release", "全部锁定或解除"],
-  keysOn: ["Keys act everywhere. Off: letters only while the picture has the focus, and keys that conduct only in the bar.", "按键处处有效。关闭时：字母键仅在画面获得焦点时有效，操控键仅在操控栏内有效。"],
-  keysOff: ["Keys conduct only in this bar: press Tab until it has the focus, or switch them on under “?”.", "按键仅在此栏内有效：请按 Tab 键移入此栏，或在“?”中打开。"],
+  keysOn: ["Keys act everywhere. Off: letters only while the picture has the focus, and keys that conduct only in " +
+      "the bar.", "按键处处有效。关闭时：字母键仅在画面获得焦点时有效，操控键仅在操控栏内有效。"],
+  keysOff: ["Keys conduct only in this bar: press Tab until it has the focus, or switch them on under “?”.",
+      "按键仅在此栏内有效：请按 Tab 键移入此栏，或在“?”中打开。"],
   measure: ["Measure", "测距"],
   measureFirst: ["Measure: click two places, or press Enter for the middle of the picture.", "测距：点击两处，或按 Enter 取画面中点。"],
   measured: ["{metres} m from ({ax}, {ay}) to ({bx}, {by})", "({ax}, {ay}) 至 ({bx}, {by})：{metres} m"],
@@ -64,7 +67,8 @@ const WORDS = {
   chase_paused: ["", "等待：演出被暂停，继续后恢复"],
   chase_sought: ["", "等待：演出被跳转，暂停并继续后恢复"],
   distance: ["{metres}\u00a0m", "{metres}\u00a0m"],
-  spokenNow: ["Head at {x}, {y} metres. Speed {speed}. Clearance {clearance}.", "龙头位于 {x}、{y} 米。速度 {speed}。间距 {clearance}。"],
+  spokenNow: ["Head at {x}, {y} metres. Speed {speed}. Clearance {clearance}.",
+      "龙头位于 {x}、{y} 米。速度 {speed}。间距 {clearance}。"],
 
   // States and kinds of events.
   moving: ["moving", "行进中"],
@@ -97,7 +101,8 @@ const WORDS = {
   both: ["{a} and {b}", "{a}与{b}"],
   theObstacle: ["the {name}", "障碍物“{name}”"],
   stands: ["stands", "静止"],
-  detail: ["Bench {number} of {count}{of}{name}: front handle at ({x}, {y}) m, {speed}, heading {degrees}°", "第 {number} 节板凳（共 {count} 节{of}{name}）：前把手位于 ({x}, {y}) m，{speed}，航向 {degrees}°"],
+  detail: ["Bench {number} of {count}{of}{name}: front handle at ({x}, {y}) m, {speed}, heading {degrees}°",
+      "第 {number} 节板凳（共 {count} 节{of}{name}）：前把手位于 ({x}, {y}) m，{speed}，航向 {degrees}°"],
   theHead: [", the head", "，龙头"],
   theTail: [", the tail", "，龙尾"],
   perSecond: ["{speed} m/s", "{speed} m/s"],
@@ -194,7 +199,8 @@ const WORDS = {
 
   locked: ["locked", "已锁定画面"],
   notToScale: ["Not to scale above the boards.", "板凳以上的部分不按比例。"],
-  still: ["A still, renewed every {seconds} s: this computer draws {rate} pictures/s. For a film: benches/stage_picture.py film.", "静态画面，每 {seconds} 秒更新：本机每秒只能绘制 {rate} 幅。制作影片：benches/stage_picture.py film。"],
+  still: ["A still, renewed every {seconds} s: this computer draws {rate} pictures/s. For a film: " +
+      "benches/stage_picture.py film.", "静态画面，每 {seconds} 秒更新：本机每秒只能绘制 {rate} 幅。制作影片：benches/stage_picture.py film。"],
   cameraKept: ["Camera {number} kept", "已保存视角 {number}"],
   cameraTaken: ["Camera {number}", "视角 {number}"],
   cameraEmpty: ["Camera {number} is empty: Shift+{number} keeps this one", "视角 {number} 为空：Shift+{number} 保存当前视角"],
@@ -231,7 +237,8 @@ export function say(key, values = {}) {
 export function translate(root) {
   for (const one of root.querySelectorAll("[data-word]")) one.textContent = say(one.dataset.word);
   for (const one of root.querySelectorAll("[data-title]")) one.title = say(one.dataset.title);
-  for (const one of root.querySelectorAll("[data-role]")) one.setAttribute("aria-roledescription", say(one.dataset.role));
+  for (const one of root.querySelectorAll("[data-role]")) one.setAttribute("aria-roledescription",
+      say(one.dataset.role));
   for (const one of root.querySelectorAll("[data-label]")) one.setAttribute("aria-label", say(one.dataset.label));
 }
 
@@ -250,7 +257,8 @@ export function remaining(seconds) {
   if (seconds < 100) return [seconds.toFixed(1), say("s")];
   const whole = Math.floor(seconds), pad = (number) => String(number).padStart(2, "0");
   const hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
-  return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, say("h")] : [`${minutes}:${pad(whole % 60)}`, say("min")];
+  return hours ? [`${hours}:${pad(minutes)}:${pad(whole % 60)}`, say("h")] : [`${minutes}:${pad(whole % 60)}`,
+      say("min")];
 }
 
 /** Returns seconds as minutes and seconds. */
@@ -285,7 +293,8 @@ export function proofOf({ event, status, time_lo, time_hi, obstacle }, freeze) {
   }
   if (status === "undecided") return { text: say("provedUpTo", { kind, lo }), canCome: true };
   // Without an end of the path the proof only says that the lock comes first.
-  if (status === "none") return { text: lo === null ? say("provedNone", { kind }) : say("provedNoneBefore", { kind, lo }), canCome: event !== "path_end" };
+  if (status === "none") return { text: lo === null ? say("provedNone", { kind }) : say("provedNoneBefore",
+      { kind, lo }), canCome: event !== "path_end" };
   return { text: "", canCome: false };
 }
 
@@ -295,7 +304,8 @@ const SOURCES = { artnet: "ArtTimeCode", mtc: "MTC", ltc: "LTC", psn: "PSN" };
 export function chaseOf({ source, state, timecode, tracker, error, distance, sentence }) {
   const words = WORDS[`chase_${state}`]?.[1];
   if (language === 0 || !words) return sentence;
-  const title = SOURCES[source] ?? source, subject = timecode ? `${title} ${timecode}` : tracker === null ? title : say("chaseTracker", { source: title, tracker });
+  const title = SOURCES[source] ?? source, subject = timecode ? `${title} ${timecode}` : tracker === null ? title
+      : say("chaseTracker", { source: title, tracker });
   const isAtWork = error !== null && ["locked", "freewheeling"].includes(state);
   const ms = isAtWork ? say("chaseMs", { ms: (1000 * error).toFixed(1) }) : "";
   return `${subject} ${words}${ms}${distance === null ? "" : say("chaseOff", { metres: distance.toFixed(2) })}`;
@@ -305,8 +315,8 @@ export function chaseOf({ source, state, timecode, tracker, error, distance, sen
 export const nameOf = (bench) => (bench === 0 ? say("headBench") : say("one", { number: bench + 1 }));
 
 /**
- * Returns the name of a bench, by its number through all handles of a stage, or of an obstacle, whose numbers follow the
- * handles. `naming` names a bench by its number within its dragon, from 0.
+ * Returns the name of a bench, by its number through all handles of a stage, or of an obstacle, whose numbers follow
+ * the handles. `naming` names a bench by its number within its dragon, from 0.
  */
 export function benchIn({ dragons, obstacles }, number, naming = nameOf) {
   const owner = dragons.find(({ first_handle, benches }) => number >= first_handle && number <= first_handle + benches);
@@ -335,7 +345,8 @@ export function sentenceOf(state, alert, stage) {
   const ends = (bench, count) => (bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : "");
   const name = (number) => benchIn(stage, number, (bench, count) => `第 ${bench + 1} 节板凳${ends(bench, count)}`);
   const both = (...pair) => pair.filter((number) => number !== null).map(name).join("与");
-  const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? "" : `(${alert.event_x.toFixed(3)},\u00a0${alert.event_y.toFixed(3)})\u00a0m`;
+  const event = both(alert.event_bench_a, alert.event_bench_b), place = alert.event_x === null ? ""
+      : `(${alert.event_x.toFixed(3)},\u00a0${alert.event_y.toFixed(3)})\u00a0m`;
   if (state.happened) {
     const at = `t\u00a0=\u00a0${alert.event_time?.toFixed(6)}\u00a0s`;
     if (alert.event === "obstacle") return `${event}于 ${place} 处相遇，${at}（编号从 1 起）。`;

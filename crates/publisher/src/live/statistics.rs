@@ -9,7 +9,8 @@ pub mod accumulator;
 mod tests;
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use serde::{Deserialize, Serialize};
 
@@ -39,14 +40,17 @@ pub fn queues_of(samples: usize, announcements: usize) -> (super::Reports, Inbox
     while samples.push(Sample::NOTHING).is_ok() {}
     while sample_inbox.pop().is_ok() {}
     let (announcements, announcement_inbox) = rtrb::RingBuffer::new(announcements);
-    let reports = super::Reports { samples, announcements };
-    (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox })
+    let reports = super::Reports::new(samples, announcements);
+    let turns = Arc::clone(&reports.turns);
+    (reports, Inbox { samples: sample_inbox, announcements: announcement_inbox, turns, seen_turns: 0 })
 }
 
 /// This thread's ends of the queues.
 pub struct Inbox {
     samples: rtrb::Consumer<Sample>,
     announcements: rtrb::Consumer<Announcement>,
+    turns: Arc<AtomicU64>,
+    seen_turns: u64,
 }
 
 /// The summary of a run. `run --json` prints it, and a soak test reads it.
@@ -83,6 +87,8 @@ pub struct Run<'a> {
     pub announce: Box<dyn FnMut(&Announcement) + 'a>,
     /// Called with each sample.
     pub record: Box<dyn FnMut(&Sample) + 'a>,
+    /// Called where the loop has turned since the last call: also between two frames, about ten times a second.
+    pub alive: Box<dyn FnMut() + 'a>,
 }
 
 /// The statistics thread without its waiting and its system calls, for a simulated scheduler.
@@ -107,6 +113,11 @@ impl<'a> Collector<'a> {
         while let Ok(sample) = self.inbox.samples.pop() {
             self.accumulator.record(&sample);
             (self.run.record)(&sample);
+        }
+        let turns = self.inbox.turns.load(Ordering::Relaxed);
+        if turns != self.inbox.seen_turns {
+            self.inbox.seen_turns = turns;
+            (self.run.alive)();
         }
     }
 

@@ -185,7 +185,7 @@ impl Setup {
         let options = LoopOptions { run_id: 9, rate: self.rate.hertz(), periods: self.periods };
         let (samples, mut received) = rtrb::RingBuffer::new(1 << 17);
         let (announcements, _) = rtrb::RingBuffer::new(1);
-        let reports = Reports { samples, announcements };
+        let reports = Reports::new(samples, announcements);
         let result = run_loop(
             &*clock,
             &mut frames,

@@ -20,6 +20,7 @@ use serde::de::DeserializeOwned;
 
 use super::bag::recordings_of;
 use super::index::{Index, index, told};
+use super::layout_history::layouts;
 use super::recover::records_of_chunk;
 use super::run::SCENE_ATTACHMENT;
 use bench_dragon_messages::sentence::number;
@@ -66,14 +67,17 @@ pub enum ReadError {
     },
     /// The type has other fields than in this version.
     #[error(
-        "its topic {} has other fields than {of} of this version, expected a recording of the same version",
-        printable(.topic)
+        "its topic {} has {}, this program reads {own}: play it with the version of bench-dragon that recorded it \
+         (--version prints its layouts)",
+        printable(.topic), found.unwrap_or("a layout that this version does not know")
     )]
     Fields {
         /// The topic.
         topic: String,
-        /// The type.
-        of: String,
+        /// The layout of the recording, if an earlier version had it.
+        found: Option<&'static str>,
+        /// The layout of this version.
+        own: &'static str,
     },
     /// There are no frames.
     #[error("it has no frames")]
@@ -514,9 +518,10 @@ fn check_type(channel: &Channel<'_>, topic: Topic) -> Result<(), ReadError> {
     let text = schema.map(|schema| String::from_utf8_lossy(&schema.data)).unwrap_or_default();
     // The name in definitions.
     let name = of.ros_name().replace("/msg/", "/");
-    if fields(&name, &text) == fields(&name, &of.schema()) {
-        Ok(())
-    } else {
-        Err(ReadError::Fields { topic: channel.topic.clone(), of: of.ros_name() })
+    let found = fields(&name, &text);
+    if found == fields(&name, &of.schema()) {
+        return Ok(());
     }
+    let (found, own) = layouts(topic, found.get(&name).map_or(&[], Vec::as_slice));
+    Err(ReadError::Fields { topic: channel.topic.clone(), found, own })
 }

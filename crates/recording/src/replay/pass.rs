@@ -1,7 +1,8 @@
 //! The frames of a recording from a start to its end, each with its alerts and cues.
 //!
 //! A recorder may receive an alert a little before or after its frame. Frames of a chunk are therefore returned after
-//! the next chunk has been read. Called by the [`replay`](super).
+//! the next chunk has been read. A later file of a bag may begin with the alert and the cue that hold: they are not sent
+//! twice. Called by the [`replay`](super).
 
 use std::collections::VecDeque;
 
@@ -43,6 +44,9 @@ pub(super) struct Pass {
     /// The messages that belong to no returned frame.
     alerts: VecDeque<CollisionAlert>,
     cues: VecDeque<Cue>,
+    /// The latest of those that were read: tick, stamp and kind.
+    latest_alert: Option<(u64, u64, [u32; 2])>,
+    latest_cue: Option<(u64, u64, u32)>,
     /// As in [`Start`].
     from_tick: u64,
     /// True before the first frame.
@@ -86,6 +90,8 @@ impl Pass {
             ahead_chunk: start.chunk,
             alerts: start.alert.into_iter().collect(),
             cues: start.cue.into_iter().collect(),
+            latest_alert: None,
+            latest_cue: None,
             from_tick: start.tick,
             first: true,
             failure: None,
@@ -141,8 +147,10 @@ impl Pass {
         match read {
             Ok(()) => {
                 self.ahead = frames;
-                self.alerts.extend(alerts);
-                self.cues.extend(cues);
+                let of_alert = |of: &CollisionAlert| (of.tick, of.stamp_ns, [of.level, of.event]);
+                self.alerts.extend(alerts.into_iter().filter(|of| is_new(&mut self.latest_alert, of_alert(of))));
+                let of_cue = |of: &Cue| (of.tick, of.stamp_ns, of.number);
+                self.cues.extend(cues.into_iter().filter(|of| is_new(&mut self.latest_cue, of_cue(of))));
             }
             Err(error) => self.failure = Some(error),
         }
@@ -154,6 +162,11 @@ impl Pass {
         let cues = self.cues.partition_point(|cue| cue.tick <= tick);
         (self.alerts.drain(..alerts).collect(), self.cues.drain(..cues).collect())
     }
+}
+
+/// Keeps the key of a message as the latest. Returns false if the message before it had the same.
+fn is_new<Key: PartialEq + Copy>(latest: &mut Option<Key>, key: Key) -> bool {
+    latest.replace(key) != Some(key)
 }
 
 /// Keeps only the last of the messages that are older than the first frame.

@@ -50,7 +50,7 @@ fn play(due: &[u64], wakes: Vec<Wake>) -> (LoopCounts, Vec<FrameHeader>) {
         &mut CommandQueues::default(),
         &mut [Box::new(collected.clone())],
         LoopOptions { run_id: 3, rate: 1e9 / PERIOD_NS as f64, periods: None },
-        Reports { samples, announcements },
+        Reports::new(samples, announcements),
         &clock.stop,
     );
     (counts.ok().unwrap(), collected.0.take())

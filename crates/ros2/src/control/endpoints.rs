@@ -152,20 +152,24 @@ pub(super) struct Client {
 }
 
 impl ServiceEndpoint {
-    /// Sends a response to these readers, or to all if there are none.
-    pub(super) fn answer(&mut self, client: &Client, readers: &[GUID], response: &Response) {
+    /// Sends a response to these readers, or to all if there are none. Returns false if RustDDS refuses it, as it does
+    /// after many answers until each new client has acknowledged one: then call this again.
+    pub(super) fn answer(&mut self, client: &Client, readers: &[GUID], response: &Response) -> bool {
         let mut bytes = client.header.clone();
         // The header's 16 bytes do not change the alignment.
-        let Ok(body) = CDRSerializerAdapter::<Response>::to_bytes(response) else { return };
+        let Ok(body) = CDRSerializerAdapter::<Response>::to_bytes(response) else { return true };
         bytes.extend_from_slice(&body);
         let options = || WriteOptionsBuilder::new().related_sample_identity(client.identity);
-        let written = match readers {
+        match readers {
             [] => self.responses.write_with_options(bytes, options().build()).is_ok(),
             _ => readers.iter().all(|reader| {
                 self.responses.write_with_options(bytes.clone(), options().to_single_reader(*reader).build()).is_ok()
             }),
-        };
-        if !written && !std::mem::replace(&mut self.reported.discarded, true) {
+        }
+    }
+
+    pub(super) fn report_discarded(&mut self) {
+        if !std::mem::replace(&mut self.reported.discarded, true) {
             log::warn!(
                 "ROS 2 service {}: a client is so slow, or dead, that answers are discarded until it is back or its lease \
                  ends (reported once)",

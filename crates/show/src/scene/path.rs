@@ -1,4 +1,4 @@
-//! The `[path]` table: a spiral, a turnaround, or a route of lines and arcs.
+//! The `[path]` table: a spiral, a turnaround, or a route of lines, arcs and spirals.
 //!
 //! In: the table from serde. Out: a [`PathDescription`], or one sentence about the wrong field. Only [`super`] calls
 //! it.
@@ -20,8 +20,8 @@ use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::spiral::{Direction, Spiral};
 use bench_dragon_motion::model::team::Team;
 
-/// The greatest number of segments of a route.
-pub(crate) const MOST_STEPS: usize = 31;
+/// The greatest number of pieces of a route.
+pub(crate) const MOST_STEPS: usize = 4096;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -46,6 +46,8 @@ struct RawStep {
     radius: Option<Spanned<f64>>,
     turns: Option<Spanned<f64>>,
     side: Option<RawSide>,
+    pitch: Option<Spanned<f64>>,
+    direction: Option<RawDirection>,
 }
 
 #[derive(Clone, Copy, PartialEq, Deserialize)]
@@ -53,6 +55,14 @@ struct RawStep {
 enum RawStepKind {
     Line,
     Arc,
+    Spiral,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum RawDirection {
+    In,
+    Out,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -224,42 +234,119 @@ impl RawPath {
     }
 }
 
+impl RawSide {
+    fn side(self) -> Side {
+        match self {
+            Self::Left => Side::Left,
+            Self::Right => Side::Right,
+        }
+    }
+}
+
 impl RawStep {
     fn validated(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
-        let check = |field: &str, value: &Spanned<f64>, accepted: Accepted| {
-            source.check(&format!("path.pieces.{field}"), value, accepted)
-        };
-        match (self.kind, &self.length, &self.turns, &self.radius, self.side) {
-            (RawStepKind::Line, Some(length), None, None, None) => {
-                Ok(RouteStep::Line { length: check("length", length, Accepted::LEG)? })
-            }
-            (RawStepKind::Line, ..) => Err(source.field_error(at, "a line has a length and nothing else")),
-            (RawStepKind::Arc, length, turns, Some(radius), Some(side)) if length.is_some() != turns.is_some() => {
-                let radius = check("radius", radius, Accepted::LENGTH)?;
-                let turns = match (turns, length) {
-                    (Some(turns), _) => check("turns", turns, Accepted::ARC_TURNS)?,
-                    (None, Some(length)) => {
-                        let turns = check("length", length, Accepted::LEG)? / (std::f64::consts::TAU * radius);
-                        Accepted::ARC_TURNS
-                            .check("path.pieces.length in turns", turns)
-                            .map_err(|sentence| source.field_error(length, &sentence))?
-                    }
-                    // The guard excludes the case of both.
-                    (None, None) => return Err(source.field_error(at, "an arc needs turns or a length")),
-                };
-                let side = match side {
-                    RawSide::Left => Side::Left,
-                    RawSide::Right => Side::Right,
-                };
-                Ok(RouteStep::Arc { side, turns, radius })
-            }
-            (RawStepKind::Arc, ..) => Err(source.field_error(
+        match self.kind {
+            RawStepKind::Line => self.line(source, at),
+            RawStepKind::Arc => self.arc(source, at),
+            RawStepKind::Spiral => self.spiral(source, at),
+        }
+    }
+
+    fn line(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
+        match self {
+            Self {
+                length: Some(length), radius: None, turns: None, side: None, pitch: None, direction: None, ..
+            } => Ok(RouteStep::Line { length: checked(source, "length", length, Accepted::LEG)? }),
+            _ => Err(source.field_error(at, "a line has a length and nothing else")),
+        }
+    }
+
+    fn arc(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
+        let (Self { radius: Some(radius), side: Some(side), pitch: None, direction: None, .. }, Some(extent)) =
+            (self, self.extent())
+        else {
+            return Err(source.field_error(
                 at,
                 "an arc has a radius, a side (\"left\" or \"right\") and either turns (0.25 is a quarter circle) or a \
                  length",
-            )),
+            ));
+        };
+        let radius = checked(source, "radius", radius, Accepted::LENGTH)?;
+        let turns = match extent {
+            Extent::Turns(turns) => checked(source, "turns", turns, Accepted::ARC_TURNS)?,
+            Extent::Length(length) => {
+                let turns = checked(source, "length", length, Accepted::LEG)? / (TAU * radius);
+                as_turns(source, length, turns)?
+            }
+        };
+        Ok(RouteStep::Arc { side: side.side(), turns, radius })
+    }
+
+    fn spiral(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
+        let (
+            Self { pitch: Some(pitch), radius: Some(radius), side: Some(side), direction: Some(way), .. },
+            Some(extent),
+        ) = (self, self.extent())
+        else {
+            return Err(source.field_error(
+                at,
+                "a spiral has a pitch, a radius (its distance from its centre where it begins), a direction (\"in\" or \
+                 \"out\"), a side (\"left\" or \"right\") and either turns around its centre or a length",
+            ));
+        };
+        let pitch = checked(source, "pitch", pitch, Accepted::LENGTH)?;
+        let radius = checked(source, "radius", radius, Accepted::LENGTH)?;
+        let direction = match way {
+            RawDirection::In => Direction::Inward,
+            RawDirection::Out => Direction::Outward,
+        };
+        let (spiral, begin) = (Spiral::new(pitch, direction), DoubleDouble::from_turns(radius / pitch));
+        let turns_of = |metres: f64| spiral.advance(begin, metres).minus(begin).abs() / TAU;
+        let (turns, given, field, unit) = match extent {
+            Extent::Turns(turns) => (checked(source, "turns", turns, Accepted::ARC_TURNS)?, turns, "turns", "turns"),
+            Extent::Length(length) => {
+                (turns_of(checked(source, "length", length, Accepted::LEG)?), length, "length", "metres")
+            }
+        };
+        // The end has to be as far from the centre as the beginning of the tightest spiral.
+        if direction == Direction::Inward && radius - pitch * turns < Accepted::LENGTH.least {
+            let most = radius / pitch;
+            let most = if unit == "turns" { most } else { spiral.arc_length(begin, DoubleDouble::ZERO) };
+            let sentence = format!(
+                "path.pieces.{field} is {}, which leads to the centre of the spiral or past it, expected less than \
+                 {most:.3} {unit}",
+                number(*given.get_ref())
+            );
+            return Err(source.field_error(given, &sentence));
+        }
+        let turns = if let Extent::Length(length) = extent { as_turns(source, length, turns)? } else { turns };
+        Ok(RouteStep::Spiral { side: side.side(), direction, pitch, radius, turns })
+    }
+
+    /// Returns the turns or the length, if one of the two is given.
+    fn extent(&self) -> Option<Extent<'_>> {
+        match (&self.turns, &self.length) {
+            (Some(turns), None) => Some(Extent::Turns(turns)),
+            (None, Some(length)) => Some(Extent::Length(length)),
+            _ => None,
         }
     }
+}
+
+/// How far a bent piece leads.
+enum Extent<'a> {
+    Turns(&'a Spanned<f64>),
+    Length(&'a Spanned<f64>),
+}
+
+fn checked(source: &Source, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
+    source.check(&format!("path.pieces.{field}"), value, accepted)
+}
+
+/// Returns the turns of a piece whose length is given.
+fn as_turns(source: &Source, length: &Spanned<f64>, turns: f64) -> Result<f64, SceneError> {
+    let checked = Accepted::ARC_TURNS.check("path.pieces.length in turns", turns);
+    checked.map_err(|sentence| source.field_error(length, &sentence))
 }
 
 /// Returns true if one Euler step of the paper's rules, `metres` long, ends where a bench is folded back on itself, or

@@ -4,6 +4,16 @@ use super::*;
 use crate::model::description::{PathDescription, RouteStep};
 use proptest::prelude::*;
 
+/// Spirals of a route, of at most three turns, that end at least a twentieth of their first radius from the centre.
+pub(crate) fn any_spiral() -> impl Strategy<Value = RouteStep> {
+    let sides = prop_oneof![Just(Side::Left), Just(Side::Right)];
+    let directions = prop_oneof![Just(Direction::Inward), Just(Direction::Outward)];
+    (sides, directions, 0.3..2.0f64, 1.0..6.0f64, 0.01..0.95f64).prop_map(|(side, direction, pitch, radius, share)| {
+        let turns = (share * radius / pitch).min(3.0);
+        RouteStep::Spiral { side, direction, pitch, radius, turns }
+    })
+}
+
 /// Paths of every kind, their sizes a few metres.
 pub(crate) fn any_path() -> impl Strategy<Value = Path> {
     let spiral =
@@ -16,8 +26,8 @@ pub(crate) fn any_path() -> impl Strategy<Value = Path> {
         let side = if left { Side::Left } else { Side::Right };
         if line { RouteStep::Line { length: size } } else { RouteStep::Arc { side, radius: 0.5 * size, turns } }
     });
-    let route =
-        prop::collection::vec(step, 2..8).prop_map(|steps| PathDescription::Route { heading_turns: 0.3, steps });
+    let route = prop::collection::vec(prop_oneof![2 => step, 1 => any_spiral()], 2..8)
+        .prop_map(|steps| PathDescription::Route { heading_turns: 0.3, steps });
     prop_oneof![spiral, turnaround, route].prop_map(|description| description.path().unwrap())
 }
 

@@ -45,7 +45,7 @@ impl Spiral {
     ///
     /// With r' = r - a d at the follower, the square of the chord is (a d)^2 + 4 r r' sin^2(d/2), which grows with d
     /// while tan(d/2) <= r'/a: beyond theta = 1 + pi/2 for a quarter of a turn.
-    pub(super) fn inner_follower(&self, front: Coordinate, behind: f64, link: f64) -> Follower {
+    pub(in crate::model) fn inner_follower(&self, front: Coordinate, behind: f64, link: f64) -> Follower {
         if front.high < 1.0 + FRAC_PI_2 {
             return Follower::Unknown;
         }

@@ -22,10 +22,14 @@ pub(super) enum Curve {
         heading: Real,
         sense: Real,
     },
-    /// r = `radius_per_radian` theta; outward, turned by half a turn.
+    /// r = `radius_per_radian` theta about `centre`, the angle from x being `phase` + `sense` theta; outward, turned by
+    /// half a turn.
     Spiral {
+        centre: RealVector,
         radius_per_radian: Real,
         direction: Direction,
+        phase: Real,
+        sense: Real,
     },
 }
 
@@ -46,7 +50,7 @@ impl Curve {
         let unit = match self {
             Self::Line { direction, .. } => direction.clone(),
             Self::Arc { heading, sense, .. } => functions.unit_vector(&(heading + sense * &at)),
-            Self::Spiral { .. } => functions.unit_vector(&at),
+            Self::Spiral { phase, sense, .. } => functions.unit_vector(&(phase + sense * &at)),
         };
         self.place_with(at, unit)
     }
@@ -59,8 +63,7 @@ impl Curve {
         }
         let unit = match self {
             Self::Line { direction, .. } => direction.clone(),
-            Self::Arc { sense, .. } => place.unit.turned_slightly(&(sense * by)),
-            Self::Spiral { .. } => place.unit.turned_slightly(by),
+            Self::Arc { sense, .. } | Self::Spiral { sense, .. } => place.unit.turned_slightly(&(sense * by)),
         };
         self.place_with(at, unit)
     }
@@ -71,15 +74,15 @@ impl Curve {
             Self::Arc { centre, radius, sense, .. } => {
                 (centre - &unit.left().scaled(&(sense * radius)), unit.scaled(radius))
             }
-            Self::Spiral { radius_per_radian, direction } => {
+            Self::Spiral { centre, radius_per_radian, direction, sense, .. } => {
                 let radius_per_radian = if *direction == Direction::Inward {
                     radius_per_radian.clone()
                 } else {
                     -radius_per_radian.clone()
                 };
-                let point = unit.scaled(&(&radius_per_radian * &at));
-                let slope = &unit.scaled(&radius_per_radian) + &point.left();
-                (point, slope)
+                let spoke = unit.scaled(&(&radius_per_radian * &at));
+                let slope = &unit.scaled(&radius_per_radian) + &spoke.left().scaled(sense);
+                (centre + &spoke, slope)
             }
         };
         RealParam { at, point, slope, unit }
@@ -110,6 +113,14 @@ impl Curve {
             }
         }
     }
+}
+
+fn origin() -> RealVector {
+    RealVector { x: Real::from(0.0), y: Real::from(0.0) }
+}
+
+fn about_origin(radius_per_radian: Real, direction: Direction) -> Curve {
+    Curve::Spiral { centre: origin(), radius_per_radian, direction, phase: Real::from(0.0), sense: Real::from(1.0) }
 }
 
 /// Returns the metres of the spiral from its centre: s = a/2 (theta sqrt(1 + theta^2) + ln(theta + sqrt(1 + theta^2))).
@@ -179,8 +190,7 @@ impl RealPath {
                 path.heading = path.functions.turn() * Real::from(heading_turns);
                 let direction = path.functions.unit_vector(&path.heading);
                 let zero = Real::from(0.0);
-                let origin = RealVector { x: zero.clone(), y: zero.clone() };
-                path.push(Curve::Line { origin, direction }, zero.clone(), &zero);
+                path.push(Curve::Line { origin: origin(), direction }, zero.clone(), &zero);
                 for step in steps {
                     path.step(step);
                 }
@@ -194,7 +204,7 @@ impl RealPath {
         let radius_per_radian = Real::from(pitch) / &turn;
         let start = turn * Real::from(start_turn);
         let length = spiral_length(&radius_per_radian, &start, &mut self.functions);
-        self.push(Curve::Spiral { radius_per_radian, direction: Direction::Inward }, start, &length);
+        self.push(about_origin(radius_per_radian, Direction::Inward), start, &length);
     }
 
     /// Returns the inward spiral that ends at A, without length, both arcs, and the outward spiral that begins at B,
@@ -203,11 +213,7 @@ impl RealPath {
         let turn = self.functions.turn();
         let (radius_per_radian, radius) = (Real::from(pitch) / &turn, Real::from(turn_radius));
         let (theta, zero) = (&radius / &radius_per_radian, Real::from(0.0));
-        self.push(
-            Curve::Spiral { radius_per_radian: radius_per_radian.clone(), direction: Direction::Inward },
-            theta.clone(),
-            &zero,
-        );
+        self.push(about_origin(radius_per_radian.clone(), Direction::Inward), theta.clone(), &zero);
         // The tangent there is -(a e_r + R e_phi) / sqrt(a^2 + R^2).
         let to_radius = self.functions.atan(&theta);
         self.heading = &theta + &to_radius + turn / Real::from(2.0);
@@ -217,7 +223,7 @@ impl RealPath {
         let angle = Real::from(2.0) * to_radius;
         self.arc(Side::Right, &ratio * &second, &angle);
         self.arc(Side::Left, second, &angle);
-        self.push(Curve::Spiral { radius_per_radian, direction: Direction::Outward }, theta, &zero);
+        self.push(about_origin(radius_per_radian, Direction::Outward), theta, &zero);
     }
 
     /// Sets the start of travel `lead_in` metres before the end of the first segment and its end `lead_out` metres
@@ -245,7 +251,32 @@ impl RealPath {
                 let angle = self.functions.turn() * Real::from(turns);
                 self.arc(side, Real::from(radius), &angle);
             }
+            RouteStep::Spiral { side, direction, pitch, radius, turns } => {
+                let turn = self.functions.turn();
+                let first = &turn * Real::from(radius) / Real::from(pitch);
+                let around = &turn * Real::from(turns);
+                let last = if direction == Direction::Inward { &first - around } else { &first + around };
+                self.piece_of_spiral(side, direction, Real::from(pitch) / turn, first, &last);
+            }
         }
+    }
+
+    /// Adds the spiral between two polar angles. Its tangent has the angle phase + sense (theta + atan(theta) + pi).
+    fn piece_of_spiral(&mut self, side: Side, direction: Direction, radius_per_radian: Real, first: Real, last: &Real) {
+        let counter_clockwise = (side == Side::Left) == (direction == Direction::Outward);
+        let sense = Real::from(if counter_clockwise { 1.0 } else { -1.0 });
+        let half = self.functions.turn() / Real::from(2.0);
+        let [at_first, at_last] = [&first, last].map(|theta| &sense * (theta + self.functions.atan(theta) + &half));
+        let phase = &self.heading - at_first;
+        self.heading = &phase + at_last;
+        let about_origin = Curve::Spiral { centre: origin(), radius_per_radian, direction, phase, sense };
+        let from_centre = about_origin.place(first.clone(), &mut self.functions).point;
+        let Curve::Spiral { radius_per_radian, direction, phase, sense, .. } = about_origin else { return };
+        let [inner, outer] = if first < *last { [&first, last] } else { [last, &first] };
+        let length = spiral_length(&radius_per_radian, outer, &mut self.functions)
+            - spiral_length(&radius_per_radian, inner, &mut self.functions);
+        let centre = &self.end_point() - &from_centre;
+        self.push(Curve::Spiral { centre, radius_per_radian, direction, phase, sense }, first, &length);
     }
 
     fn arc(&mut self, side: Side, radius: Real, angle: &Real) {

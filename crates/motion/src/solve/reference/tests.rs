@@ -12,7 +12,9 @@ use super::*;
 use crate::model::Point;
 use crate::model::curve::Side;
 use crate::model::description::RouteStep;
+use crate::model::path::tests::any_spiral;
 use crate::model::path::{Param, Path};
+use crate::model::spiral::Direction;
 use crate::solve::newton::Newton;
 use crate::solve::{Chain, Velocities};
 
@@ -86,6 +88,71 @@ fn it_agrees_with_50_digits_on_the_turnaround() {
         println!("t = {time} s: {position:e} m, {speed:e}");
         assert!(position < 1e-13 && speed < 1e-13, "{time} s: {position:e} m, {speed:e}");
     }
+}
+
+/// The route of tests/truth/spiral_route.py: spirals inward and outward, to the left and to the right.
+fn spiral_route() -> PathDescription {
+    use Direction::{Inward, Outward};
+    use Side::{Left, Right};
+    let spiral = |side, direction, pitch, radius, turns| RouteStep::Spiral { side, direction, pitch, radius, turns };
+    let steps = vec![
+        RouteStep::Line { length: 15.0 },
+        spiral(Left, Inward, 1.7, 12.0, 4.0),
+        RouteStep::Arc { side: Right, radius: 2.6, turns: 0.45 },
+        spiral(Left, Outward, 1.3, 5.0, 1.5),
+        spiral(Right, Inward, 0.9, 4.5, 2.0),
+        RouteStep::Line { length: 6.0 },
+        spiral(Right, Outward, 2.1, 3.0, 1.25),
+        RouteStep::Line { length: 20.0 },
+    ];
+    PathDescription::Route { heading_turns: 0.0, steps }
+}
+
+#[test]
+fn it_agrees_with_50_digits_on_a_route_of_spirals() {
+    let rows = table(include_str!("../../../../../tests/truth/spiral_route.csv"));
+    let mut reference = Reference::new(team(25), &spiral_route(), 1.0).unwrap();
+    let errors = errors(&mut reference, &rows, 0.0);
+    assert_eq!(errors.len(), 10);
+    for (time, position, speed) in errors {
+        println!("t = {time} s: {position:e} m, {speed:e}");
+        assert!(position < 1e-14 && speed < 1e-14, "{time} s: {position:e} m, {speed:e}");
+    }
+}
+
+/// Thousands of roundings do not add up: the last points of a long route keep the promise.
+#[test]
+fn a_route_of_4096_pieces_keeps_its_digits() {
+    // Lengths and turns of 52 bits from a linear congruence.
+    let mut state = 1u64;
+    let mut share = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let sides = [Side::Left, Side::Right];
+    let mut step = |k: usize| match k % 8 {
+        0 => RouteStep::Line { length: 1.0 + 9.0 * share() },
+        7 => {
+            let (pitch, radius) = (0.5 + share(), 4.0 + 3.0 * share());
+            let direction = if k % 16 == 7 { Direction::Inward } else { Direction::Outward };
+            RouteStep::Spiral { side: sides[k / 16 % 2], direction, pitch, radius, turns: 0.1 + 0.2 * share() }
+        }
+        _ => RouteStep::Arc { side: sides[k % 2], radius: 3.0 + 5.0 * share(), turns: 0.05 + 0.2 * share() },
+    };
+    let steps = (0..4096).map(&mut step).collect();
+    let description = PathDescription::Route { heading_turns: 0.3, steps };
+    let path = description.path().unwrap();
+    let mut exact = path::RealPath::new(&description).unwrap();
+    let mut worst = 0f64;
+    for share in 1..=64 {
+        let travelled = path.length() * f64::from(share) / 64.0;
+        let point = path.point(path.param_at(travelled));
+        let truth = exact.place_at(&Real::from(travelled)).1.point;
+        let error = truth.x.split().error_of(point.x).hypot(truth.y.split().error_of(point.y));
+        worst = worst.max(error / (8.0 * f64::EPSILON * (point.coords.norm() + travelled)));
+    }
+    println!("{} m, {worst} of the promise", path.length());
+    assert!(path.length() > 15_000.0 && worst < 1.0, "{worst} of the promise");
 }
 
 /// Returns a decimal without rounding to a double: at most 20 significant digits.
@@ -351,6 +418,7 @@ fn any_step() -> impl Strategy<Value = RouteStep> {
     prop_oneof![
         (0.01..12.0).prop_map(|length| RouteStep::Line { length }),
         (side, 0.7..8.0, 0.01..0.6).prop_map(|(side, radius, turns)| RouteStep::Arc { side, radius, turns }),
+        any_spiral(),
     ]
 }
 

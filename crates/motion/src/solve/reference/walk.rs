@@ -34,7 +34,9 @@ pub(super) struct Walk<'a> {
     slope: Vector,
     /// Of the arc, with the sign of its curvature; of the spiral, per radian.
     radius: f64,
-    /// True if the handle is on this curve and the distance can shrink only after a fold.
+    /// 1 if the polar angle of a spiral grows counter-clockwise, else -1.
+    sense: f64,
+    /// True if the handle is on this curve, the path's first, and the distance can shrink only after a fold.
     folds: bool,
 }
 
@@ -46,14 +48,17 @@ impl<'a> Walk<'a> {
             Curve::Arc { radius, sense, .. } => (sense * radius).rounded(),
             Curve::Spiral { radius_per_radian, .. } => radius_per_radian.rounded(),
         };
+        let sense = if let Curve::Spiral { sense, .. } = &segment.curve { sense.rounded() } else { 1.0 };
+        let behind = segment.curve.forward() * (&place.at - &segment.first.at).rounded();
         Self {
             curve: &segment.curve,
             at: place.at.rounded(),
-            behind: if is_first { f64::INFINITY } else { (&place.at - &segment.first.at).rounded() },
+            behind: if is_first { f64::INFINITY } else { behind },
             offset: (&place.point - &front.point).rounded(),
             slope: place.slope.rounded(),
             radius,
-            folds: std::ptr::eq(place, front) && is_inward(&segment.curve),
+            sense,
+            folds: is_first && std::ptr::eq(place, front) && is_inward(&segment.curve),
         }
     }
 
@@ -115,9 +120,9 @@ impl<'a> Walk<'a> {
                 let d = if *direction == Direction::Inward { back } else { -back };
                 let (a, r) = (self.radius, self.radius * self.at);
                 let other = r + a * d;
-                // p' = (a + r J) e for p = r e, J the quarter turn to the left.
-                let e = (a * self.slope - r * left(self.slope)) / (a * a + r * r);
-                (a * d - other * versine) * e + other * d.sin() * left(e)
+                // p' = (a + r J) e for p = r e, J the quarter turn in which the polar angle grows.
+                let e = (a * self.slope - r * self.sense * left(self.slope)) / (a * a + r * r);
+                (a * d - other * versine) * e + other * d.sin() * self.sense * left(e)
             }
         };
         self.offset + displacement

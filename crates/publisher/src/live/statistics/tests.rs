@@ -203,7 +203,15 @@ fn the_thread_gives_each_sink_a_status_a_second_and_every_alert_in_order() {
         let Announcement::Alert { alert, .. } = announcement else { panic!("{announcement:?}") };
         announced.push(alert.tick);
     });
-    let run = Run { run_id: 11, rate: 30.0, scene: "paper", sinks: sinks.into(), announce, record: Box::new(|_| ()) };
+    let run = Run {
+        run_id: 11,
+        rate: 30.0,
+        scene: "paper",
+        sinks: sinks.into(),
+        announce,
+        record: Box::new(|_| ()),
+        alive: Box::new(|| ()),
+    };
     let summary = collect(&clock, inbox, run, &clock.stop);
 
     assert_eq!(summary.samples, 30);
@@ -241,7 +249,14 @@ fn what_was_pushed_before_the_end_is_collected() {
     reports.samples.push(sample(0, 0, 0)).unwrap();
     let done = Rc::new(AtomicBool::new(false));
     let sinks: Vec<Box<dyn StatusPublisher>> = vec![Box::new(LastMoment { reports, done: Rc::clone(&done) })];
-    let run =
-        Run { run_id: 11, rate: 30.0, scene: "paper", sinks, announce: Box::new(|_| ()), record: Box::new(|_| ()) };
+    let run = Run {
+        run_id: 11,
+        rate: 30.0,
+        scene: "paper",
+        sinks,
+        announce: Box::new(|_| ()),
+        record: Box::new(|_| ()),
+        alive: Box::new(|| ()),
+    };
     assert_eq!(collect(&clock, inbox, run, &done).samples, 2);
 }

@@ -97,7 +97,7 @@ proptest! {
         let options = LoopOptions { run_id: 1, rate: rate.hertz(), periods: Some(400) };
         let (samples, _received) = rtrb::RingBuffer::new(1024);
         let (announcements, _announced) = rtrb::RingBuffer::new(1);
-        let reports = Reports { samples, announcements };
+        let reports = Reports::new(samples, announcements);
         run_loop(&*clock, &mut frames, &mut CommandQueues::new(ports), &mut [], options, reports, &clock.stop).unwrap();
 
         prop_assert_eq!((frames.executed.len(), frames.waiting.len()), (sent, 0));

@@ -194,7 +194,7 @@ impl Setup {
         let (announcements, _lines) = rtrb::RingBuffer::new(1);
         let options = LoopOptions { run_id: 7, rate: playback.rate, periods: Some(self.periods) };
         let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(Failing(self.fails_at)), Box::new(publisher)];
-        let reports = Reports { samples, announcements };
+        let reports = Reports::new(samples, announcements);
         let mut doors = CommandQueues::new(vec![port]);
         let counts = run_loop(&clock, &mut frames, &mut doors, &mut publishers, options, reports, &clock.stop);
         let counts = counts.unwrap_or_else(|(counts, _)| counts);

@@ -1,0 +1,85 @@
+//! The layouts of earlier versions, told by the fields of a recording's types: a recording names no version.
+//!
+//! In: the type of a topic, as a recording describes it. Out: the name of its layout. Called by the
+//! [`reader`](super::reader), for the sentence that refuses a recording.
+
+use bench_dragon_ros2_messages::settings::Topic;
+
+/// The layouts of a topic's message, the newest first. Each has a field that the layout before it has not.
+const fn history(topic: Topic) -> &'static [(&'static str, &'static str)] {
+    match topic {
+        Topic::Stage => &[
+            ("Stage/6", "dragons"),
+            ("Stage/5", "scene_hash"),
+            ("Stage/4", "cue_list"),
+            ("Stage/3", "segments"),
+            ("Stage/2", "pieces"),
+            ("Stage/1", "pitch"),
+        ],
+        Topic::Handles => &[("FrameHeader/2", "epoch"), ("FrameHeader/1", "deadline_ns")],
+        Topic::Alerts => &[("CollisionAlert/2", "event_bench_a"), ("CollisionAlert/1", "time_to_event")],
+        Topic::Status => &[("LoopStatus/2", "unforeseen_contacts"), ("LoopStatus/1", "overruns")],
+        Topic::Cues => &[("Cue/1", "cue_time")],
+        _ => &[],
+    }
+}
+
+/// Returns the layouts of a topic's message: that of a recording with `fields`, `None` if no version had it, and this
+/// program's. Equal names are a layout of a later version.
+pub fn layouts(topic: Topic, fields: &[[String; 2]]) -> (Option<&'static str>, &'static str) {
+    let known = history(topic);
+    let found = known.iter().find(|(_, field)| fields.iter().any(|[_, name]| name == field));
+    let own = known.first().map_or("", |(layout, _)| layout);
+    (found.map(|(layout, _)| *layout).filter(|layout| *layout != own), own)
+}
+
+#[cfg(test)]
+mod tests {
+    use bench_dragon_client::layouts::names;
+    use bench_dragon_ros2_messages::{MessageType, fields};
+
+    use super::*;
+
+    const TOPICS: [Topic; 5] = [Topic::Stage, Topic::Handles, Topic::Alerts, Topic::Status, Topic::Cues];
+
+    fn found(topic: Topic, names: &str) -> Option<&'static str> {
+        let fields: Vec<_> = names.split(' ').map(|name| [String::new(), name.to_owned()]).collect();
+        layouts(topic, &fields).0
+    }
+
+    #[test]
+    fn the_newest_layouts_are_this_programs() {
+        for topic in TOPICS {
+            let (newest, field) = history(topic)[0];
+            assert!(names().contains(&format!("bench_dragon/{newest}").as_str()), "{newest} has a successor");
+            let name = MessageType::of(topic).ros_name().replace("/msg/", "/");
+            let own = &fields(&name, &MessageType::of(topic).schema())[&name];
+            assert!(own.iter().any(|[_, name]| name == field), "{newest} has no {field}");
+        }
+    }
+
+    /// The fields of the files in `msgs` of earlier versions.
+    #[test]
+    fn earlier_layouts_are_told_by_their_fields() {
+        let geometry = "header run_id stamp_ns pitch start_turn hole_inset head_length body_length width";
+        let events = "freeze_time benches segments events cues";
+        for (layout, rest) in [
+            ("Stage/5", &format!("{events} scene_hash path timeline cue_list") as &str),
+            ("Stage/4", &format!("{events} path timeline cue_list")),
+            ("Stage/3", "benches segments path"),
+            ("Stage/2", "benches pieces path"),
+            ("Stage/1", "benches reserved"),
+        ] {
+            assert_eq!(found(Topic::Stage, &format!("{geometry} {rest}")), Some(layout));
+        }
+        let frame =
+            "header run_id sequence tick stamp_ns sent_ns deadline_ns sim_time time_scale min_clearance handles";
+        assert_eq!(found(Topic::Handles, &format!("{frame} state poses")), Some("FrameHeader/1"));
+        let alert = "header run_id tick stamp_ns sim_time event_time time_to_event clearance x y level bench_a bench_b";
+        assert_eq!(found(Topic::Alerts, alert), Some("CollisionAlert/1"));
+        assert_eq!(found(Topic::Status, "header run_id rate measured_rate overruns skipped"), Some("LoopStatus/1"));
+        for topic in TOPICS {
+            assert_eq!(found(topic, "header nothing"), None);
+        }
+    }
+}

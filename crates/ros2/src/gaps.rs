@@ -1,0 +1,89 @@
+//! Old messages that a new subscriber of a transient-local topic must not get.
+//!
+//! RustDDS offers a new subscriber all messages that it keeps, whatever durability and depth the subscriber has, and has
+//! no call to withhold them. So this file sends a GAP submessage (RTPS 2.5, section 9.4.5.6) to the subscriber: these
+//! messages are not for it. RustDDS retransmits 5 ms after the subscriber has asked, and the subscriber accepts a GAP only
+//! when it knows the writer, so that the datagram is repeated for some time. If all come too late, the
+//! subscriber gets old messages first. Called by the matches.
+
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use rustdds::{DomainParticipant, GUID};
+
+use super::retransmission::{addressed, send};
+
+/// The time for a new subscriber to discover the writer, and the interval of the datagrams.
+const PATIENCE: Duration = Duration::from_secs(1);
+const INTERVAL: Duration = Duration::from_millis(1);
+/// The kind of the submessage, and its first flag.
+const GAP: u8 = 0x08;
+const LITTLE_ENDIAN: u8 = 1;
+
+/// The messages of a writer that a new reader must not get.
+pub(super) struct OldMessages {
+    reader: GUID,
+    datagram: Vec<u8>,
+    addresses: Vec<SocketAddr>,
+    since: Instant,
+    sent: Option<Instant>,
+}
+
+impl OldMessages {
+    /// Withholds the first `last` messages of `writer` from `reader`.
+    pub(super) fn of(participant: &DomainParticipant, writer: GUID, reader: GUID, last: u32) -> Option<Self> {
+        let mut readers = participant.discovered_readers().into_iter();
+        let data = readers.find(|data| data.reader_proxy.remote_reader_guid == reader)?;
+        let locators = data.reader_proxy.unicast_locator_list.into_iter().filter(|locator| locator.is_udp());
+        let addresses = locators.map(SocketAddr::from).collect();
+        let datagram = datagram(writer.to_bytes(), reader.to_bytes(), last);
+        (last > 0).then(|| Self { reader, datagram, addresses, since: Instant::now(), sent: None })
+    }
+
+    /// Returns the reader.
+    pub(super) fn reader(&self) -> GUID {
+        self.reader
+    }
+
+    /// Sends the datagram if it is due. Returns true if it must be sent again.
+    pub(super) fn serve(&mut self) -> bool {
+        if self.sent.is_some_and(|sent| sent.elapsed() < INTERVAL) {
+            return true;
+        }
+        self.sent = Some(Instant::now());
+        send(&self.datagram, self.addresses.iter().copied());
+        self.since.elapsed() < PATIENCE
+    }
+}
+
+/// Returns the message of `writer` to `reader`: its messages 1 to `last`, at least 1, are not for it.
+fn datagram(writer: [u8; 16], reader: [u8; 16], last: u32) -> Vec<u8> {
+    let (mut bytes, [writer, reader]) = addressed(writer, reader);
+    bytes.extend([GAP, LITTLE_ENDIAN, 32, 0]);
+    bytes.extend([reader, writer].concat());
+    // The start (high, low), the end, and a set of one number: the end.
+    for word in [0, 1, 0, last, 1, 1 << 31] {
+        bytes.extend(u32::to_le_bytes(word));
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The bytes as RTPS 2.5 lays them out, written down by hand.
+    #[test]
+    fn the_datagram_is_that_of_the_standard() {
+        let writer = [1, 18, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 21, 3];
+        let reader = [1, 15, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 0, 0, 22, 4];
+        #[rustfmt::skip]
+        let expected = [
+            b'R', b'T', b'P', b'S', 2, 4, 1, 18, 1, 18, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12,
+            0x0e, 1, 12, 0, 1, 15, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42,
+            0x08, 1, 32, 0, 0, 0, 22, 4, 0, 0, 21, 3, 0, 0, 0, 0, 1, 0, 0, 0,
+            0, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 128,
+        ];
+        assert_eq!(datagram(writer, reader, 7), expected);
+    }
+}
