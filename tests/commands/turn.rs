@@ -54,7 +54,6 @@ fn a_wrong_question_is_refused_in_one_sentence() {
         ("turnaround", "--arc-ratio=nan", "--arc-ratio is NaN, expected"),
         ("turnaround", "--arc-ratio=1e9", "--arc-ratio is 1000000000, expected"),
         ("procession", "--arc-ratio=1", "the scene's path is a route, which has no pitch"),
-        ("square", "--arc-ratio=1", "`plan` knows no obstacles"),
         ("crossing", "--arc-ratio=1", "the scene has several dragons"),
     ];
     for (scene, argument, expected) in cases {

@@ -1,4 +1,5 @@
-//! A placed show, rotated and mirrored: PosiStageNet as pypsn decodes it, OSC as python-osc does, and its log. The expected places are those of the scene without a placement, by the formula.
+//! A placed show, rotated and mirrored: PosiStageNet as pypsn decodes it, OSC as python-osc does, and its log. The
+//! expected places are those of the scene without a placement, by the formula.
 
 use bench_dragon::motion::Method;
 use bench_dragon::motion::solve::{Chain, Velocities};

@@ -74,8 +74,9 @@ const FIRST_INTERVAL: f64 = 1e-3;
 const GROWTH: f64 = 1.5;
 const SHRINK: f64 = 0.5;
 
-/// Width below which other events are tried, and its factor after such a trial.
-const OTHERS_BELOW: f64 = 1e-6;
+/// Greatest width below which other events are tried beside the same one, and the share of the width after such a trial
+/// below which they are tried again.
+const OTHERS_BELOW: f64 = 1e-4;
 const OTHERS_AGAIN: f64 = 0.1;
 
 /// Share of a radius within which a better ratio must be better, and the steps of the ratio's logarithm.
@@ -193,20 +194,18 @@ impl Blocked<'_> {
     fn extend(&mut self, progress: &mut dyn FnMut(f64)) {
         let longest = self.family.team.longest_link();
         let mut width = FIRST_INTERVAL;
-        // Width below which other events are tried beside the same one.
         let mut others_below = OTHERS_BELOW;
         while self.intervals < MOST_INTERVALS && self.radius < Accepted::LENGTH.greatest {
             if !self.holds(width) {
                 let same = self.family.follow(self.radius, &self.witness);
-                let next = self.widest(same, width, LEAST_INTERVAL);
-                let slow = next.is_none_or(|next| next < others_below);
-                // The event may have gone or be about to go, and another one remain a little further on.
-                let other = slow.then(|| {
-                    others_below = OTHERS_AGAIN * next.unwrap_or(others_below);
+                let mut next = self.widest(same, width, LEAST_INTERVAL);
+                if next.is_none_or(|next| next < others_below) {
+                    // The event may have gone or be about to go, and another one remain further on.
                     let others = self.family.events(self.radius + WIDTH);
-                    self.widest(others, FIRST_INTERVAL, next.unwrap_or(0.0).max(WIDTH))
-                });
-                let Some(next) = other.flatten().or(next) else { break };
+                    next = self.widest(others, FIRST_INTERVAL, next.unwrap_or(0.0).max(WIDTH)).or(next);
+                    others_below = OTHERS_BELOW.min(OTHERS_AGAIN * next.unwrap_or(0.0));
+                }
+                let Some(next) = next else { break };
                 width = next;
             }
             self.radius += width;
