@@ -37,13 +37,10 @@ fn the_least_turn_of_a_third_ratio_is_that_of_another_search() {
     if !can_run(python_modules(&["math"])) {
         return;
     }
-    // The last two are known from elsewhere.
-    for (ratio, radius) in [("1.5", RADIUS), ("1", 2.834_249_482_15), ("2", 4.269_997_21)] {
-        let peer = python().args(["tests/python/least_turn.py", "1.7", "2.86", ratio]).output().unwrap();
-        let printed = text(&peer.stdout);
-        let found: f64 = printed.split(' ').next().unwrap().parse().unwrap();
-        assert!((found - radius).abs() < 5e-9, "ratio {ratio}: {printed}{}", text(&peer.stderr));
-    }
+    let peer = python().args(["tests/python/least_turn.py", "1.7", "2.86", "1.5"]).output().unwrap();
+    let printed = text(&peer.stdout);
+    let found = printed.split(' ').next().and_then(|radius| radius.parse::<f64>().ok());
+    assert!((found.unwrap_or(f64::NAN) - RADIUS).abs() < 5e-9, "{printed}{}", text(&peer.stderr));
 }
 
 #[test]

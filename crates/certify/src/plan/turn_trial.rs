@@ -43,7 +43,7 @@ const WINDOW: f64 = 0.3;
 /// Greatest multiple of the depth of a fold by which the end of its stretch is beyond the other handle, the number of
 /// halvings that are tried, and the share of the depth that remains at the end.
 const BEYOND: f64 = 2.0;
-const BEYOND_TRIALS: i32 = 15;
+const BEYOND_TRIALS: i32 = 8;
 const REMAINS: f64 = 0.5;
 
 /// Greatest depth of a fold, in multiples of the metres by which its end is further than the link.
@@ -277,8 +277,9 @@ impl Folded {
         // The distance may fall again beyond.
         let places = (0..BEYOND_TRIALS).map(|power| other + forward * BEYOND * product.abs() * 0.5f64.powi(power));
         let places = places.filter(|place| product >= 0.0 || product_at(*place) < REMAINS * product);
-        let end = places.max_by(|one, other| distance(*one).total_cmp(&distance(*other)))?;
-        let room = ROOM * (distance(end) - link);
+        let distances = places.map(|place| (place, distance(place)));
+        let (end, furthest) = distances.max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let room = ROOM * (furthest - link);
         let merit = if product < 0.0 { product.max(-room) } else { product };
         Some(Self { end: path.param_at(end), merit })
     }
