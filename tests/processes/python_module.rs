@@ -65,7 +65,8 @@ fn a_route_of_4096_pieces_is_one_message() {
     let mut run = program("pieces_4096");
     let publisher = Process::start(run.arg("--scene").arg(&file).args(["run", "--json", "--duration", "300"]));
     let mut peer = python();
-    let output = Process::start(peer.args(["-c", STAGE_OF_A_LONG_ROUTE, &unique("pieces_4096")])).output_within(240);
+    peer.env("PYTHONPATH", "packaging/python").args(["-c", STAGE_OF_A_LONG_ROUTE, &unique("pieces_4096")]);
+    let output = Process::start(&mut peer).output_within(240);
     let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
     assert_eq!((found["segments"].as_u64(), found["lines"].as_u64()), (Some(4096), Some(2048)), "{found}");
     assert!(found["gap"].as_f64().unwrap() < 1e-9, "{found}");
@@ -116,7 +117,7 @@ fn the_last_handle_of_each_of_two_dragons_has_the_heading_of_its_last_bench() {
     run.args(["--scene", "config/coil.toml", "run", "--start", "100", "--rate", "10", "--duration", "300"]);
     let publisher = Process::start(&mut run);
     let mut reading = python();
-    reading.args(["-c", LAST_HEADINGS_OF_TWO, &unique("python_headings")]);
+    reading.env("PYTHONPATH", "packaging/python").args(["-c", LAST_HEADINGS_OF_TWO, &unique("python_headings")]);
     let output = Process::start(&mut reading).output_within(240);
     let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
     let [without, with] = [0, 1].map(|reader| found["errors"][reader].as_f64().unwrap());
