@@ -10,7 +10,7 @@ use bench_dragon::certify::plan::{
     least_pitch,
 };
 use bench_dragon::certify::speed::MOST_HANDLES;
-use bench_dragon::show::scene::Accepted;
+use bench_dragon::show::scene::{Accepted, Scene};
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
@@ -93,6 +93,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let scene = text.parse()?;
+    warn_of_obstacles(&scene);
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let found = if let Some(file) = file {
@@ -200,6 +201,13 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
         )
     })?;
     output.finish()
+}
+
+/// Warns that the obstacles of a scene change nothing.
+fn warn_of_obstacles(scene: &Scene) {
+    if !scene.ground().is_empty() {
+        log::warn!("the plan leaves out the obstacles of the scene: it is about boards alone");
+    }
 }
 
 impl From<PlanError> for CommandError {

@@ -183,6 +183,7 @@ fn plans_are_those_without_obstacles() {
     let plain = plain.args(arguments).output().unwrap();
     let planned = run(&staged, &arguments);
     assert!(planned.status.success() && planned.stdout == plain.stdout, "{planned:?} {plain:?}");
+    assert!(text(&planned.stderr).contains("leaves out the obstacles"), "{planned:?}");
     assert!(run(&staged, &["plan", "speed", "--max-handle-speed=2"]).status.success());
 }
 

@@ -29,6 +29,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
     let scene: Scene = common.scene_text()?.parse()?;
+    super::warn_of_obstacles(&scene);
     let Some(pitch) = scene.motion.description().pitch() else {
         let sentence =
             "the scene's path is a route, which has no pitch: expected path.kind \"spiral\" or \"turnaround\"";
