@@ -144,7 +144,7 @@ fn compared(text: &str, samples: u32) -> (usize, usize) {
 
 #[test]
 fn the_least_clearances_of_the_square_are_enclosed_to_a_nanometre() {
-    let text = std::fs::read_to_string("config/square.toml").unwrap();
+    let text = std::fs::read_to_string("tests/compute/ground.toml").unwrap();
     assert_eq!(compared(&text, 400), (5, 5));
     // Shows that end at an obstacle, also at one that is no further than its outline.
     let blocked = text.replace("center = [4.0, 3.5]", "center = [4.0, 2.9]");

@@ -263,7 +263,10 @@ impl<'a, 'w> Descent<'a, 'w> {
         self.latest = match event.kind {
             EventKind::PathEnd => self.end,
             // The certificate ends by a time that is rounded down. A place after it would show nothing.
-            _ => self.end * (1.0 - BEFORE_TIME) - GRID * f64::EPSILON * (1.0 + path.length()),
+            _ => {
+                let last = self.chain.exact.travelled(self.grid_point(self.end).head).lo.min(self.end);
+                last * (1.0 - BEFORE_TIME) - GRID * f64::EPSILON * (1.0 + path.length())
+            }
         };
         let is_at_start = event.travelled == 0.0;
         self.begin_beside(obstacles, is_at_start);
