@@ -245,14 +245,21 @@ fn describe(motion: &Motion, placement: Option<&Placement>, output: &mut Output)
         team.hole_inset
     ))?;
     output.line(&format!("  Path: {}; the head moves at {} m/s.", path(motion), motion.head_speed()))?;
-    let Some(placement) = placement else { return Ok(()) };
-    let (origin, turns) = (placement.origin(), number(placement.rotation_turns()));
-    let mirrored = if placement.is_mirrored() { "mirrored, then " } else { "" };
-    output.line(&format!(
-        "  Placement: the path's coordinates {mirrored}turned by {turns} turns, then moved by ({}, {}) m.",
-        number(origin.x),
-        number(origin.y)
-    ))
+    match placement.and_then(placed) {
+        Some(sentence) => output.line(&format!("  {sentence}")),
+        None => Ok(()),
+    }
+}
+
+/// Returns a sentence for people on a placement, without the parts that change nothing; `None` if none does.
+fn placed(placement: &Placement) -> Option<String> {
+    let (origin, turns) = (placement.origin(), placement.rotation_turns());
+    let mirrored = placement.is_mirrored().then(|| "mirrored".to_owned());
+    let turned = (turns != 0.0).then(|| format!("turned by {} turns", number(turns)));
+    let is_moved = (origin.x, origin.y) != (0.0, 0.0);
+    let moved = is_moved.then(|| format!("moved by ({}, {}) m", number(origin.x), number(origin.y)));
+    let parts: Vec<String> = [mirrored, turned, moved].into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("Placement: the path's coordinates {}.", parts.join(", then ")))
 }
 
 /// A line of `check --json`: the least clearance of two boards.

@@ -126,7 +126,9 @@ fn an_ended_command_leaves_nothing() {
     let file = folder.path().join("proof.jsonl");
     std::fs::write(&file, "earlier").unwrap();
     for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGKILL] {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        // The tests may have been started where a signal is ignored.
+        let mut program = Command::new("env");
+        program.args(["--default-signal=INT,TERM", env!("CARGO_BIN_EXE_bench-dragon")]);
         // Its proof would take minutes.
         program.args(["--scene", "tests/scenes/x5.toml", "events", "--certify"]).arg(&file);
         let child = Process::start(&mut program);

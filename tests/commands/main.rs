@@ -12,3 +12,4 @@ mod harness;
 mod packages;
 mod placement;
 mod swept;
+mod turn;

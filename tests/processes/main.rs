@@ -13,6 +13,7 @@ mod live;
 mod log;
 mod metrics;
 mod outputs_of_dragons;
+mod placed;
 mod python_module;
 mod readers;
 mod record;

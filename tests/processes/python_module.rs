@@ -65,7 +65,8 @@ fn a_route_of_4096_pieces_is_one_message() {
     let mut run = program("pieces_4096");
     let publisher = Process::start(run.arg("--scene").arg(&file).args(["run", "--json", "--duration", "300"]));
     let mut peer = python();
-    let output = Process::start(peer.args(["-c", STAGE_OF_A_LONG_ROUTE, &unique("pieces_4096")])).output_within(240);
+    peer.env("PYTHONPATH", "packaging/python").args(["-c", STAGE_OF_A_LONG_ROUTE, &unique("pieces_4096")]);
+    let output = Process::start(&mut peer).output_within(240);
     let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
     assert_eq!((found["segments"].as_u64(), found["lines"].as_u64()), (Some(4096), Some(2048)), "{found}");
     assert!(found["gap"].as_f64().unwrap() < 1e-9, "{found}");
@@ -83,4 +84,45 @@ fn its_type_hints_are_strict() {
     mypy.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/packaging/python"));
     let output = Process::start(mypy.args(["-m", "mypy", "--cache-dir", "/dev/null"])).output_within(300);
     assert!(output.status.success(), "{}", text(&output.stdout));
+}
+
+/// Prints the greatest difference between the heading of a dragon's last handle and the direction of its last bench, for
+/// a reader without the stage and for one with it, half-way between two frames.
+const LAST_HEADINGS_OF_TWO: &str = "
+import json, math, sys
+from bench_dragon import HermiteReader, subscribe
+feed, readers, stage, before = subscribe(sys.argv[1], seconds=120), [HermiteReader(), HermiteReader()], None, None
+for frame in feed:
+    stage = stage or feed.stage()
+    for reader in readers:
+        reader.push(frame.header, frame.handles)
+    if stage and before is not None:
+        break
+    before = frame.header.deadline_ns
+readers[1].set_stage(stage[0])
+tails = [dragon.first_handle + dragon.benches for dragon in stage[0].dragons]
+def error(reader, tail):
+    _, handles = reader.at((before + frame.header.deadline_ns) // 2)
+    front, rear = handles[tail - 1], handles[tail]
+    return abs(math.sin(rear['heading'] - math.atan2(front['y'] - rear['y'], front['x'] - rear['x'])))
+print(json.dumps({'tails': tails, 'errors': [max(error(reader, tail) for tail in tails) for reader in readers]}))
+";
+
+#[test]
+fn the_last_handle_of_each_of_two_dragons_has_the_heading_of_its_last_bench() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let mut run = program("python_headings");
+    run.args(["--scene", "config/coil.toml", "run", "--start", "100", "--rate", "10", "--duration", "300"]);
+    let publisher = Process::start(&mut run);
+    let mut reading = python();
+    reading.env("PYTHONPATH", "packaging/python").args(["-c", LAST_HEADINGS_OF_TWO, &unique("python_headings")]);
+    let output = Process::start(&mut reading).output_within(240);
+    let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
+    let [without, with] = [0, 1].map(|reader| found["errors"][reader].as_f64().unwrap());
+    assert_eq!(found["tails"], serde_json::json!([60, 121]));
+    assert!(without > 0.1 && with < 1e-12, "{found}");
+    publisher.signal(SIGINT);
+    assert!(publisher.output_within(60).status.success());
 }

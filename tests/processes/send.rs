@@ -16,16 +16,16 @@ use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 
 /// A solver with which the publisher starts at once, even if the program is not optimised.
-const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
+pub const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
 /// Deadline of every wait, seconds.
-const DEADLINE: u64 = 120;
+pub const DEADLINE: u64 = 120;
 
 fn publisher(name: &str, arguments: &[&str]) -> Process {
     let scene = scene_file(name, &[NEWTON, ("[publish]", "[publish]\nqueue = 64")]);
     Process::start(program(name).arg("--scene").arg(scene).args(["run", "--json"]).args(arguments))
 }
 
-fn free_port() -> u16 {
+pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
@@ -196,7 +196,7 @@ fn a_desk_is_told_when_the_publisher_dies_and_when_it_is_back() {
 }
 
 /// Returns the messages with an address among the output of a peer.
-fn heard<'a>(messages: &'a [Value], address: &'a str) -> impl Iterator<Item = &'a Value> {
+pub fn heard<'a>(messages: &'a [Value], address: &'a str) -> impl Iterator<Item = &'a Value> {
     messages.iter().filter(move |message| message["address"] == address).map(|message| &message["arguments"])
 }
 

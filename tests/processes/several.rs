@@ -99,7 +99,6 @@ fn what_knows_one_dragon_refuses_several_with_one_sentence() {
     let file = folder.path().join("certificate");
     let file = file.to_str().unwrap();
     for arguments in [
-        vec!["events", "--certify", file],
         vec!["check", "--prove"],
         vec!["plan", "pitch", "--reach-radius", "4.5"],
         vec!["plan", "speed", "--max-handle-speed", "2"],

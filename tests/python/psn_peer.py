@@ -1,7 +1,7 @@
 """A lighting desk that checks its input: PosiStageNet as PyPI's pypsn decodes it, compared with the shared memory.
 
     psn_peer.py --name NAME... --port P [--group 236.10.10.10] [--axes x,up,y] [--first-id N] [--id-step N] [--npm FOLDER]
-                [--progress]
+                [--progress] [--samples]
 
 Listens to UDP port P and subscribes to the publishers NAME, the first of which must be running. Ends when no packet has
 come for two seconds after the first. The numbers of a frame's trackers, STEP apart, tell their publisher. Every frame
@@ -9,7 +9,8 @@ must decode completely. Each is compared, every tracker, to float32, with the fr
 same head. Prints a line when it listens, and one with the counts. With --npm, the decoder of that folder (npm's
 @jwetzell/posistagenet) gets the same packets and must decode the same. With --progress, prints a line five times a
 second. It has for each publisher the number of times its trackers have `stopped`, and the number of frames since then
-that were `equal`, judged by the head's place.
+that were `equal`, judged by the head's place. With --samples, the counts come with every 20th frame that was equal: its
+simulated time, and position, speed and orientation of every tracker.
 """
 
 import argparse
@@ -76,7 +77,11 @@ class Memory(threading.Thread):
                 self.missed += 0 if last is None else header.sequence - last - 1
                 last, heard = header.sequence, time.monotonic()
                 sample.delete()
-                self.frames[np.float32([handles["x"][0], handles["y"][0]]).tobytes()] = (handles, header.time_scale)
+                self.frames[np.float32([handles["x"][0], handles["y"][0]]).tobytes()] = (
+                    handles,
+                    header.time_scale,
+                    header.sim_time,
+                )
             # A publisher that has ended: its service is closed, so that the next publisher can create it again.
             if last is not None and time.monotonic() - heard > 0.5:
                 port = service = None
@@ -123,7 +128,7 @@ def hold_against(trackers, memory, axes, first_id):
     key = head_key(trackers[0].pos, axes)
     if key not in memory.frames:
         return "unknown"
-    compare(trackers, *memory.frames[key], axes, first_id)
+    compare(trackers, *memory.frames[key][:2], axes, first_id)
     return "equal"
 
 
@@ -196,6 +201,7 @@ def main():
     parser.add_argument("--id-step", type=int, default=1000)
     parser.add_argument("--npm")
     parser.add_argument("--progress", action="store_true")
+    parser.add_argument("--samples", action="store_true")
     arguments = parser.parse_args()
 
     memories = [Memory(name) for name in arguments.name]
@@ -243,7 +249,7 @@ def main():
     # npm's decoder reads a frame with the number 0 as a frame without a number.
     assert all(later == sooner % 255 + 1 for sooner, later in zip(ids, ids[1:])), "none is lost"
 
-    seen = [{"equal": 0, "unknown": 0, "stopped": 0, "changes": []} for _ in memories]
+    samples, seen = [], [{"equal": 0, "unknown": 0, "stopped": 0, "changes": []} for _ in memories]
     for _, trackers in frames:
         for place, (memory, counts) in enumerate(zip(memories, seen)):
             first = arguments.first_id + place * arguments.id_step
@@ -251,6 +257,10 @@ def main():
             what = hold_against(part, memory, arguments.axes, first) if part else "absent"
             if what != "absent":
                 counts[what] += 1
+            if what == "equal" and arguments.samples and counts[what] % 20 == 0:
+                sim_time = memory.frames[head_key(part[0].pos, arguments.axes)][2]
+                fields = [[tuple(one.pos), tuple(one.speed), tuple(one.ori)] for one in part]
+                samples.append({"sim_time": sim_time, "trackers": fields})
             state = "moving" if what in ("equal", "unknown") else what
             if counts["changes"][-1:] != [state]:
                 counts["changes"].append(state)
@@ -274,6 +284,7 @@ def main():
                 "names": names,
                 "publishers": seen,
                 "systems": sorted(systems),
+                "samples": samples,
             }
         )
     )

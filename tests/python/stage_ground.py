@@ -15,7 +15,7 @@ from stage_transport import command
 
 SQUARE = "config/square.toml"
 # Of that scene, in metres.
-WELL, KERB, WELL_KEEP_OUT = (-4.0, 0.0), 1.6, 1.5
+WELL, KERB, WELL_KEEP_OUT = (-3.9, 0.1), 1.6, 1.5
 SPECTATORS, SPECTATORS_KEEP_OUT = numpy.array([[-9.0, 12.0], [9.0, 12.0]]), 1.5
 BOUNDARY = numpy.array([[-20, 15], [20, 15], [20, -15], [-12.5, -15]], float)
 

@@ -114,8 +114,9 @@ def loops_are_not_joined():
 
 
 # A reader of three handles at (cubic in t, parabola in t), frames a second apart; its results at times in ms.
-READ = """async ([frames, moments]) => {
+READ = """async ([frames, moments, stage]) => {
     const { HermiteReader } = await import("/hermite.js"), reader = new HermiteReader(8);
+    if (stage) reader.setStage(stage);
     const empty = reader.at(0);
     for (const frame of frames) reader.push({ ...frame, handles: Float64Array.from(frame.handles.map((n) => n ?? NaN)) });
     return [empty, moments.map((moment) => { const { time, handles } = reader.at(moment); return [time, [...handles]]; })];
@@ -135,8 +136,8 @@ def interpolation_keeps_its_rules():
     with server() as url, browser() as (page, complaints):
         page.goto(url)
 
-        def at(frames, *moments):
-            empty, read = page.evaluate(READ, [frames, moments])
+        def at(frames, *moments, stage=None):
+            empty, read = page.evaluate(READ, [frames, moments, stage])
             assert empty is None, "something is shown before the first frame"
             return [(moment, numpy.array(handles, float).reshape(3, 5)) for moment, handles in read]
 
@@ -164,6 +165,12 @@ def interpolation_keeps_its_rules():
         for later in (frame(1, epoch=1), frame(1, epoch=1, time=0.5)):
             for moment, handles in at([frame(0), later], 400, 999):
                 assert moment == 0 and numpy.array_equal(handles[:, :2], place(0)), "something lies between two epochs"
+        # Two dragons, of one bench and of none: the second handle has the heading of the bench before it.
+        dragons = [{"first_handle": 0, "benches": 1}, {"first_handle": 2, "benches": 0}]
+        steep = [{**frame(t), "handles": [0, 0, 9, 0, 0, t, 1, 9, 1, 0, 5, 1, 9, 0, 0]} for t in (0, 1)]
+        for run, heading in (("1", math.atan2(-1, -0.5)), ("2", math.pi)):
+            ((_, handles),) = at(steep, 500, stage={"run_id": run, "dragons": dragons})
+            assert math.isclose(handles[1, 2], heading), f"the heading of a dragon's last handle is {handles[1, 2]}"
         # Frames of another run are dropped.
         ((moment, _),) = at([frame(0), frame(1, run="2")], 400)
         assert moment == 1, "a frame of another run is shown"

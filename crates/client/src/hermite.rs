@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 
 use bench_dragon_messages::state::PlaybackState;
-use bench_dragon_messages::{FrameHeader, HandlePose};
+use bench_dragon_messages::{FrameHeader, HandlePose, Stage};
 
 /// A frame that is kept.
 #[derive(Debug, Clone, Default)]
@@ -58,13 +58,24 @@ impl Snapshot {
 pub struct HermiteReader {
     frames: VecDeque<Snapshot>,
     keep: usize,
+    /// The run of the stage, and the last handle of each of its dragons.
+    stage_run: u64,
+    tails: Vec<usize>,
 }
 
 impl HermiteReader {
     /// Creates a reader that keeps the latest `keep` frames, at least two. A display that runs `d` seconds behind a
     /// stream of `r` frames per second needs d r + 2.
     pub fn new(keep: usize) -> Self {
-        Self { frames: VecDeque::with_capacity(keep.max(2)), keep: keep.max(2) }
+        Self { frames: VecDeque::with_capacity(keep.max(2)), keep: keep.max(2), stage_run: 0, tails: Vec::new() }
+    }
+
+    /// Sets the dragons of a run: the last handle of each has the heading of its last bench. Without the stage of its
+    /// run, a frame is of one dragon.
+    pub fn set_stage(&mut self, stage: &Stage) {
+        self.stage_run = stage.run_id;
+        self.tails.clear();
+        self.tails.extend(stage.dragons.iter().map(|dragon| dragon.first_handle as usize + dragon.benches as usize));
     }
 
     /// Adds the next frame of a stream, and drops the frames of another run. A frame of another machine has a
@@ -109,13 +120,16 @@ impl HermiteReader {
                 // The rate in force holds until the next frame; the end of the show may come earlier.
                 let time = (from + before.header.time_scale * elapsed_ns as f64 * 1e-9).min(to);
                 interpolate(before, next, to - from, (time - from) / (to - from), handles);
+                let tails = if before.header.run_id == self.stage_run { self.tails.as_slice() } else { &[] };
+                set_headings(handles, tails);
                 Some(time)
             }
         }
     }
 }
 
-/// Appends the handles at the share `u` of the way, `length` simulated seconds, from one frame to the next.
+/// Appends the positions and rates of the handles at the share `u` of the way, `length` simulated seconds, from one
+/// frame to the next.
 fn interpolate(from: &Snapshot, to: &Snapshot, length: f64, u: f64, handles: &mut Vec<HandlePose>) {
     let ends = (!from.stands_still(), !to.stands_still());
     for (a, b) in from.handles.iter().zip(&to.handles) {
@@ -123,12 +137,20 @@ fn interpolate(from: &Snapshot, to: &Snapshot, length: f64, u: f64, handles: &mu
         let (y, vy) = coordinate([a.y, b.y], [a.vy, b.vy], ends, length, u);
         handles.push(HandlePose { x, y, heading: a.heading, vx, vy });
     }
+}
+
+/// Sets every heading to that of the bench behind the handle; at the `tails` and at the last handle, to that of the
+/// bench before.
+fn set_headings(handles: &mut [HandlePose], tails: &[usize]) {
     for bench in 1..handles.len() {
         let (front, rear) = (handles[bench - 1], handles[bench]);
         handles[bench - 1].heading = (front.y - rear.y).atan2(front.x - rear.x);
     }
-    if let [.., leader, last] = handles.as_mut_slice() {
-        last.heading = leader.heading;
+    for tail in tails.iter().copied().chain([handles.len().saturating_sub(1)]) {
+        // A damaged stage may name any number.
+        if let Some([leader, last]) = tail.checked_sub(1).and_then(|leader| handles.get_mut(leader..=tail)) {
+            last.heading = leader.heading;
+        }
     }
 }
 
@@ -164,7 +186,7 @@ mod tests {
     use super::*;
     use bench_dragon_motion::Method;
     use bench_dragon_motion::solve::{Chain, Velocities};
-    use bench_dragon_show::convert::{Stamps, frame_header, handle_pose};
+    use bench_dragon_show::convert::{OnStage, Stamps, frame_header, handle_pose, stage};
     use bench_dragon_show::scene::{AtEnd, Scene};
     use bench_dragon_show::{Playback, Show};
 
@@ -183,7 +205,10 @@ mod tests {
     /// A reader that has taken the first frames of a show, which freezes at the contact.
     fn reader(playback: Playback, frames: u64) -> HermiteReader {
         let scene = scene();
-        let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap();
+        reader_of(&mut Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap(), playback, frames)
+    }
+
+    fn reader_of(show: &mut Show, playback: Playback, frames: u64) -> HermiteReader {
         let mut reader = HermiteReader::new(frames as usize);
         for tick in 0..frames {
             let frame = show.frame(tick);
@@ -268,6 +293,27 @@ mod tests {
                 prop_assert!((x - value(u * h)).abs() < 1e-11 && (v - rate(u * h)).abs() < 1e-11);
             }
         }
+    }
+
+    #[test]
+    fn the_last_handle_of_each_of_two_dragons_has_the_heading_that_the_solver_gives() {
+        let scene = Scene::parse_any(include_str!("../../../config/coil.toml"), "coil.toml", "coil").unwrap();
+        let playback = Playback { start: 100.0, rate: 10.0, ..Playback::of(&scene) };
+        let mut show = Show::new(&scene, scene.timeline_without_contact(), playback).unwrap();
+        let mut reader = reader_of(&mut show, playback, 2);
+        let (mut chain, mut handles) = (Chain::new(122), Vec::new());
+        scene.solver().solve(100.05, &mut chain).unwrap();
+        let mut worst = |reader: &HermiteReader| {
+            reader.at(START_NS + 50_000_000, &mut handles).unwrap();
+            let error = |(pose, truth): (&HandlePose, &f64)| (pose.heading - truth).sin().abs();
+            handles.iter().zip(&chain.heading).map(error).fold(0.0, f64::max)
+        };
+        // Without the stage, and with that of another run, the last handle of gold is turned toward the head of jade.
+        assert!(worst(&reader) > 0.1);
+        reader.set_stage(&stage(2, 0, [0; 32], OnStage::from(&scene), &show).stage);
+        assert!(worst(&reader) > 0.1);
+        reader.set_stage(&stage(1, 0, [0; 32], OnStage::from(&scene), &show).stage);
+        assert!(worst(&reader) < 1e-7, "{}", worst(&reader));
     }
 
     #[test]

@@ -98,7 +98,7 @@ impl Drawing<'_> {
                 continue;
             }
             let colours = (0..=COLOURS).map(|colour| key_times.sample(colour * key_times.steps() / COLOURS));
-            let colours: Vec<String> = match dragons.colour(bench, palette) {
+            let colours: Vec<String> = match dragons.colour(bench) {
                 Some(colour) => vec![colour.to_owned()],
                 None => colours.map(|sample| self.fill(samples[sample].1.speed[bench], palette)).collect(),
             };

@@ -2,7 +2,7 @@
 
 use super::benches;
 use super::camera::StageBox;
-use super::palette::{Palette, SERIES};
+use super::palette::colours_of;
 use bench_dragon_messages::Roster;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble};
@@ -12,6 +12,8 @@ use bench_dragon_motion::solve::Chain;
 /// The dragons of a picture, in the order of their handles.
 pub struct Dragons<'a> {
     drawn: Vec<Drawn<'a>>,
+    /// The colour of each dragon, if there are several.
+    colours: Vec<&'static str>,
     /// The names of benches.
     pub roster: Roster,
 }
@@ -29,7 +31,7 @@ pub struct Drawn<'a> {
 impl<'a> Dragons<'a> {
     /// Creates the only dragon of a picture.
     pub fn one(motion: &'a Motion) -> Self {
-        Self { drawn: vec![Drawn { name: "", first: 0, motion }], roster: motion.roster() }
+        Self { drawn: vec![Drawn { name: "", first: 0, motion }], colours: Vec::new(), roster: motion.roster() }
     }
 
     /// Creates the dragons of a show of several.
@@ -39,8 +41,9 @@ impl<'a> Dragons<'a> {
             first: ensemble.handles_of(k).start,
             motion: &dragon.motion,
         };
-        let drawn = ensemble.dragons().iter().enumerate().map(drawn).collect();
-        Self { drawn, roster: ensemble.roster() }
+        let drawn: Vec<Drawn> = ensemble.dragons().iter().enumerate().map(drawn).collect();
+        let names: Vec<&str> = drawn.iter().map(|of| of.name).collect();
+        Self { colours: colours_of(&names), drawn, roster: ensemble.roster() }
     }
 
     /// Returns the dragons.
@@ -98,10 +101,8 @@ impl<'a> Dragons<'a> {
     }
 
     /// Returns the colour of a bench's dragon, if there are several.
-    pub fn colour(&self, bench: usize, palette: &Palette) -> Option<&'static str> {
-        let (light, dark) = SERIES[self.owner(bench).0 % SERIES.len()];
-        let is_light = palette.ground == super::palette::LIGHT.ground;
-        self.are_several().then_some(if is_light { light } else { dark })
+    pub fn colour(&self, bench: usize) -> Option<&'static str> {
+        self.colours.get(self.owner(bench).0).copied()
     }
 
     /// Returns the name of a bench in the picture: for heads, tails, and touching benches if they are few.

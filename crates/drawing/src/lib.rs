@@ -163,7 +163,7 @@ impl<'a> Drawing<'a> {
         for of in self.dragons.all() {
             stage = stage.add(self.path(of, palette));
         }
-        let fill = |bench: usize| match self.dragons.colour(bench, palette) {
+        let fill = |bench: usize| match self.dragons.colour(bench) {
             Some(colour) => colour.to_owned(),
             None => self.fill(chain.speed[bench], palette),
         };

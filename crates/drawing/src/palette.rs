@@ -77,6 +77,44 @@ pub const SERIES: [(&str, &str); 7] = [
     ("#505050", "#b0b0b0"),
 ];
 
+/// The colours of several dragons, in the order of the page's identities: each is visible on a light and on a dark
+/// ground. The page has 16 identities, of which the last six repeat colours with other dashes.
+const DRAGONS: [&str; 16] = [
+    "#1f6fb5", "#c4560a", "#0b8560", "#a8478c", "#8a6a00", "#6c58d0", "#1b8296", "#c9525c", "#5f7a1e", "#757980",
+    "#1f6fb5", "#c4560a", "#0b8560", "#a8478c", "#8a6a00", "#6c58d0",
+];
+
+/// Names of dragons that are colours, with their places in [`DRAGONS`].
+const NAMED: [(&str, usize); 14] = [
+    ("blue", 0),
+    ("orange", 1),
+    ("jade", 2),
+    ("green", 2),
+    ("pink", 3),
+    ("gold", 4),
+    ("yellow", 4),
+    ("violet", 5),
+    ("purple", 5),
+    ("teal", 6),
+    ("red", 7),
+    ("lime", 8),
+    ("silver", 9),
+    ("white", 9),
+];
+
+/// Returns the colours of dragons with these names, as on the page: a name that is a colour has that colour, the others
+/// have the first that are free.
+pub fn colours_of(names: &[&str]) -> Vec<&'static str> {
+    let mut places: Vec<Option<usize>> = Vec::with_capacity(names.len());
+    for name in names {
+        let own = NAMED.iter().find(|(named, _)| named == name).map(|(_, place)| *place);
+        places.push(own.filter(|own| !places.contains(&Some(*own))));
+    }
+    let mut free = (0..DRAGONS.len()).cycle().filter(|place| !places.contains(&Some(*place)));
+    // At most ten colours have names, so that some are always free.
+    places.iter().map(|place| DRAGONS[place.or_else(|| free.next()).unwrap_or(0)]).collect()
+}
+
 impl Palette {
     /// Returns the colours with the names of their variables in the style sheet.
     pub fn named(&self) -> [(&'static str, &'static str); 11] {

@@ -81,9 +81,11 @@ pub fn alert_sentence(alert: &CollisionAlert, stage: &Stage, figures: Figures) -
     if sentence.contains("bench ") { format!("{sentence} (counting from 1)") } else { sentence }
 }
 
-/// Returns a state that no alert reports, as a sentence; `None` if an alert reports it or nothing has happened.
-pub fn state_sentence(state: FrameState) -> Option<&'static str> {
+/// Returns a state that no alert reports, as a sentence; `None` if an alert reports it or nothing has happened. A show
+/// of several dragons is at the end of its paths when all are.
+pub fn state_sentence(state: FrameState, stage: &Stage) -> Option<&'static str> {
     match state {
+        FrameState::PathEnd if stage.dragons.len() > 1 => Some("all heads have reached the ends of their paths"),
         FrameState::PathEnd => Some("the head has reached the end of the path"),
         _ => None,
     }
@@ -103,6 +105,9 @@ fn happening(alert: &CollisionAlert, kind: EventKind, stage: &Stage) -> String {
         }
         EventKind::Lock => {
             format!("{who} locked, its rear handle at {place}, t = {time:.6} s: the motion cannot continue")
+        }
+        EventKind::PathEnd if stage.dragons.len() > 1 => {
+            format!("all heads reached the ends of their paths, t = {time:.6} s")
         }
         EventKind::PathEnd => format!("the head reached the end of the path, t = {time:.6} s"),
     }
@@ -261,6 +266,16 @@ mod tests {
             ),
             "{sentence}"
         );
+    }
+
+    #[test]
+    fn the_heads_of_several_reach_the_ends_of_their_paths() {
+        let dragon = StageDragon { benches: 3, ..StageDragon::default() };
+        let two = Stage { dragons: List::of([dragon; 2]), ..Stage::default() };
+        let sentence = |stage| state_sentence(FrameState::PathEnd, stage).unwrap();
+        assert_eq!(sentence(&two), "all heads have reached the ends of their paths");
+        assert_eq!(sentence(&team(3)), "the head has reached the end of the path");
+        assert_eq!(state_sentence(FrameState::Contact, &two), None);
     }
 
     #[test]

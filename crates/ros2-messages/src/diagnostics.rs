@@ -5,9 +5,9 @@ use serde::Serialize;
 use super::{HasStamp, Header, Time, level_of};
 use crate::settings::DiagnosticLimits;
 use bench_dragon_messages::chase::{ChaseSource, ChaseState};
-use bench_dragon_messages::sentence::chase_sentence;
+use bench_dragon_messages::sentence::{chase_sentence, name_in, obstacle_name};
 use bench_dragon_messages::state::{EventKind, Severity};
-use bench_dragon_messages::{ChaseStatus, CollisionAlert, LoopStatus};
+use bench_dragon_messages::{ChaseStatus, CollisionAlert, LoopStatus, Stage};
 
 /// diagnostic_msgs/KeyValue.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -100,8 +100,14 @@ impl LoopSecond<'_> {
 }
 
 impl DiagnosticArray {
-    /// Creates the diagnostics of the loop and of the dragon for the last second.
-    pub fn of(name: &str, status: &LoopStatus, alert: Option<&CollisionAlert>, second: &LoopSecond) -> Self {
+    /// Creates the diagnostics of the loop and of the dragons of a stage for the last second.
+    pub fn of(
+        name: &str,
+        status: &LoopStatus,
+        stage: &Stage,
+        alert: Option<&CollisionAlert>,
+        second: &LoopSecond,
+    ) -> Self {
         let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
         let level = level_of(alert);
         let (loop_level, message) = second.level(status);
@@ -128,9 +134,10 @@ impl DiagnosticArray {
         if let Some(alert) = alert {
             values.push(value("clearance (m)", format!("{:.4}", alert.clearance)));
             values.push(value("time to event (s)", format!("{:.3}", alert.event_time - status.sim_time)));
-            values.push(value("nearest benches (from 0)", listed(alert.nearest_benches())));
+            let from = if stage.dragons.len() > 1 { 1 } else { 0 };
+            values.push(value(&format!("nearest benches (from {from})"), listed(alert.nearest_benches(), stage)));
             values.push(value("event", alert.event_kind().map_or("none", EventKind::name).to_owned()));
-            values.push(value("event benches (from 0)", listed(alert.event_benches())));
+            values.push(value(&format!("event benches (from {from})"), listed(alert.event_benches(), stage)));
         }
         let dragon = DiagnosticStatus {
             level: match level.severity() {
@@ -185,20 +192,27 @@ impl HasStamp for DiagnosticArray {
     }
 }
 
-/// Returns the benches in a list, or "none".
-fn listed(benches: impl Iterator<Item = u32>) -> String {
-    let names: Vec<_> = benches.map(|bench| bench.to_string()).collect();
+/// Returns benches and obstacles in a list, or "none". Benches of one dragon are numbers from 0; those of several have
+/// their names, which count from 1 within their dragon.
+fn listed(numbers: impl Iterator<Item = u32>, stage: &Stage) -> String {
+    let listed = |number: u32| {
+        let is_named = stage.dragons.len() > 1 || obstacle_name(stage, number).is_some();
+        if is_named { name_in(stage, number) } else { number.to_string() }
+    };
+    let names: Vec<_> = numbers.map(listed).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::state::FrameState;
+    use bench_dragon_messages::{List, SceneName, StageDragon, StageObstacle};
 
     fn level(before: LoopStatus, now: LoopStatus, limits: DiagnosticLimits, discarded: [u64; 2]) -> (u8, String) {
         let [discarded_before, discarded] = discarded;
         let second = LoopSecond { before: &before, discarded, discarded_before, limits };
-        let [the_loop, _] = DiagnosticArray::of("d", &now, None, &second).status.try_into().unwrap();
+        let [the_loop, _] = DiagnosticArray::of("d", &now, &Stage::default(), None, &second).status.try_into().unwrap();
         (the_loop.level, the_loop.message)
     }
 
@@ -231,6 +245,50 @@ mod tests {
     }
 
     #[test]
+    fn benches_of_several_dragons_and_obstacles_have_their_names() {
+        let told = |dragons: &[(&str, u32)], alert: CollisionAlert| {
+            let mut first_handle = 0;
+            let dragons = dragons.iter().map(|&(name, benches)| {
+                let dragon =
+                    StageDragon { first_handle, benches, name: SceneName::new(name), ..StageDragon::default() };
+                first_handle += benches + 1;
+                dragon
+            });
+            let well = StageObstacle { name: SceneName::new("well"), ..StageObstacle::default() };
+            let stage = Stage { dragons: List::of(dragons), obstacles: List::of([well]), ..Stage::default() };
+            let status = LoopStatus::default();
+            let limits = DiagnosticLimits::default();
+            let second = LoopSecond { before: &status, discarded: 0, discarded_before: 0, limits };
+            let [_, dragon] =
+                DiagnosticArray::of("d", &status, &stage, Some(&alert), &second).status.try_into().unwrap();
+            let benches = dragon.values.into_iter().filter(|value| value.key.contains("benches"));
+            benches.map(|value| (value.key, value.value)).collect::<Vec<_>>()
+        };
+        let pairs = |nearest: [&str; 2], event: [&str; 2]| {
+            [nearest, event].map(|[key, value]| (key.to_owned(), value.to_owned())).to_vec()
+        };
+        let alert = CollisionAlert {
+            bench_a: 8,
+            bench_b: 21,
+            event: FrameState::Contact as u32,
+            event_bench_a: 0,
+            event_bench_b: 34,
+            ..CollisionAlert::default()
+        };
+        assert_eq!(
+            told(&[("gold", 20), ("jade", 12)], alert),
+            pairs(
+                ["nearest benches (from 1)", "bench 9 of gold, bench 1 (the head) of jade"],
+                ["event benches (from 1)", "bench 1 (the head) of gold, the well"]
+            )
+        );
+        assert_eq!(
+            told(&[("", 33)], alert),
+            pairs(["nearest benches (from 0)", "8, 21"], ["event benches (from 0)", "0, the well"])
+        );
+    }
+
+    #[test]
     fn a_chase_is_judged_by_its_state_and_its_silence() {
         let told = |state: ChaseState, age_ns: u64| {
             let now = LoopStatus { stamp_ns: 9_000_000_000, ..LoopStatus::default() };
@@ -244,7 +302,7 @@ mod tests {
             };
             let second =
                 LoopSecond { before: &now, discarded: 0, discarded_before: 0, limits: DiagnosticLimits::default() };
-            let array = DiagnosticArray::of("d", &now, None, &second).with_chase("d", &now, &chase);
+            let array = DiagnosticArray::of("d", &now, &Stage::default(), None, &second).with_chase("d", &now, &chase);
             let [_, _, chase] = array.status.try_into().unwrap();
             assert_eq!(chase.name, "d: chase");
             let value = |key: &str| chase.values.iter().find(|of| of.key == key).map(|of| of.value.clone());

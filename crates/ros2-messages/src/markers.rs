@@ -333,7 +333,7 @@ fn named(alert: &CollisionAlert, happened: bool) -> Vec<(u32, Severity)> {
 
 /// Returns the sentence about an alert at the time of a frame, or about a state without an alert.
 fn words(frame: &FrameHeader, stage: &Stage, alert: Option<&CollisionAlert>) -> Option<String> {
-    let state = FrameState::ALL.get(frame.state as usize).and_then(|state| state_sentence(*state));
+    let state = FrameState::ALL.get(frame.state as usize).and_then(|state| state_sentence(*state, stage));
     let of = |alert: &CollisionAlert| {
         // Alerts come once a second, frames more often.
         let now = CollisionAlert { time_to_event: alert.event_time - frame.sim_time, ..*alert };

@@ -203,7 +203,8 @@ impl Topics {
             let (before, discarded_before) = std::mem::replace(&mut self.diagnosed, (*status, self.discarded));
             let (discarded, limits) = (self.discarded, self.limits);
             let second = LoopSecond { before: &before, discarded, discarded_before, limits };
-            let message = DiagnosticArray::of(&self.name, status, self.latest_alert.as_ref(), &second);
+            let (stage, alert) = (&self.stage.stage, self.latest_alert.as_ref());
+            let message = DiagnosticArray::of(&self.name, status, stage, alert, &second);
             let message = match &self.latest_chase {
                 Some(chase) => message.with_chase(&self.name, status, chase),
                 None => message,
@@ -273,7 +274,7 @@ mod tests {
         let stage = StageMessage { stage, segments: Vec::new() };
         // iceoryx2 takes no longer name.
         let name = "n".repeat(255);
-        let diagnostics = DiagnosticArray::of(&name, &worst, Some(&alert), &second);
+        let diagnostics = DiagnosticArray::of(&name, &worst, &stage.stage, Some(&alert), &second);
         let diagnostics =
             diagnostics.with_chase(&name, &worst, &ChaseStatus { frame_rate: 2, ..ChaseStatus::default() });
         let events = [

@@ -1,6 +1,7 @@
 """The place of every handle at the time of display: cubic Hermite interpolation between frames, with numpy alone.
 
     reader = HermiteReader()
+    reader.set_stage(feed.stage()[0])            # for a show of several dragons, whenever a stage comes
     reader.push(frame.header, frame.handles)     # for every frame, as it comes
     time, handles = reader.at(monotonic_ns)      # at any time: simulated seconds and a structured array
 
@@ -41,6 +42,16 @@ class HermiteReader:
     def __init__(self, keep: int = 64) -> None:
         """Keeps the latest `keep` frames: a display that runs d seconds behind r frames a second needs d r + 2."""
         self._frames: collections.deque[KeptFrame] = collections.deque(maxlen=max(keep, 2))
+        self._stage_run: int | None = None
+        self._tails: list[int] = []
+
+    def set_stage(self, stage: Any) -> None:
+        """Sets the dragons of a run: the last handle of each has the heading of its last bench.
+
+        `stage` is a `Stage`. Without the stage of its run, a frame is of one dragon.
+        """
+        self._stage_run = stage.run_id
+        self._tails = [dragon.first_handle + dragon.benches for dragon in stage.dragons]
 
     def push(self, header: Any, handles: Handles, arrival_ns: int | None = None) -> None:
         """Adds a copy of the next frame. Frames of another run are dropped.
@@ -81,7 +92,8 @@ class HermiteReader:
             handles[rate] = slope / length
         dx, dy = (handles[axis][:-1] - handles[axis][1:] for axis in "xy")
         handles["heading"][:-1] = np.arctan2(dy, dx)
-        handles["heading"][-1] = handles["heading"][-2]
+        for tail in [*(self._tails if a.run_id == self._stage_run else ()), len(handles) - 1]:
+            handles["heading"][tail] = handles["heading"][tail - 1]
         return moment, handles
 
 

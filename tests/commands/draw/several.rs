@@ -1,6 +1,7 @@
 //! Pictures of several dragons: every look has the boards of all, and the ends of each.
 
 use super::*;
+use bench_dragon::drawing::palette::colours_of;
 
 /// The handles of `config/coil.toml`: those of gold, then those of jade.
 const HANDLES: [usize; 2] = [61, 61];
@@ -17,6 +18,39 @@ fn drawn_numbers(svg: &Document) -> Vec<usize> {
     let mut numbers: Vec<usize> = ids.map(|number| number.parse().unwrap()).collect();
     numbers.sort_unstable();
     numbers
+}
+
+/// Returns the page's list of identities, and its names of colours with their places.
+fn page_identities() -> (Vec<&'static str>, Vec<(&'static str, usize)>) {
+    let page = include_str!("../../../crates/outputs/src/view/palette.js");
+    let list = page.split_once("const IDENTITIES = [").unwrap().1.split_once("].map").unwrap().0;
+    let colours = list.split("colour: \"").skip(1).map(|rest| &rest[..7]).collect();
+    let named = page.split_once("const NAMED = {").unwrap().1.split_once('}').unwrap().0;
+    let pairs = named.split(',').filter_map(|pair| pair.trim().split_once(": "));
+    (colours, pairs.map(|(name, place)| (name, place.parse().unwrap())).collect())
+}
+
+#[test]
+fn a_dragon_has_the_colour_of_the_page() {
+    let (identities, named) = page_identities();
+    assert_eq!((identities.len(), named.len()), (16, 14));
+    for (name, place) in &named {
+        assert_eq!(colours_of(&[name, "other"])[0], identities[*place], "{name}");
+    }
+    // The others have the first free places; a second name of one colour is one of them.
+    let expected: Vec<&str> = [2, 0, 1, 4, 3].map(|place| identities[place]).to_vec();
+    assert_eq!(colours_of(&["jade", "east", "green", "gold", "west"]), expected);
+    let many: Vec<String> = (0..16).map(|number| format!("dragon{number}")).collect();
+    assert_eq!(colours_of(&many.iter().map(String::as_str).collect::<Vec<_>>()), identities);
+    for theme in ["light", "dark"] {
+        let svg = answer(&["--scene", &scene_file("coil"), "draw", "--at", "200", "--theme", theme]);
+        let svg = Document::parse(&svg).unwrap();
+        for (bench, place) in [(3, 4), (64, 2)] {
+            let fill =
+                with_id(&svg, &format!("bench-{bench}")).unwrap().ancestors().find_map(|node| node.attribute("fill"));
+            assert_eq!(fill, Some(identities[place]), "bench {bench} in {theme}");
+        }
+    }
 }
 
 /// The boards of the plan are those of `solve`; the others are those of the plan.

@@ -75,7 +75,7 @@ fn arguments_of_ros_that_cannot_be_honoured_are_refused_in_a_sentence() {
     for (arguments, expected) in [
         (&["run", "--ros2", "--ros-args", "-p", "use_sim_time:=true"][..], "publish.ros2.topics"),
         (&["run", "--ros2", "--ros-args", "-r", "poses:=/other"], "-r poses:=/other is not understood"),
-        (&["run", "--ros2", "--ros-args", "--params-file", "x.yaml"], "expected -r __ns:=/NAMESPACE"),
+        (&["run", "--ros2", "--ros-args", "--params-file", "x.yaml"], "expected a file of parameters (YAML)"),
         (&["run", "--ros2", "--ros-args", "-p", "rate:=0"], "--rate is 0"),
         (&["run", "--ros2", "--ros-args", "-r", "__node:=2nd"], "2nd"),
         (&["watch", "--ros-args", "-r", "__node:=gold"], "run and replay"),

@@ -61,6 +61,9 @@ const WIDTH: f64 = 9e-9;
 /// the proof needs a greater distance from the lock.
 const FURTHER: [f64; 6] = [1.0, 4.0, 16.0, 64.0, 256.0, 4096.0];
 
+/// Number of benches with which a radius is tried first.
+const FEW: usize = 4;
+
 /// Limit of intervals of radii.
 const MOST_INTERVALS: u64 = 200_000;
 
@@ -70,6 +73,11 @@ const LEAST_INTERVAL: f64 = 1e-11;
 const FIRST_INTERVAL: f64 = 1e-3;
 const GROWTH: f64 = 1.5;
 const SHRINK: f64 = 0.5;
+
+/// Greatest width below which other events are tried beside the same one, and the share of the width after such a trial
+/// below which they are tried again.
+const OTHERS_BELOW: f64 = 1e-4;
+const OTHERS_AGAIN: f64 = 0.1;
 
 /// Share of a radius within which a better ratio must be better, and the steps of the ratio's logarithm.
 const BETTER: f64 = 1e-7;
@@ -124,7 +132,13 @@ pub fn least_turn(
     (found.value, found.length) = (Some(upper), Some(family.length(upper)));
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
-        let Some(passage) = Passage::new(team, (pitch, family.arc_ratio), upper) else { break };
+        let passage = |team: &Team| Passage::new(team, (pitch, family.arc_ratio), upper);
+        // The first benches fail as soon as the whole team does, at less cost.
+        let few = Team { benches: team.benches.min(FEW), ..*team };
+        if !passage(&few).is_some_and(|passage| passage.is_free(&few, &mut |_| ())) {
+            continue;
+        }
+        let Some(passage) = passage(team) else { break };
         if passage.is_free(team, &mut |share| progress(0.5 + 0.5 * share)) {
             found.value_hi = Some(upper);
             found.leads = Some([passage.lead_in, passage.lead_out]);
@@ -180,14 +194,17 @@ impl Blocked<'_> {
     fn extend(&mut self, progress: &mut dyn FnMut(f64)) {
         let longest = self.family.team.longest_link();
         let mut width = FIRST_INTERVAL;
+        let mut others_below = OTHERS_BELOW;
         while self.intervals < MOST_INTERVALS && self.radius < Accepted::LENGTH.greatest {
             if !self.holds(width) {
                 let same = self.family.follow(self.radius, &self.witness);
-                let next = self.widest(same, width, LEAST_INTERVAL).or_else(|| {
-                    // The event may have gone, and another one remain a little further on.
+                let mut next = self.widest(same, width, LEAST_INTERVAL);
+                if next.is_none_or(|next| next < others_below) {
+                    // The event may have gone or be about to go, and another one remain further on.
                     let others = self.family.events(self.radius + WIDTH);
-                    self.widest(others, FIRST_INTERVAL, WIDTH)
-                });
+                    next = self.widest(others, FIRST_INTERVAL, next.unwrap_or(0.0).max(WIDTH)).or(next);
+                    others_below = OTHERS_BELOW.min(OTHERS_AGAIN * next.unwrap_or(0.0));
+                }
                 let Some(next) = next else { break };
                 width = next;
             }

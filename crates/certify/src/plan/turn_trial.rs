@@ -1,5 +1,5 @@
-//! Events of a team on turnarounds of one pitch and arc ratio, found by the ordinary search, which samples. They suggest
-//! to the proofs of [`crate::turn`] where to search.
+//! Events of a team on turnarounds of one pitch and arc ratio, found by the ordinary search, which samples. They
+//! suggest to the proofs of [`crate::turn`] where to search.
 
 use crate::grid::{param, place};
 use crate::path::Place;
@@ -40,10 +40,14 @@ const STEPS: u32 = 64;
 /// Distance from the last contact, in links, within which the same two boards are followed.
 const WINDOW: f64 = 0.3;
 
-/// Greatest share of the depth of a fold by which the end of its stretch is beyond the other handle, and the number of
-/// halvings that are tried.
-const BEYOND: f64 = 0.25;
-const BEYOND_TRIALS: i32 = 12;
+/// Greatest multiple of the depth of a fold by which the end of its stretch is beyond the other handle, the number of
+/// halvings that are tried, and the share of the depth that remains at the end.
+const BEYOND: f64 = 2.0;
+const BEYOND_TRIALS: i32 = 8;
+const REMAINS: f64 = 0.5;
+
+/// Greatest depth of a fold, in multiples of the metres by which its end is further than the link.
+const ROOM: f64 = 4.0;
 
 /// The turnarounds of a team with one pitch and one ratio of the arcs.
 #[derive(Debug, Clone, Copy)]
@@ -170,15 +174,19 @@ impl Family<'_> {
         let (from, by) = (path.travelled(coarse.1), 0.5 * (path.travelled(coarse.1) - near).abs());
         let (_, finer) = golden_section_min(|travelled| depth(at(travelled)), from - by, from + by);
         let junctions = [1, 2].map(|segment| Param::new(segment, Coordinate { high: BESIDE_JUNCTION, low: 0.0 }));
-        let junctions = junctions.into_iter().filter(|junction| (path.travelled(*junction) - near).abs() < reach);
-        let (merit, pivot) = junctions.chain([at(finer)]).fold(coarse, better);
-        // The ends of the S move as the radius grows: a pivot keeps off them.
+        let near_junctions = junctions.into_iter().filter(|junction| (path.travelled(*junction) - near).abs() < reach);
+        let (merit, pivot) = near_junctions.chain([at(finer)]).fold(coarse, better);
+        // The ends of the S and of its first arc move as the radius grows: a pivot keeps off them.
         let aside = ASIDE * merit.abs();
-        let beside = [0.0, self.length(radius)].into_iter().find(|end| (path.travelled(pivot) - end).abs() < aside);
-        let (merit, pivot) = beside.map_or((merit, pivot), |end| {
+        let is_beside = |place: f64| (path.travelled(pivot) - place).abs() < aside;
+        let (merit, pivot) = if is_beside(path.travelled(junctions[1])) {
+            (depth(junctions[1]), junctions[1])
+        } else if let Some(end) = [0.0, self.length(radius)].into_iter().find(|end| is_beside(*end)) {
             let [before, after] = [at(end - aside), at(end + aside)];
             better((depth(before), before), after)
-        });
+        } else {
+            (merit, pivot)
+        };
         let end = folded(pivot)?.end;
         (merit < 0.0).then(|| Witness::Fold { kind, link, pivot: place(pivot), end: place(end) })
     }
@@ -258,16 +266,20 @@ impl Folded {
             let from = path.travelled(pivot);
             let reached = |metres: f64| distance(from + metres) >= link;
             let step = link / f64::from(STEPS);
-            let first = (1..64 * STEPS).map(|k| step * f64::from(k)).find(|metres| reached(*metres))?;
+            // No chord is longer than its path.
+            let first = (STEPS..64 * STEPS).map(|k| step * f64::from(k)).find(|metres| reached(*metres))?;
             (from + bisect_predicate(reached, first - step, first), 1.0)
         } else {
             (path.travelled(follower(path, pivot, link).ok()?), -1.0)
         };
-        let product = forward * tangent.dot(&(path.point(path.param_at(other)) - point));
+        let product_at = |travelled: f64| forward * tangent.dot(&(path.point(path.param_at(travelled)) - point));
+        let product = product_at(other);
         // The distance may fall again beyond.
         let places = (0..BEYOND_TRIALS).map(|power| other + forward * BEYOND * product.abs() * 0.5f64.powi(power));
-        let end = places.max_by(|one, other| distance(*one).total_cmp(&distance(*other)))?;
-        let room = (distance(end) - link) / BEYOND;
+        let places = places.filter(|place| product >= 0.0 || product_at(*place) < REMAINS * product);
+        let distances = places.map(|place| (place, distance(place)));
+        let (end, furthest) = distances.max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let room = ROOM * (furthest - link);
         let merit = if product < 0.0 { product.max(-room) } else { product };
         Some(Self { end: path.param_at(end), merit })
     }

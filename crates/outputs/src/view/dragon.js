@@ -78,9 +78,6 @@ export class Dragon {
     const from = STRIDE * this.first, to = this.isOnly ? all.length : from + STRIDE * (this.stage.benches + 1);
     if (this.frame?.of !== newest) this.frame = { ...newest, of: newest, handles: newest.handles.subarray(from, to) };
     if (this.places?.buffer !== all.buffer) this.places = all.subarray(from, to);
-    const { length } = this.places;
-    // Its last handle has the heading of its last bench, whichever dragon follows.
-    if (length > STRIDE) this.places[length - STRIDE + 2] = this.places[length - 2 * STRIDE + 2];
     this.colours.take(this.frame);
     this.measure();
   }

@@ -32,6 +32,15 @@ export class HermiteReader {
     this.keep = Math.max(2, keep);
     /** @type {Frame[]} */
     this.frames = [];
+    this.stage = null;
+  }
+
+  /**
+   * Sets the `stage` message of a run: the last handle of each of its dragons has the heading of its last bench.
+   * Without the stage of its run, a frame is of one dragon.
+   */
+  setStage(stage) {
+    this.stage = stage;
   }
 
   /** Adds the next frame of a stream, and drops the frames of another run. */
@@ -74,6 +83,7 @@ export class HermiteReader {
     }
     const time = timeBetween(from, next, moment), length = next.time - from.time;
     interpolate(from, next, length, (time - from.time) / length, handles);
+    setHeadings(handles, this.stage?.run_id === from.run ? this.stage.dragons : []);
     return { time, handles, from, to: next };
   }
 }
@@ -92,18 +102,23 @@ function timeBetween(from, to, moment) {
   return Math.max(from.time, to.time - (to.scale * (to.due - moment)) / 1000);
 }
 
-/** Fills `handles` at the share `u` of the way, `length` simulated seconds, from one frame to the next. */
+/** Fills in positions and rates at the share `u` of the way, `length` simulated seconds, from one frame to the next. */
 function interpolate(from, to, length, u, handles) {
   const count = handles.length;
   for (let k = 0; k < count; k += STRIDE) {
     coordinate(from, to, k, length, u, handles);
     coordinate(from, to, k + 1, length, u, handles);
   }
+}
+
+/** Sets every heading to that of the bench behind; of the last handle of each dragon, to that of the bench before. */
+function setHeadings(handles, dragons) {
+  const count = handles.length;
   for (let k = STRIDE; k < count; k += STRIDE) {
     handles[k - STRIDE + 2] = Math.atan2(handles[k - STRIDE + 1] - handles[k + 1], handles[k - STRIDE] - handles[k]);
   }
-  // The last handle has the heading of the last bench.
-  handles[count - STRIDE + 2] = handles[count - 2 * STRIDE + 2];
+  for (const tail of [...dragons.map((dragon) => dragon.first_handle + dragon.benches), count / STRIDE - 1])
+    handles[STRIDE * tail + 2] = handles[STRIDE * (tail - 1) + 2];
 }
 
 /**

@@ -110,6 +110,7 @@ export class Publisher {
     this.state = this.sight.state;
     this.struck = false;
     if (!this.isThere) return false;
+    playback.reader.setStage(stage);
     this.shown = playback.at(now, this.places);
     this.places = this.shown.handles;
     const isOther = this.run !== newest.run && this.begin(stage, newest);

@@ -75,7 +75,8 @@ pub(super) fn stage(
         proved: Option<&'a [ProvedEvent]>,
         states: [Value; FrameState::ALL.len()],
     }
-    let (stage, states) = (StageObject::from(stage), FrameState::ALL.map(state));
+    let states = FrameState::ALL.map(|of| state(of, &stage.stage));
+    let stage = StageObject::from(stage);
     json!(StageMessage { r#type: "stage", publisher, scene, stage, proved, states }).to_string()
 }
 
@@ -108,9 +109,9 @@ pub(super) fn chase(status: &ChaseStatus) -> String {
 }
 
 /// The facts about a state, so that a page can show states that it does not know.
-fn state(state: FrameState) -> Value {
+fn state(state: FrameState, stage: &Stage) -> Value {
     json!({"name": state.name(), "severity": state.severity().name(), "happened": state.event().is_some(),
-        "sentence": state_sentence(state)})
+        "sentence": state_sentence(state, stage)})
 }
 
 /// Returns an alert with its severity and its sentence, with the names of `stage`; the page shows the figures

@@ -340,7 +340,7 @@ export function sentenceOf(state, alert, stage) {
     if (state.sentence) return `${capital(state.sentence)}.`;
     return state.severity === "ok" || alert?.level !== state.name ? "" : `${capital(alert.sentence)}.`;
   }
-  if (state.sentence) return "龙头已到达路径终点。";
+  if (state.sentence) return stage.dragons.length > 1 ? "所有龙头都已到达各自路径的终点。" : "龙头已到达路径终点。";
   if (state.severity === "ok" || alert.level !== state.name) return "";
   const ends = (bench, count) => (bench === 0 ? "（龙头）" : bench === count - 1 ? "（龙尾）" : "");
   const name = (number) => benchIn(stage, number, (bench, count) => `第 ${bench + 1} 节板凳${ends(bench, count)}`);

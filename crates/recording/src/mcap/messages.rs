@@ -100,14 +100,21 @@ impl Messages {
         self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
     }
 
-    /// Fills the messages of a status. The diagnostics compare it with the status `before`, by the default limits: the
-    /// limits of the scene are in no message.
-    pub fn status(&mut self, sequence: u32, status: &LoopStatus, alert: Option<&CollisionAlert>, before: &LoopStatus) {
+    /// Fills the messages of a status, with the current stage and alert. The diagnostics compare it with the status
+    /// `before`, by the default limits: the limits of the scene are in no message.
+    pub fn status(
+        &mut self,
+        sequence: u32,
+        status: &LoopStatus,
+        (stage, alert): (Option<&Stage>, Option<&CollisionAlert>),
+        before: &LoopStatus,
+    ) {
         self.batch.clear();
         self.batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(*status));
         let limits = DiagnosticLimits::default();
         let second = LoopSecond { before, discarded: 0, discarded_before: 0, limits };
-        let message = DiagnosticArray::of(&self.name, status, alert, &second);
+        let unknown = Stage::default();
+        let message = DiagnosticArray::of(&self.name, status, stage.unwrap_or(&unknown), alert, &second);
         self.batch.push(Topic::Diagnostics, status.stamp_ns, sequence, &message);
     }
 }

@@ -320,7 +320,8 @@ impl Recorder {
             Event::Status(status) => {
                 run.status = Some(status);
                 let before = run.diagnosed.replace(status).unwrap_or(status);
-                self.messages.status(sequence, &status, run.alert.as_ref(), &before);
+                let stage = run.stage.as_deref().map(|message| &message.stage);
+                self.messages.status(sequence, &status, (stage, run.alert.as_ref()), &before);
             }
             Event::Scene { .. } => return Ok(()),
         }

@@ -1,0 +1,64 @@
+//! `plan turn`: a ratio that no formula gives against another search, and bad input.
+
+use std::io::Write;
+use std::process::Command;
+
+use crate::harness::{can_run, python, python_modules, text};
+use serde_json::Value;
+
+/// Plans a turn of the turnaround's team with 12 benches.
+fn planned(ratio: &str) -> Value {
+    let scene = include_str!("../../config/turnaround.toml").replace("benches = 223", "benches = 12");
+    let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    file.write_all(scene.as_bytes()).unwrap();
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let output = program.arg("--scene").arg(file.path()).args(["--json", "plan", "turn", "--arc-ratio", ratio]);
+    let output = output.output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn number(line: &Value, field: &str) -> f64 {
+    line[field].as_f64().unwrap_or_else(|| panic!("no {field} in {line}"))
+}
+
+#[test]
+fn the_least_turn_of_a_third_ratio_is_that_of_another_search() {
+    // By `tests/python/least_turn.py`: the head's link locks at the junction of the arcs.
+    const RADIUS: f64 = 3.552348981005;
+    let line = planned("1.5");
+    let (lo, value) = (number(&line, "value_lo"), number(&line, "value"));
+    assert!(lo <= RADIUS + 1e-11 && RADIUS - lo < 1e-8, "{line}");
+    assert!((value - RADIUS).abs() < 1e-8 && number(&line, "value_hi") > RADIUS - 1e-11, "{line}");
+    assert_eq!((&line["limit"], &line["bench_a"]), (&"lock".into(), &0.into()), "{line}");
+    let a = 1.7 / std::f64::consts::TAU;
+    let length = 2.0 * RADIUS.hypot(a) * (RADIUS / a).atan();
+    assert!((number(&line, "length") - length).abs() < 1e-7, "{line}");
+    if !can_run(python_modules(&["math"])) {
+        return;
+    }
+    let peer = python().args(["tests/python/least_turn.py", "1.7", "2.86", "1.5"]).output().unwrap();
+    let printed = text(&peer.stdout);
+    let found = printed.split(' ').next().and_then(|radius| radius.parse::<f64>().ok());
+    assert!((found.unwrap_or(f64::NAN) - RADIUS).abs() < 5e-9, "{printed}{}", text(&peer.stderr));
+}
+
+#[test]
+fn a_wrong_question_is_refused_in_one_sentence() {
+    let cases = [
+        ("turnaround", "--arc-ratio=0", "--arc-ratio is 0, expected a number from 0.001 to 1000"),
+        ("turnaround", "--arc-ratio=-1", "--arc-ratio is -1, expected"),
+        ("turnaround", "--arc-ratio=nan", "--arc-ratio is NaN, expected"),
+        ("turnaround", "--arc-ratio=1e9", "--arc-ratio is 1000000000, expected"),
+        ("procession", "--arc-ratio=1", "the scene's path is a route, which has no pitch"),
+        ("crossing", "--arc-ratio=1", "the scene has several dragons"),
+    ];
+    for (scene, argument, expected) in cases {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+        let file = format!("config/{scene}.toml");
+        let output = program.args(["--scene", &file, "plan", "turn", argument]).output().unwrap();
+        let printed = text(&output.stderr);
+        assert_eq!((output.status.code(), printed.lines().count()), (Some(2), 1), "{scene}: {printed}");
+        assert!(output.stdout.is_empty() && printed.contains(expected), "{scene}: {printed}");
+    }
+}
