@@ -193,3 +193,41 @@ fn the_example_scenes_of_several_dragons_are_proved() {
         }
     }
 }
+
+/// A certificate of two dragons that never meet: nothing follows their result, and a claim up to a lock needs steps up to
+/// that lock.
+#[test]
+fn a_claim_that_two_dragons_do_not_meet_needs_its_steps() {
+    let wide = "kind = \"spiral\"\npitch = 1.7\nstart_turn = 3.0";
+    let coil = dragon("gold", 3, "{ origin = [0.0, 0.0] }", 1.0, 0.5, wide);
+    let far = dragon("jade", 3, "{ origin = [500.0, 0.0] }", 1.5, 0.0, &line(400.0));
+    let text = coil + &far;
+    let scene = Scene::parse_any(&text, "pair.toml", "pair").unwrap();
+    let lines = certificate(&text, &scene);
+    let shown = check(&lines).unwrap();
+    let lock = shown.results.iter().find(|result| result.event == EventKind::Lock).unwrap();
+    let last = shown.results.last().unwrap();
+    let (end, time) = (lock.time_lo.unwrap(), last.time_lo.unwrap());
+    assert_eq!((lock.status, last.status), (Status::Proved, Status::None), "{lock:?} {last:?}");
+    assert!((end - time).abs() < 1e-3 * 2.0, "{lock:?} {last:?}");
+    let all: Vec<&str> = lines.lines().collect();
+    let result: serde_json::Value = serde_json::from_str(all[all.len() - 1]).unwrap();
+    let with_time = |time: f64| {
+        let mut changed = result.clone();
+        changed["time_lo"] = time.into();
+        changed.to_string()
+    };
+    let is_both = |line: &&&str| line.contains("\"type\":\"both\"");
+    let without: Vec<&str> = all[..all.len() - 1].iter().filter(|line| !is_both(line)).copied().collect();
+    let (at_start, early) = (with_time(0.0), with_time(end - 0.01));
+    assert!(check(&[without.as_slice(), &[at_start.as_str()]].concat().join("\n")).is_err(), "without steps");
+    for claim in [&at_start, &early] {
+        assert!(check(&[&all[..all.len() - 1], &[claim.as_str()]].concat().join("\n")).is_err(), "{claim}");
+    }
+    // Undecided, any time follows.
+    let undecided = early.replace("\"none\"", "\"undecided\"");
+    check(&[&all[..all.len() - 1], &[undecided.as_str()]].concat().join("\n")).unwrap();
+    let step = *all.iter().rfind(is_both).unwrap();
+    let refused = check(&[all.as_slice(), &[step]].concat().join("\n")).unwrap_err().to_string();
+    assert!(refused.contains("nothing of two dragons can follow their result"), "{refused}");
+}

@@ -699,12 +699,19 @@ class Judge:
                 require(nearest >= lo, f"benches {i} and {j} are nearer than {lo} m at t = {at} s")
         if claim["until"] != "contact" and claim["hi"] is not None:
             i, j = claim["bench_a"], claim["bench_b"]
+            self.check_is_by(near, claim)
             boards = scene.boards(scene.chain(read_place(near["at"][0]), j + 2))
             nearest = clearance(boards[i], boards[j])
             # The steps have come there.
             require(lo is None or nearest >= lo, f"benches {i} and {j} are nearer than {lo} m")
             require(nearest <= claim["hi"], f"benches {i} and {j} are {float(nearest)} m apart, not {claim['hi']} m")
         self.counts["clearances"] += 1
+
+    def check_is_by(self, near, claim):
+        """Checks that a near place is not after the time up to which the result holds."""
+        if claim["until"] == "time":
+            metres = self.scene.travelled(read_place(near["at"][0]))
+            require(not metres > arb(claim["time_until"]) * self.scene.speed, "the near place is after time_until")
 
     def obstacle_clearance(self, claim, near, until, number):
         """Checks that no board is nearer to an obstacle than claimed, and that one is as near."""
@@ -726,6 +733,7 @@ class Judge:
             require(all(avoided), f"a board is nearer to obstacle {claim['obstacle']} than {lo} m at t = {at} s")
         if hi is not None:
             bench = claim["bench"]
+            self.check_is_by(near, claim)
             board = scene.boards(scene.chain(read_place(near["at"][0]), bench + 2))[bench]
             wider = Obstacle(shape.kind, shape.points, shape.distance + arb(hi))
             require(wider.is_reached(board), f"bench {bench} is not within {hi} m of obstacle {claim['obstacle']}")

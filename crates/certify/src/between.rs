@@ -202,25 +202,37 @@ impl PairSearch<'_, '_> {
         to: f64,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Status, CertifyError> {
-        let around = self.around();
         let Some((contact, benches)) = hint else {
             let refused = self.go_to(to, progress)?;
             // Nearer to a lock no step can be shown.
-            let ends = self.sides.iter().any(|side| side.section.locks) && to - self.time < around.max(self.near());
+            let before_lock = self.before_lock();
             return Ok(match refused {
                 None if !self.sides.iter().any(|side| side.section.locks) => Status::None { time_lo: None },
-                _ if ends => Status::None { time_lo: Some(self.time) },
+                _ if before_lock.is_some() => Status::None { time_lo: before_lock },
                 None => Status::Undecided { time_lo: self.time, because: "the motion ends there".to_owned() },
                 Some(because) => Status::Undecided { time_lo: self.time, because },
             });
         };
         if contact > 0.0
-            && let Some(because) = self.go_to(contact - around, progress)?
+            && let Some(because) = self.go_to(contact - self.around(), progress)?
             && contact - self.time > self.near()
         {
             return Ok(Status::Undecided { time_lo: self.time, because });
         }
         self.meeting(contact, benches)
+    }
+
+    /// Returns a time up to which the boards are apart, if it is just before the end of the steps of a dragon that
+    /// locks.
+    fn before_lock(&self) -> Option<f64> {
+        // The checker's bound, less its rounding.
+        let near = 0.999 * self.near();
+        self.sides.iter().filter(|side| side.section.locks).find_map(|side| {
+            let metres = side.chain.exact.travelled(side.section.end);
+            let end = metres.over(Interval::point(side.head_speed)) + Interval::point(side.delay);
+            let time = self.time.min(end.lo);
+            (time >= 0.0 && end.hi - time < near).then_some(time)
+        })
     }
 
     /// Returns the seconds on each side of a contact.

@@ -43,6 +43,11 @@ const LEAST_STEP: f64 = 1e-14;
 /// Rounding error of the show's end, as a share of the path length in metres.
 const END_SLACK: f64 = 1e-13;
 
+/// Share of the travel by which an upper bound must be before the end of a stretch that is not the path's, and the
+/// distances of grid points besides.
+const BEFORE_TIME: f64 = 4e-14;
+const GRID: f64 = 8.0;
+
 /// Distances in metres before a lock at which the search may stop, tried in this order. The nearer the stop, the less
 /// the lost handle can still move.
 const BEFORE_LOCK: [f64; 3] = [1e-9, 3e-11, 1e-12];
@@ -178,6 +183,8 @@ pub(super) struct Descent<'a, 'w> {
     most_steps: u64,
     /// Travel at the end of the show, metres.
     end: f64,
+    /// Travel up to which a place may show an upper bound, metres.
+    latest: f64,
     /// The upper bound that is known. Boards are tested only if this or `floor` is set.
     upper: Option<Upper>,
     /// A fixed lower bound to prove, in metres.
@@ -227,6 +234,7 @@ impl<'a, 'w> Descent<'a, 'w> {
             steps: 0,
             most_steps,
             end,
+            latest: end,
             upper: None,
             floor: None,
             beside,
@@ -251,6 +259,14 @@ impl<'a, 'w> Descent<'a, 'w> {
         self.end = match event.kind {
             EventKind::Contact | EventKind::Obstacle | EventKind::PathEnd => (event.travelled - slack).max(0.0),
             EventKind::Stall | EventKind::Lock => event.travelled - slack.max(BEFORE_LOCK[0]),
+        };
+        self.latest = match event.kind {
+            EventKind::PathEnd => self.end,
+            // The certificate ends by a time that is rounded down. A place after it would show nothing.
+            _ => {
+                let last = self.chain.exact.travelled(self.grid_point(self.end).head).lo.min(self.end);
+                last * (1.0 - BEFORE_TIME) - GRID * f64::EPSILON * (1.0 + path.length())
+            }
         };
         let is_at_start = event.travelled == 0.0;
         self.begin_beside(obstacles, is_at_start);
@@ -339,7 +355,7 @@ impl<'a, 'w> Descent<'a, 'w> {
 
     /// Returns the nearest grid point that is surely inside the show.
     fn inside(&self, travelled: f64) -> Option<GridPoint> {
-        let end = self.end;
+        let end = self.latest.max(0.0);
         let side = if travelled < 0.5 * end { 1.0 } else { -1.0 };
         self.beside(travelled.clamp(0.0, end), side, |travelled| travelled.lo >= 0.0 && travelled.hi <= end)
     }
@@ -543,7 +559,7 @@ impl<'a, 'w> Descent<'a, 'w> {
                     benches.map(|bench| first_order.board(bench.min(first_order.listed.handles.len() - 2)));
                 let travelled = self.chain.exact.travelled(first_order.at);
                 let inside = travelled.lo >= 0.0
-                    && travelled.hi <= self.end
+                    && travelled.hi <= self.latest
                     && benches[1] + 1 < first_order.listed.handles.len();
                 let nearer = inside
                     .then(|| Upper {

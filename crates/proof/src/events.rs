@@ -20,10 +20,18 @@ pub(super) struct Events {
     pub reached: Vec<(usize, usize, Place)>,
     /// The end of the motion.
     pub finish: Option<Finish>,
-    /// Two benches, and metres that they are no further apart at a place of the motion.
-    pub near: Option<([usize; 2], Interval)>,
+    /// Two boards that are near each other.
+    pub near: Option<Near>,
     /// Boards near obstacles.
     pub near_obstacles: Vec<NearObstacle>,
+}
+
+/// Two benches that are no further apart than some metres at a place of the motion.
+pub(super) struct Near {
+    pub benches: [usize; 2],
+    pub most: Interval,
+    /// Metres of the head from the start to that place or one before it.
+    pub travelled: Interval,
 }
 
 /// A bench whose clearance from an obstacle is no more than some metres at a place of the motion.
@@ -188,7 +196,7 @@ impl Events {
         if !one.at_most(&other).is_at_most(&most) {
             return Err(format!("benches {a} and {b} may be further apart than it says (Lemma 6)"));
         }
-        self.near = Some(([a, b], most));
+        self.near = Some(Near { benches: [a, b], most, travelled: scene.path.travelled(head.0) });
         Ok(())
     }
 

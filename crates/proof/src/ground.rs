@@ -9,7 +9,7 @@ use super::first_order::FirstOrderBoard;
 use super::interval::{Interval, Vector};
 
 /// Limit of obstacles and of the corners of one.
-const MOST: usize = 100_000;
+const MOST: usize = 64;
 
 /// Directions from a point in which its crossings of a polygon's sides are counted, until one is certain.
 const RAYS: [[f64; 2]; 4] = [[1.0, 0.0], [0.3, 1.0], [-1.0, 0.7], [-0.2, -1.0]];

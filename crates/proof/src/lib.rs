@@ -49,7 +49,7 @@ use self::steps::{Step, Steps};
 /// The version of the file format.
 const FORMAT: u32 = 2;
 /// Limit of the length of a line, bytes.
-const LONGEST_LINE: u64 = 1 << 28;
+const LONGEST_LINE: u64 = 1 << 26;
 
 /// The content of a valid certificate.
 #[derive(Debug, Clone, Serialize)]
@@ -272,6 +272,10 @@ impl Checker {
     /// Handles the lines of a scene of several dragons. Returns false for another line.
     fn add_of_several(&mut self, line: &ParsedLine) -> Result<bool, String> {
         let Self { scenes, alone, between, proved, .. } = self;
+        let has_result = between.is_some() && proved.results.len() > self.before;
+        if has_result && !matches!(line, ParsedLine::Dragon { .. } | ParsedLine::Pair { .. }) {
+            return Err("nothing of two dragons can follow their result".to_owned());
+        }
         match (line, between, alone) {
             (ParsedLine::Dragon { dragon }, None, _) => {
                 self.end_section()?;
@@ -297,9 +301,6 @@ impl Checker {
                 pair.add_meeting(scenes, alone, (*benches, *time), (*heads, [one, other]), *point)?;
             }
             (ParsedLine::Result(outcome), Some(pair), Some(alone)) => {
-                if proved.results.len() > self.before {
-                    return Err("a second result for two dragons".to_owned());
-                }
                 pair.check(scenes, alone, outcome)?;
                 proved.results.push(outcome.clone());
             }

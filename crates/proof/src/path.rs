@@ -40,7 +40,8 @@ pub(super) enum Curve {
     /// Coordinates are metres from `origin`.
     Line { origin: Vector, direction: Vector },
     /// Coordinates are radians from `origin`.
-    Arc { origin: Vector, direction: Vector, to_centre: Vector, radius: Interval },
+    /// `to_left` is 1 if the centre is on the left, else -1.
+    Arc { origin: Vector, direction: Vector, to_centre: Vector, radius: Interval, to_left: Interval },
 }
 
 /// The place of a route's spiral: the spiral about the origin is mirrored (y to -y), rotated and moved.
@@ -80,7 +81,7 @@ impl Curve {
     /// Creates an arc that begins at `origin` with `direction`. `to_left` is 1 if its centre is on the left, else -1.
     pub fn arc(origin: Vector, direction: Vector, to_left: Interval, radius: Interval) -> Self {
         let to_centre = Vector { x: -(direction.y * to_left), y: direction.x * to_left };
-        Self::Arc { origin, direction, to_centre, radius }
+        Self::Arc { origin, direction, to_centre, radius, to_left }
     }
 
     /// Creates a spiral of `a` metres per radian from `origin`, where its polar angle is `first` and the direction of
@@ -121,7 +122,7 @@ impl Curve {
             Self::Line { origin, direction } => {
                 At { point: origin.plus(&direction.scaled(coordinate)), tangent: *direction }
             }
-            Self::Arc { origin, direction, to_centre, radius } => {
+            Self::Arc { origin, direction, to_centre, radius, .. } => {
                 let (sine, cosine) = elementary::sin_cos(coordinate);
                 let across = to_centre.scaled(&(Interval::new(1.0) - cosine));
                 let chord = direction.scaled(&sine).plus(&across);
@@ -176,7 +177,7 @@ impl Curve {
     }
 
     /// Returns the curvature from one coordinate to a later one, positive to the left, 1/m.
-    fn bend(&self, from: &Interval, to: &Interval) -> Interval {
+    pub fn bend(&self, from: &Interval, to: &Interval) -> Interval {
         match self {
             // The curvature falls with the angle.
             Self::Inward { a, frame } => {
@@ -186,10 +187,7 @@ impl Curve {
                 Frame::bend(frame.as_ref(), spiral_curvature(a, from).hull(&spiral_curvature(a, to)))
             }
             Self::Line { .. } => Interval::new(0.0),
-            Self::Arc { direction, to_centre, radius, .. } => {
-                let is_left = direction.cross(to_centre).is_positive();
-                Interval::new(if is_left { 1.0 } else { -1.0 }) / radius
-            }
+            Self::Arc { radius, to_left, .. } => to_left / radius,
         }
     }
 

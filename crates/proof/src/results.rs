@@ -1,6 +1,6 @@
 //! Checks that a result follows from the steps and the events.
 
-use super::events::{Events, Finish};
+use super::events::{Events, Finish, Near};
 use super::interval::Interval;
 use super::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, Status, Until};
 use super::path::Place;
@@ -86,8 +86,11 @@ pub(super) fn check_clearance(
     if lo.is_some_and(|lo| !(lo.is_finite() && lo <= steps.apart && comes_to(&zero))) {
         return Err("the clearance lo does not follow".to_owned());
     }
+    let of = |near: &Near| (near.benches, near.most);
     let near = match until {
-        Until::PathEnd if steps.all_apart && matches!(events.finish, Some(Finish::PathEnd)) => events.near,
+        Until::PathEnd if steps.all_apart && matches!(events.finish, Some(Finish::PathEnd)) => {
+            events.near.as_ref().map(of)
+        }
         Until::PathEnd => return Err("the steps that say how far boards are apart end before the path".to_owned()),
         Until::Contact => {
             // Boards are apart at the start, and two overlap later.
@@ -97,10 +100,10 @@ pub(super) fn check_clearance(
         }
         Until::Time => {
             let is_reached = |time: f64| lo.is_none() || comes_to(&(Interval::new(time) * scene.head_speed));
-            if !time_until.is_some_and(|time| time >= 0.0 && is_reached(time)) {
+            let Some(time) = time_until.filter(|time| *time >= 0.0 && is_reached(*time)) else {
                 return Err("time_until does not follow".to_owned());
-            }
-            events.near
+            };
+            events.near.as_ref().filter(|near| is_by(scene, &near.travelled, time)).map(of)
         }
     };
     if (until == Until::Time) != time_until.is_some() {
@@ -117,6 +120,11 @@ pub(super) fn check_clearance(
         }
         _ => Err("the clearance hi, or its benches, do not follow".to_owned()),
     }
+}
+
+/// Returns true if the head has surely travelled so far by a time.
+fn is_by(scene: &Scene, travelled: &Interval, time: f64) -> bool {
+    travelled.is_at_most(&(Interval::new(time) * scene.head_speed))
 }
 
 /// Checks the result for an obstacle in a certificate of the least clearance.
@@ -150,9 +158,7 @@ pub(super) fn check_obstacle_clearance(
         return Err("the end of the stretch does not follow".to_owned());
     }
     let near = events.near_obstacles.iter().find(|near| near.obstacle == obstacle);
-    let is_before = |travelled: &Interval| {
-        time_until.is_none_or(|time| travelled.is_at_most(&(Interval::new(time) * scene.head_speed)))
-    };
+    let is_before = |travelled: &Interval| time_until.is_none_or(|time| is_by(scene, travelled, time));
     let follows = match (hi, bench, near) {
         (None, None, _) => true,
         (Some(hi), Some(bench), Some(near)) => {

@@ -9,8 +9,10 @@ use super::ground::{Mapping, Obstacle, PlacementText, StageText};
 use super::interval::{Interval, Vector};
 use super::path::{Curve, Path, PathEnd, Segment};
 
-/// Limit of benches, and of pieces of a path.
+/// Limit of benches.
 const MOST: usize = 1_000_000;
+/// Limit of the pieces of a route, as in a show: the cost of a step grows with them.
+const MOST_PIECES: usize = 4096;
 
 /// The greatest number of dragons.
 const MOST_DRAGONS: usize = 16;
@@ -342,8 +344,8 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
 }
 
 fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Path, String> {
-    if pieces.is_empty() || pieces.len() > MOST {
-        return Err(format!("path.pieces has {} pieces, expected from 1 to {MOST}", pieces.len()));
+    if pieces.is_empty() || pieces.len() > MOST_PIECES {
+        return Err(format!("path.pieces has {} pieces, expected from 1 to {MOST_PIECES}", pieces.len()));
     }
     finite("path.heading_turns", heading_turns)?;
     finite("path.start", start[0]).and(finite("path.start", start[1]))?;

@@ -25,6 +25,21 @@ impl Alone {
     }
 }
 
+/// Links of travel before the end of a dragon's last step, up to which two boards must be shown to be apart.
+const BEFORE_LOCK: f64 = 1e-3;
+
+impl Alone {
+    /// Returns true if the dragon locks, and a time is before the end of its last step by next to nothing.
+    fn locks_just_after(&self, scene: &Scene, time: f64) -> bool {
+        let Some(end) = self.end.filter(|_| self.locks) else { return false };
+        let end = scene.time(&scene.path.travelled(end));
+        let link = scene.team.link(0).min(scene.team.link(1));
+        let before = end - link * Interval::new(BEFORE_LOCK) / scene.head_speed;
+        let time = Interval::new(time);
+        before.is_at_most(&time) && time.is_at_most(&end)
+    }
+}
+
 /// The section of two dragons.
 pub(super) struct Pair {
     pub dragons: [usize; 2],
@@ -197,7 +212,8 @@ impl Pair {
                 no_benches && self.clear.is_some() && self.scenes(scenes).into_iter().all(ends)
             }
             (Status::None, Some(lo), None) => {
-                no_benches && begins(lo) && self.dragons.iter().any(|dragon| alone[*dragon].locks)
+                let is_of = |dragon: &usize| alone[*dragon].locks_just_after(&scenes[*dragon], lo);
+                no_benches && self.clear.is_some() && begins(lo) && self.dragons.iter().any(is_of)
             }
             (Status::Undecided, Some(lo), None) => no_benches && begins(lo),
             (Status::Proved, Some(lo), Some(hi)) => {

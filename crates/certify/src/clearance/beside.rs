@@ -93,7 +93,7 @@ impl Descent<'_, '_> {
                     continue;
                 }
                 let at = self.chain.exact.travelled(first_order.at);
-                let is_inside = at.lo >= 0.0 && at.hi <= self.end && bench < listed;
+                let is_inside = at.lo >= 0.0 && at.hi <= self.latest && bench < listed;
                 let upper = || UpperBeside {
                     value: barrier.at_most(&first, When::Middle),
                     travelled,

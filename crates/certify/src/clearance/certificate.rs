@@ -41,9 +41,8 @@ impl Descent<'_, '_> {
     fn write_near_obstacle(&mut self, obstacle: usize, head_speed: f64) -> Option<f64> {
         let Beside { upper, shown, .. } = self.beside[obstacle];
         let (chain, (UpperBeside { head, travelled, bench, .. }, (_, end))) = (&self.chain, (upper?, shown?));
-        let until = Interval::point(self.time_of(Some(end), head_speed)) * head_speed;
-        let is_before = chain.exact.travelled(head[0]).hi <= until.lo.max(0.0);
-        if !chain.exact.in_order(head[0], end) || !(is_before || self.is_whole(obstacle)) {
+        let is_before = self.is_whole(obstacle) || self.is_by(head[0], end, head_speed);
+        if !chain.exact.in_order(head[0], end) || !is_before {
             return None;
         }
         let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
@@ -81,10 +80,17 @@ impl Descent<'_, '_> {
         place.map_or(0.0, time).max(0.0)
     }
 
+    /// Returns true if the head comes to a place by the time that is stated for the end of a stretch.
+    fn is_by(&self, place: Place, end: Place, head_speed: f64) -> bool {
+        let until = Interval::point(self.time_of(Some(end), head_speed)) * head_speed;
+        self.chain.exact.travelled(place).hi <= until.lo.max(0.0)
+    }
+
     /// Writes that two boards are near, at a place that the steps have come to. Returns the upper bound.
-    fn write_near(&mut self, Upper { head, travelled, benches, .. }: Upper) -> Option<f64> {
+    fn write_near(&mut self, Upper { head, travelled, benches, .. }: Upper, head_speed: f64) -> Option<f64> {
         let (chain, (_, end)) = (&self.chain, self.shown?);
-        if !chain.exact.in_order(head[0], end) {
+        let is_before = matches!(self.finish, Some(Finish::PathEnd)) || self.is_by(head[0], end, head_speed);
+        if !chain.exact.in_order(head[0], end) || !is_before {
             return None;
         }
         let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
@@ -106,7 +112,7 @@ impl Descent<'_, '_> {
     /// A line cannot be written.
     pub(super) fn write_result(mut self, head_speed: f64) -> io::Result<()> {
         let near = self.upper.filter(|_| !matches!(self.finish, Some(Finish::Contact(_))));
-        let hi = near.and_then(|upper| self.write_near(upper));
+        let hi = near.and_then(|upper| self.write_near(upper, head_speed));
         let benches = near.filter(|_| hi.is_some()).map(|upper| upper.benches);
         let beside: Vec<_> =
             (0..self.beside.len()).map(|obstacle| self.write_near_obstacle(obstacle, head_speed)).collect();

@@ -64,6 +64,21 @@ fn the_clearance_of_a_straight_team_is_accepted() {
     check(&lines).unwrap();
 }
 
+/// An upper bound is about the stretch that the result states, not about a later moment.
+#[test]
+fn a_near_place_after_the_stated_time_is_refused() {
+    let until = |time: f64| {
+        let mut lines = clearance(1.4, 1.6);
+        lines[RESULT - 1] = json!({"type": "least_clearance", "lo": 1.4, "hi": 1.6, "until": "time", "time_until": time,
+            "bench_a": 0, "bench_b": 2});
+        lines
+    };
+    // The head goes 2 m/s: it comes to the near place at 1.55 s.
+    assert_refused(&until(1.0), RESULT as u64, "hi, or its benches, do not follow");
+    assert_refused(&until(0.0), RESULT as u64, "hi, or its benches, do not follow");
+    check(&until(1.56)).unwrap();
+}
+
 #[test]
 fn a_clearance_that_does_not_follow_is_refused() {
     assert_refused(&clearance(1.5 + 1e-12, 1.6), 2, "nearer than it says");

@@ -7,7 +7,7 @@ use crate::boards::{Board, covers, is_inside_ring};
 use crate::capsule::{Capsule, Pair};
 use crate::interval::{Interval, Vector};
 use crate::link;
-use crate::path::{Place, Span};
+use crate::path::{Curve, Place, Span};
 use crate::scene::Scene;
 
 fn scene(path: &str) -> Scene {
@@ -30,6 +30,18 @@ fn circle(radius: f64) -> Scene {
 fn at(scene: &Scene, place: Place) -> ([f64; 2], [f64; 2]) {
     let at = scene.path.at(place);
     ([at.point.x.rough(), at.point.y.rough()], [at.tangent.x.rough(), at.tangent.y.rough()])
+}
+
+/// After thousands of pieces the direction is known badly, but the side is given.
+#[test]
+fn an_arc_bends_to_its_side_whatever_its_direction() {
+    let wide = Interval::new(-1.0).hull(&Interval::new(1.0));
+    let direction = Vector { x: wide, y: wide };
+    for side in [1.0, -1.0] {
+        let arc = Curve::arc(Vector::new(0.0, 0.0), direction, Interval::new(side), Interval::new(2.0));
+        let bend = arc.bend(&Interval::new(0.1), &Interval::new(0.2));
+        assert_eq!(bend.rough(), side / 2.0);
+    }
 }
 
 /// Every junction is met from both sides, and the length is that of the turnaround's table.

@@ -272,3 +272,19 @@ fn an_obstacle_needs_its_result() {
     assert!(refused.to_string().contains("ends before its results"), "{refused:?}");
     assert!(check(&certificate()).is_ok());
 }
+
+/// The cost of a step grows with the obstacles, their corners and the pieces: no more than a show accepts.
+#[test]
+fn a_scene_larger_than_a_show_accepts_is_refused() {
+    let refused = |scene: &str, says: &str| {
+        let mut lines = certificate();
+        lines[0]["scene"] = json!(scene);
+        assert_refused(&lines, 1, says);
+    };
+    let corners: Vec<[f64; 2]> = (0..65).map(|corner| [f64::from(corner), 90.0]).collect();
+    refused(&format!("{SCENE}[[stage.obstacles]]\nname = \"a\"\nline = {corners:?}\n"), "65 corners");
+    let lamp = "[[stage.obstacles]]\nname = \"a\"\ncircle = { center = [90.0, 0.0], radius = 1.0 }\n";
+    refused(&format!("{SCENE}{}", lamp.repeat(65)), "number of obstacles");
+    let pieces = "{ kind = \"line\", length = 1.0 }, ".repeat(4096);
+    refused(&SCENE.replace("pieces = [", &format!("pieces = [{pieces}")), "4098 pieces");
+}
