@@ -120,7 +120,7 @@ fn a_placed_show_is_sent_where_it_stands_and_its_log_verifies() {
 
     publisher.signal(Signal::SIGTERM);
     let run = summary(&publisher.output_within(DEADLINE));
-    let verified = program("verify").args(["--json", "verify"]).arg(&log).output().unwrap();
+    let verified = program("placed_verify").args(["--json", "verify"]).arg(&log).output().unwrap();
     let line = json_lines(&verified).pop().unwrap_or_else(|| panic!("{}", text(&verified.stderr)));
     assert_eq!((&line["verdict"], &line["frames"]), (&"same".into(), &run["frames"]), "{line}");
     // The log has the placement: without it the same frames are other frames.
@@ -128,7 +128,7 @@ fn a_placed_show_is_sent_where_it_stands_and_its_log_verifies() {
     let text = std::fs::read_to_string(&log).unwrap();
     assert!(text.contains("rotation_turns = 0.3"));
     std::fs::write(&other, text.replacen("rotation_turns = 0.3", "rotation_turns = 0.4", 1)).unwrap();
-    let verified = program("verify").args(["--json", "verify"]).arg(&other).output().unwrap();
+    let verified = program("placed_verify").args(["--json", "verify"]).arg(&other).output().unwrap();
     let line = json_lines(&verified).pop();
     assert!(!verified.status.success() && line.is_none_or(|line| line["verdict"] != "same"), "{verified:?}");
 }

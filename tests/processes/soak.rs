@@ -474,5 +474,7 @@ fn the_status_comes_once_a_second_and_adds_up() {
     }
     assert!(statuses.windows(2).all(|pair| pair[0].tick < pair[1].tick && pair[0].stamp_ns < pair[1].stamp_ns));
     assert!(statuses[1..].iter().all(|status| status.subscribers == 1), "{statuses:?}");
-    assert_eq!((last.sequence + 1, last.skipped), (number(&summary, "frames"), number(&summary, "skipped")));
+    assert_eq!(last.sequence + 1, number(&summary, "frames"));
+    // Periods skipped between the last frame and the signal are in the summary alone.
+    assert!(last.skipped <= number(&summary, "skipped"), "{last:?} {summary}");
 }
