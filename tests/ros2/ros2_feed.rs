@@ -118,7 +118,8 @@ fn a_running_show_gets_its_scenes_topics_late_and_loses_them_again() {
     );
     next(&second, "stage:reliable:transient_local");
     let ticks: Vec<u64> = (0..20).map(|_| next(&second, "handles")["tick"].as_u64().unwrap()).collect();
-    let apart = (ticks[19] - ticks[0]) as f64 / 19.0;
+    // The first may come in a row, since they have waited for the subscriber.
+    let apart = (ticks[19] - ticks[5]) as f64 / 14.0;
     assert!(apart >= 2.9, "20 of 60 frames per second are sent: {ticks:?}");
     bridge.signal(SIGTERM);
     let rest = printed.rest(60);
