@@ -90,7 +90,7 @@ def stands(page, expected=None):
     """Returns the seconds of a countdown that stands: visible, without a filled letter."""
     until(page, "document.body.dataset.stands === 'true'", "a countdown that stands")
     assert "ahead" in page.inner_text("#until"), page.inner_text("#until")
-    assert page.evaluate("getComputedStyle(document.getElementById('left')).color") == "rgba(0, 0, 0, 0)"
+    until(page, "getComputedStyle(document.getElementById('left')).color === 'rgba(0, 0, 0, 0)'", "an outlined countdown")
     left = page.inner_text("#left")
     minutes, seconds = re.fullmatch(r"(?:(\d+):)?(\d+(?:\.\d)?)\s*(?:s|min)", left).groups()
     left = 60 * int(minutes or 0) + float(seconds)
