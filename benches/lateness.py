@@ -29,7 +29,8 @@ LONGEST_US = 100_000
 
 def cyclictest(arguments, cpu_latency):
     command = ["cyclictest", "--mlockall", "--quiet", "--threads=1", f"--affinity={arguments.cpu}"]
-    command += [f"--interval={arguments.interval_us}", f"--loops={int(arguments.seconds * 1e6 / arguments.interval_us)}"]
+    loops = int(arguments.seconds * 1e6 / arguments.interval_us)
+    command += [f"--interval={arguments.interval_us}", f"--loops={loops}"]
     command += [f"--histogram={LONGEST_US}", f"--latency={cpu_latency}"]
     command += [f"--priority={arguments.priority}"] if arguments.priority else ["--policy=other"]
     said = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
@@ -48,7 +49,8 @@ def cyclictest(arguments, cpu_latency):
 
 
 def live(arguments, cpu_latency):
-    command = [os.path.join(TARGET, "bench-dragon"), "--name", NAME, "run", "--json", "--duration", str(arguments.seconds)]
+    command = [os.path.join(TARGET, "bench-dragon"), "--name", NAME]
+    command += ["run", "--json", "--duration", str(arguments.seconds)]
     command += ["--rate", str(1e6 / arguments.interval_us), "--cpu", str(arguments.cpu)]
     command += ["--cpu-latency", str(cpu_latency)]
     command += ["--realtime", str(arguments.priority)] if arguments.priority else []
@@ -72,7 +74,8 @@ def main():
             for label, measure in (("cyclictest", cyclictest), ("live", live)):
                 found = measure(arguments, cpu_latency)
                 rounds.setdefault((sleep, label), []).append(found)
-                print(f"{number:>5} {sleep:<10} {label:<11}" + "".join(f"{found[name]:12.1f}" for name in names), flush=True)
+                figures = "".join(f"{found[name]:12.1f}" for name in names)
+                print(f"{number:>5} {sleep:<10} {label:<11}{figures}", flush=True)
     for sleep, _ in CPU_LATENCIES:
         median = {
             label: {name: statistics.median(one[name] for one in rounds[sleep, label]) for name in names}

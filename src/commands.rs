@@ -289,16 +289,6 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     Err(CommandError::BadInput(sentence.to_owned()))
 }
 
-/// Refuses a scene of several dragons, whose clearance no proof knows.
-pub fn expect_one_dragon(scene: &Scene) -> Result<(), CommandError> {
-    if scene.ensemble.is_none() {
-        return Ok(());
-    }
-    let sentence =
-        "the scene has several dragons, whose clearance no proof knows yet: expected a scene of one, with [team]";
-    Err(CommandError::BadInput(sentence.to_owned()))
-}
-
 /// Returns a flag that SIGINT, SIGTERM and SIGHUP set; SIGHUP unless it is ignored, as by `nohup`.
 ///
 /// Call it before other threads start: from then on one thread receives these signals. iceoryx2 treats an interrupted

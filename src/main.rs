@@ -4,8 +4,10 @@
 mod commands;
 mod logging;
 
+use std::path::Path;
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 pub use commands::ros_args;
 use commands::{CommandError, Common};
@@ -86,7 +88,13 @@ fn main() -> ExitCode {
         Ok(translated) => translated,
         Err(error) => return exit_code(Err(error)),
     };
-    let CommandLine { mut common, command } = CommandLine::parse_from(arguments);
+    let CommandLine { mut common, command } = match CommandLine::try_parse_from(arguments) {
+        Ok(parsed) => parsed,
+        Err(error) => match scene_without_option(&error) {
+            Some(sentence) => return exit_code(Err(CommandError::BadInput(sentence))),
+            None => error.exit(),
+        },
+    };
     logging::set_up(&common);
     if let [name] = &mut common.names[..] {
         *name = names.applied_to(name);
@@ -117,6 +125,18 @@ fn main() -> ExitCode {
         Command::Check(arguments) => commands::check::check(&common, arguments),
     });
     exit_code(done)
+}
+
+/// Returns the sentence for an argument that names a scene file without `--scene`.
+fn scene_without_option(error: &clap::Error) -> Option<String> {
+    let context = match error.kind() {
+        ErrorKind::UnknownArgument => ContextKind::InvalidArg,
+        ErrorKind::InvalidSubcommand => ContextKind::InvalidSubcommand,
+        _ => return None,
+    };
+    let Some(ContextValue::String(argument)) = error.get(context) else { return None };
+    let is_scene = !argument.starts_with('-') && Path::new(argument).extension().is_some_and(|end| end == "toml");
+    is_scene.then(|| format!("unexpected argument '{argument}', expected --scene {argument}"))
 }
 
 /// Prints the error of a command. Returns the exit code.

@@ -1,5 +1,8 @@
 //! `check`: what a scene models and leaves out, and its solver with the reason.
 
+mod description;
+mod several;
+
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -10,25 +13,19 @@ use bench_dragon::certify::{
 };
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
-use bench_dragon::motion::Motion;
-use bench_dragon::motion::ensemble::{Dragon, Ensemble};
 use bench_dragon::motion::ground::Obstacle;
-use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
-use bench_dragon::motion::model::spiral::Direction;
-use bench_dragon::motion::placement::Placement;
-use bench_dragon::motion::solve::Velocities;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
-use bench_dragon::show::scene::{AtEnd, OnContact, Scene, printable};
+use bench_dragon::show::scene::{Scene, printable};
 use bench_dragon::show::timed_cues;
 use serde::Serialize;
 
+use description::describe;
+
 use super::certificate_file::CertificateFile;
-use super::events::{bench_name, find_least_clearance, least_clearance, sentence};
+use super::events::{bench_name, find_least_clearance, least_clearance, least_clearance_between, sentence};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
-use super::{
-    CommandError, Common, Output, expect_exact_motion, expect_one_dragon, figure, number, progress_bar, search_timeline,
-};
+use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -90,7 +87,6 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     let text = common.scene_text()?;
     let scene = text.parse_any()?;
     if arguments.prove {
-        expect_one_dragon(&scene)?;
         expect_exact_motion(&scene)?;
     }
     let timeline = search_timeline(&scene, common);
@@ -100,105 +96,30 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if let (Some(covered), true) = (&covered, common.json) {
         output.json(&covered.line())?;
     }
-    if arguments.prove && common.json {
-        let (found, freeze) = find_least_clearance(&scene, &timeline, common);
-        let beside = obstacle_clearances(&scene, freeze, common);
-        let hints = (found, beside.as_slice(), freeze);
-        let ClearanceEnclosures { boards, obstacles } =
-            enclosed(&scene, &text.text, hints, arguments.certify.as_deref(), common)?;
-        output.json(&clearance_line(&scene, found, boards))?;
-        for found in &beside {
-            output.json(&obstacle_line(&scene, found, enclosure_of(&obstacles, found)))?;
+    if let (Some(ensemble), true, true) = (&scene.ensemble, arguments.prove, common.json) {
+        let freeze = timeline.freeze(scene.stops_at_contact());
+        let file = arguments.certify.as_deref();
+        for part in several::enclosed((&scene, ensemble, &text.text), freeze, file, common)? {
+            output.json(&part)?;
         }
         return output.finish();
+    }
+    if arguments.prove && common.json {
+        return print_proof(&scene, &text.text, &timeline, arguments, common, output);
     }
     if common.json {
         return if covered.is_some() { output.finish() } else { print_lines(&scene, &timeline, common, output) };
     }
-    output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
-    match &scene.ensemble {
-        Some(ensemble) => {
-            for (k, Dragon { name, delay, motion }) in ensemble.dragons().iter().enumerate() {
-                let handles = ensemble.handles_of(k);
-                let (first, last) = (handles.start, handles.end - 1);
-                output.line(&format!("  Dragon {}, {name}: handles {first} to {last}, counting from 0.", k + 1))?;
-                describe(motion, Some(motion.placement()), &mut output)?;
-                if *delay > 0.0 {
-                    output.line(&format!("  It stands at its start for {} s.", number(*delay)))?;
-                }
-            }
-        }
-        None => describe(&scene.motion, scene.placement.as_ref(), &mut output)?,
-    }
-    if !scene.ground().is_empty() {
-        output.line(&format!("  Stage: {}.", ground(&scene)))?;
-    }
-    let choice = scene.ensemble.is_none().then(|| scene.motion.solver(scene.velocities));
-    match (&choice, &scene.ensemble) {
-        (Some(choice), _) => output.line(&format!("  Solver: {}.", choice.reason))?,
-        (None, ensemble) => {
-            for Dragon { name, motion, .. } in ensemble.iter().flat_map(Ensemble::dragons) {
-                output.line(&format!("  Solver of {name}: {}.", motion.solver(scene.velocities).reason))?;
-            }
-        }
-    }
-    output.line(match scene.velocities {
-        Velocities::Computed => "  Velocities: computed for every handle.",
-        Velocities::Omitted => "  Velocities: not computed; vx and vy are NaN.",
-    })?;
-    match scene.alerts {
-        Some(rules) => {
-            output.line(&format!(
-                "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
-                rules.approach_time, rules.approach_clearance
-            ))?;
-            if let Some(choice) = &choice {
-                let monitor = scene.motion.clearance_monitor(choice);
-                output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
-            }
-        }
-        None => output.line(
-            "  Alerts: none. `run` computes no rectangle, no clearance, no contact and no stall, and has no alerts \
-             service: add an [alerts] table for those.",
-        )?,
-    }
-    output.line(&format!(
-        "  At a contact the show {}; at its end it {}.",
-        match (scene.alerts, scene.on_contact) {
-            (Some(_), OnContact::Stop) => "freezes",
-            (Some(_), OnContact::Continue) => "continues",
-            (None, _) => "continues, unnoticed",
-        },
-        match scene.at_end {
-            AtEnd::Hold => "holds the last frame",
-            AtEnd::Loop => "begins again",
-        }
-    ))?;
-    let single = scene.single_precision.map_or(String::new(), |single| format!("; poses32 has {single}"));
-    output.line(&format!("  Publishing: {} frames per second to shared memory{single}.", number(scene.rate)))?;
-    output.line(&match &scene.ros2 {
-        Some(settings) => format!(
-            "  ROS 2: {} at {} frames per second.",
-            settings
-                .offered(scene.alerts.is_some(), !scene.cues.is_empty())
-                .map(|topic| topic.name())
-                .collect::<Vec<_>>()
-                .join(", "),
-            number(settings.rate_of(scene.rate))
-        ),
-        None => "  ROS 2: nothing and no network socket, unless `run --ros2` requests it.".to_owned(),
-    })?;
-    output.line("  Ahead, in simulated time:")?;
-    for timed in &timeline.all() {
-        output.line(&format!("  {}", sentence(&scene, timed)))?;
-    }
-    for cue in cues(&scene, &timeline) {
-        output.line(&format!("  {cue}"))?;
-    }
+    describe(&scene, &mut output)?;
+    ahead(&scene, &timeline, &mut output)?;
     let (found, freeze) = find_least_clearance(&scene, &timeline, common);
-    output.line(&format!("  {}", least_clearance(&scene, found)))?;
+    output.line(&format!("  {}", least_clearance(&scene, found.of_show())))?;
+    if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show()) {
+        output.line(&format!("  {}", least_clearance_between(&scene, &between)))?;
+    }
+    let found = found.of_show();
     let beside = obstacle_clearances(&scene, freeze, common);
-    let enclosures = match arguments.prove {
+    let enclosures = match arguments.prove && scene.ensemble.is_none() {
         true => {
             let hints = (found, beside.as_slice(), freeze);
             Some(enclosed(&scene, &text.text, hints, arguments.certify.as_deref(), common)?)
@@ -214,6 +135,10 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             output.line(&format!("  {}", obstacle_proof(&scene, enclosure_of(obstacles, least))))?;
         }
     }
+    if let (Some(ensemble), true) = (&scene.ensemble, arguments.prove) {
+        let parts = several::enclosed((&scene, ensemble, &text.text), freeze, arguments.certify.as_deref(), common)?;
+        several::print(&parts, &mut output)?;
+    }
     if let Some(covered) = covered {
         output.line(&format!("  {}", covered.sentence()))?;
     }
@@ -223,43 +148,51 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             output.line(&format!("    {sentence}."))?;
         }
     }
+    warn_of_the_start(&scene, &timeline);
+    output.finish()
+}
+
+/// Proves the least clearances and prints them as JSON lines.
+fn print_proof(
+    scene: &Scene,
+    text: &str,
+    timeline: &Timeline,
+    arguments: &CheckArguments,
+    common: &Common,
+    mut output: Output,
+) -> Result<(), CommandError> {
+    let (found, freeze) = find_least_clearance(scene, timeline, common);
+    let found = found.of_show();
+    let beside = obstacle_clearances(scene, freeze, common);
+    let hints = (found, beside.as_slice(), freeze);
+    let ClearanceEnclosures { boards, obstacles } = enclosed(scene, text, hints, arguments.certify.as_deref(), common)?;
+    output.json(&clearance_line(scene, found, boards))?;
+    for found in &beside {
+        output.json(&obstacle_line(scene, found, enclosure_of(&obstacles, found)))?;
+    }
+    output.finish()
+}
+
+/// Prints the events and the cues.
+fn ahead(scene: &Scene, timeline: &Timeline, output: &mut Output) -> Result<(), CommandError> {
+    output.line("  Ahead, in simulated time:")?;
+    for timed in &timeline.all() {
+        output.line(&format!("  {}", sentence(scene, timed)))?;
+    }
+    for cue in cues(scene, timeline) {
+        output.line(&format!("  {cue}"))?;
+    }
+    Ok(())
+}
+
+/// Logs a warning if boards overlap at the start, and if a board is at an obstacle there.
+fn warn_of_the_start(scene: &Scene, timeline: &Timeline) {
     if timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
         log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
     }
     if timeline.find(EventKind::Obstacle).is_some_and(|touch| touch.time == 0.0) {
         log::warn!("a board is within the keep-out of an obstacle at the start of scene \"{}\"", scene.name);
     }
-    output.finish()
-}
-
-/// Prints the team, the path and the placement of a dragon.
-fn describe(motion: &Motion, placement: Option<&Placement>, output: &mut Output) -> Result<(), CommandError> {
-    let team = motion.team();
-    output.line(&format!(
-        "  Team: {} benches, {} handles; head board {} m, the others {} m, {} m wide, holes {} m from the ends.",
-        team.benches,
-        team.handles(),
-        team.head_length,
-        team.body_length,
-        team.width,
-        team.hole_inset
-    ))?;
-    output.line(&format!("  Path: {}; the head moves at {} m/s.", path(motion), motion.head_speed()))?;
-    match placement.and_then(placed) {
-        Some(sentence) => output.line(&format!("  {sentence}")),
-        None => Ok(()),
-    }
-}
-
-/// Returns a sentence for people on a placement, without the parts that change nothing; `None` if none does.
-fn placed(placement: &Placement) -> Option<String> {
-    let (origin, turns) = (placement.origin(), placement.rotation_turns());
-    let mirrored = placement.is_mirrored().then(|| "mirrored".to_owned());
-    let turned = (turns != 0.0).then(|| format!("turned by {} turns", number(turns)));
-    let is_moved = (origin.x, origin.y) != (0.0, 0.0);
-    let moved = is_moved.then(|| format!("moved by ({}, {}) m", number(origin.x), number(origin.y)));
-    let parts: Vec<String> = [mirrored, turned, moved].into_iter().flatten().collect();
-    (!parts.is_empty()).then(|| format!("Placement: the path's coordinates {}.", parts.join(", then ")))
 }
 
 /// A line of `check --json`: the least clearance of two boards.
@@ -285,13 +218,17 @@ struct ObstacleLine<'a> {
 /// Prints the least clearances of the show as JSON lines.
 fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: Output) -> Result<(), CommandError> {
     let (found, freeze) = find_least_clearance(scene, timeline, common);
-    output.json(&LeastClearanceLine {
-        check: "clearance",
+    let line = |check, found: Option<TimedClearance>| LeastClearanceLine {
+        check,
         clearance: found.map(|found| found.least.value),
         time: found.map(|found| found.time),
         bench_a: found.map(|found| found.least.bench_a),
         bench_b: found.map(|found| found.least.bench_b),
-    })?;
+    };
+    output.json(&line("clearance", found.of_show()))?;
+    if scene.ensemble.is_some() {
+        output.json(&line("clearance_between_dragons", found.between))?;
+    }
     for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, freeze, common) {
         let obstacle = &scene.ground().obstacles()[obstacle].name;
         let (check, clearance, bench) = ("obstacle", least.value, least.bench);
@@ -327,18 +264,6 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
         "The least clearance of the {}{beyond}{up_to} is {value} m, at t = {at} s, with {bench} (counting from 1).{first}",
         printable(name)
     )
-}
-
-/// Describes the obstacles in words.
-fn ground(scene: &Scene) -> String {
-    let ground = scene.ground();
-    let obstacles = ground.obstacles().len() - usize::from(ground.has_boundary());
-    let counted = match obstacles {
-        0 => "no obstacle".to_owned(),
-        1 => "1 obstacle".to_owned(),
-        count => format!("{count} obstacles"),
-    };
-    if ground.has_boundary() { format!("{counted} and a boundary") } else { counted }
 }
 
 impl CheckArguments {
@@ -421,11 +346,7 @@ fn obstacle_line<'a>(
         least_clearance: found.least.value,
         least_clearance_lo: enclosure.map(|enclosure| enclosure.lo),
         least_clearance_hi: enclosure.map(|enclosure| enclosure.hi),
-        least_clearance_status: match enclosure {
-            Some(ObstacleEnclosure { until: None, .. }) => "proved",
-            Some(_) => "given_up",
-            None => "searched",
-        },
+        least_clearance_status: status(enclosure.is_some(), until.is_none()),
         proved_until: until.map(|until| scene.motion.time_at(until).next_down().max(0.0)),
         time: enclosure.map(|enclosure| scene.motion.time_at(enclosure.travelled)),
         bench: enclosure.map(|enclosure| enclosure.bench),
@@ -437,17 +358,29 @@ fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> Strin
     let Some(ClearanceEnclosure { lo, hi, until, travelled, .. }) = enclosure else {
         return "Nothing of it could be proved.".to_owned();
     };
+    let time_at = |travelled| scene.motion.time_at(travelled);
+    proved_sentence((lo, hi), until.map(time_at), time_at(travelled))
+}
+
+/// Returns a sentence for people on a least clearance that is proved up to a time, or to the end of the show.
+fn proved_sentence((lo, hi): (f64, f64), until: Option<f64>, at: f64) -> String {
     match until {
         None if lo == hi => format!("Proved: it is {lo} m."),
         None => format!("Proved: it is between {lo} m and {hi} m."),
-        Some(until) => {
-            let [until, at] = [until, travelled].map(|travelled| scene.motion.time_at(travelled));
-            format!(
-                "Proved: up to t = {} s no two boards are nearer than {lo} m; at t = {at} s two are no further apart than \
-                 {hi} m. Not decided beyond.",
-                until.next_down().max(0.0)
-            )
-        }
+        Some(until) => format!(
+            "Proved: up to t = {} s no two boards are nearer than {lo} m; at t = {at} s two are no further apart than \
+             {hi} m. Not decided beyond.",
+            until.next_down().max(0.0)
+        ),
+    }
+}
+
+/// Returns the status of a least clearance, of which something or nothing is proved, to the end of the show or not.
+fn status(is_proved: bool, is_whole: bool) -> &'static str {
+    match (is_proved, is_whole) {
+        (true, true) => "proved",
+        (true, false) => "given_up",
+        (false, _) => "searched",
     }
 }
 
@@ -460,11 +393,10 @@ fn clearance_line(
         least_clearance: found.map(|found| found.least.value),
         least_clearance_lo: enclosure.map(|enclosure| enclosure.lo),
         least_clearance_hi: enclosure.map(|enclosure| enclosure.hi),
-        least_clearance_status: match enclosure {
-            Some(ClearanceEnclosure { until: None, .. }) => "proved",
-            Some(_) => "given_up",
-            None => "searched",
-        },
+        least_clearance_status: status(
+            enclosure.is_some(),
+            enclosure.is_none_or(|enclosure| enclosure.until.is_none()),
+        ),
         proved_until: enclosure
             .and_then(|enclosure| enclosure.until)
             .map(|until| scene.motion.time_at(until).next_down().max(0.0)),
@@ -501,33 +433,4 @@ fn cues(scene: &Scene, timeline: &Timeline) -> Vec<String> {
         format!("Cue \"{name}\" has no time: its event does not happen, or the time would be before the start.")
     });
     told.chain(missing).collect()
-}
-
-/// Describes the path in words.
-fn path(motion: &Motion) -> String {
-    let outline = motion.path().outline();
-    if let [SegmentOutline { kind: OutlineKind::Spiral { pitch, first, .. }, .. }] = outline.as_slice() {
-        let turn = first / std::f64::consts::TAU;
-        return format!("inward spiral, {pitch} m per turn, the head starting on turn {}", figure(turn));
-    }
-    let segments: Vec<String> = outline.iter().map(segment).collect();
-    format!("{:.3} m: {}", motion.path().length(), segments.join(", "))
-}
-
-fn segment(outline: &SegmentOutline) -> String {
-    let length = outline.length;
-    match outline.kind {
-        OutlineKind::Line => format!("{length:.3} m straight on"),
-        OutlineKind::Arc { curvature } => {
-            let side = if curvature > 0.0 { "left" } else { "right" };
-            format!("{length:.3} m to the {side} at radius {:.6} m", 1.0 / curvature.abs())
-        }
-        OutlineKind::Spiral { direction, pitch, .. } => {
-            let way = match direction {
-                Direction::Inward => "inward",
-                Direction::Outward => "outward",
-            };
-            format!("{length:.3} m {way} along a spiral of {pitch} m per turn")
-        }
-    }
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Status};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::ensemble::LeastClearances;
 use bench_dragon::motion::event::Event;
 use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
@@ -120,7 +121,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 output.line(&proof_sentence(EventKind::Obstacle, status))?;
             }
         }
-        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).0))?;
+        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).0.of_show()))?;
     }
     output.finish()
 }
@@ -228,18 +229,21 @@ fn obstacle_label(obstacle: &Obstacle) -> String {
     format!("the {}", printable(&obstacle.name))
 }
 
-/// Returns the least clearance of the whole show, and the event that ends it.
+/// Returns the least clearances of the whole show, and the event that ends it.
 pub fn find_least_clearance<'t>(
     scene: &Scene,
     timeline: &'t Timeline,
     common: &Common,
-) -> (Option<TimedClearance>, &'t TimedEvent) {
+) -> (LeastClearances, &'t TimedEvent) {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
     let freeze = timeline.freeze(scene.stops_at_contact());
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let found = match &scene.ensemble {
-        Some(ensemble) => ensemble.least_clearance(freeze, &mut progress),
-        None => scene.motion.least_clearance(timeline, freeze, &mut progress),
+        Some(ensemble) => ensemble.least_clearances(freeze, &mut progress),
+        None => {
+            let own = scene.motion.least_clearance(timeline, freeze, &mut progress);
+            LeastClearances { own, between: None }
+        }
     };
     bar.finish_and_clear();
     (found, freeze)
@@ -255,6 +259,12 @@ pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
     let of = searched_until
         .map_or("of the show".to_owned(), |until| format!("up to t = {} s, where the search gave up,", figure(until)));
     format!("The least clearance {of} is {value} m, at t = {time} s, between {first} and {second} (counting from 1).")
+}
+
+/// Returns a sentence for people on the least clearance of boards of two dragons.
+pub fn least_clearance_between(scene: &Scene, found: &TimedClearance) -> String {
+    let sentence = least_clearance(scene, Some(*found));
+    sentence.replacen(" of the show", "", 1).replacen("The least clearance", "The least clearance between dragons", 1)
 }
 
 /// Returns a bench's name for people, counted from 1.

@@ -208,6 +208,8 @@ impl Supervisor {
         let mut command = Command::new(std::env::current_exe()?);
         // In a process group of its own: Ctrl-C on the terminal ends the show, which then ends this process.
         command.args(&self.arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
+        // With an arena for each thread, the allocator of glibc keeps the memory of subscribers that have left.
+        command.env("MALLOC_ARENA_MAX", "1");
         let mut child = command.spawn()?;
         let (output, connected) = (child.stdout.take(), Arc::clone(&self.connected));
         let reader = std::thread::spawn(move || read_lines(output, &connected));

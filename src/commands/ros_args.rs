@@ -110,11 +110,11 @@ fn name_option(own: &[OsString]) -> String {
 /// Returns the parameters of a node in a file as launch_ros writes it, each with its line, as `NAME:=VALUE`.
 ///
 /// # Errors
-/// Bad input: no file, another form of YAML, no parameters of the node.
+/// Bad input: no file, another form of YAML. As in rclcpp, a file for other nodes is none.
 fn parameters(file: &str, node: &str) -> Result<Vec<(usize, String)>, CommandError> {
     let bad = |sentence: String| CommandError::BadInput(format!("{BEGIN} --params-file: {file}{sentence}"));
     let text = read(file).map_err(|error| bad(format!(": {error}, expected a file of parameters (YAML)")))?;
-    let (mut is_own, mut depth, mut found) = (None, 0, Vec::new());
+    let (mut depth, mut found) = (0, Vec::new());
     for (line, content) in text.lines().enumerate().map(|(at, content)| (at + 1, content.trim_end())) {
         let entry = content.trim_start();
         if entry.is_empty() || entry.starts_with('#') || content == "---" {
@@ -125,9 +125,8 @@ fn parameters(file: &str, node: &str) -> Result<Vec<(usize, String)>, CommandErr
         let (key, value) = (unquoted(key), unquoted(value.trim()));
         depth = match (indent, depth, value) {
             (0, _, "") if !key.is_empty() => {
-                let is_here = key == "/**" || format!("/{}", key.trim_start_matches('/')) == node;
-                is_own = Some(is_own.unwrap_or(false) || is_here);
-                if is_here { 1 } else { 3 }
+                let is_own = key == "/**" || format!("/{}", key.trim_start_matches('/')) == node;
+                if is_own { 1 } else { 3 }
             }
             (1.., 1, "") if key == "ros__parameters" => 2,
             (1.., 2, value) if !key.is_empty() && !value.is_empty() => {
@@ -142,7 +141,7 @@ fn parameters(file: &str, node: &str) -> Result<Vec<(usize, String)>, CommandErr
             }
         };
     }
-    if is_own == Some(true) { Ok(found) } else { Err(bad(format!(" has no parameters of {node}, and none of /**"))) }
+    Ok(found)
 }
 
 /// Reads a regular file of [`MOST_BYTES`] at most.
@@ -287,9 +286,10 @@ mod tests {
         assert_eq!(of_file(text, "p run --ros-args --params-file FILE").unwrap(), "p run --rate=30");
         let text = "b:\n  ros__parameters:\n    rate: 7\n";
         assert_eq!(of_file(text, "p run --name b --ros-args --params-file FILE").unwrap(), "p run --name b --rate=7");
+        for text in ["", "other:\n  ros__parameters:\n    rate: 1\n"] {
+            assert_eq!(of_file(text, launched).unwrap(), "p run --quiet");
+        }
         for (text, expected) in [
-            ("", "has no parameters of /hall/gold"),
-            ("other:\n  ros__parameters:\n    rate: 1\n", "has no parameters of /hall/gold"),
             ("/**:\n  ros__parameters:\n    colour: red\n", "line 3: colour:=red is not understood"),
             ("/**:\n  ros__parameters:\n    rate: [1,\n      2]\n", "line 4, expected NODE, ros__parameters"),
             ("/**: {ros__parameters: {rate: 1}}\n", "line 1, expected NODE"),

@@ -45,7 +45,9 @@ fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
 fn least(scene: &Scene, timeline: &Timeline, freeze: &TimedEvent) -> Option<LeastOfShow> {
     let mut silent = |_| ();
     let (boards, obstacles) = match &scene.ensemble {
-        Some(all) => (all.least_clearance(freeze, &mut silent), all.obstacle_clearances(freeze, &mut silent)),
+        Some(all) => {
+            (all.least_clearances(freeze, &mut silent).of_show(), all.obstacle_clearances(freeze, &mut silent))
+        }
         None => {
             let motion = &scene.motion;
             let boards = motion.least_clearance(timeline, freeze, &mut silent);

@@ -4,17 +4,14 @@
 //! The publisher and the server are separate processes; `control` reads the state of the publisher.
 //! `tests/python/conduct_page.py` tests the page's transport bar in Debian's Chromium. No test asserts a speed.
 
-use crate::{ONE_AT_A_TIME, harness};
+use crate::{harness, run_scenario};
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
-use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
-use harness::{
-    Process, can_run, chromium, json_lines, program, python, python_modules, scene_file, text, unique, wait,
-};
+use harness::{Process, json_lines, program, scene_file, text, wait};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tungstenite::stream::MaybeTlsStream;
@@ -52,7 +49,7 @@ fn state(name: &str) -> Option<Value> {
 /// Returns a server on a free port, and the line that it printed.
 fn server(name: &str, arguments: &[&str]) -> (Process, Value) {
     let mut server = Process::start(program(name).args(["view", "--json", "--port", "0"]).args(arguments));
-    let ready = serde_json::from_str(&server.first_line_within(20)).unwrap();
+    let ready = serde_json::from_str(&server.first_line()).unwrap();
     (server, ready)
 }
 
@@ -225,14 +222,14 @@ fn commands_need_control_and_beyond_this_machine_a_token() {
     }
     let mut people = Process::start(program(name).args(["view", "--port", "0", "--listen", "0.0.0.0", "--control"]));
     let lines = people.lines();
-    let first = lines.until("localhost", 20);
+    let first = lines.until("localhost");
     let token = first.split("#token=").nth(1).unwrap().split('.').next().unwrap();
     assert_eq!(token.len(), 32, "{first}");
     // The addresses that users of other machines type, as the system lists them.
     let addresses = std::process::Command::new("hostname").arg("-I").output().unwrap();
     let addresses = text(&addresses.stdout);
     for address in addresses.split_whitespace().filter(|address| address.contains('.')) {
-        assert!(lines.until(&format!("http://{address}:"), 20).ends_with(&format!("/#token={token}")));
+        assert!(lines.until(&format!("http://{address}:")).ends_with(&format!("/#token={token}")));
     }
 }
 
@@ -315,21 +312,7 @@ fn pages_of_ones_own_are_served_and_nothing_beside_them() {
 }
 
 fn in_a_browser(scenario: &str) {
-    if !can_run(chromium().and_then(|()| python_modules(&["playwright"]))) {
-        return;
-    }
-    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let scene = cued_scene(scenario);
-    let program = env!("CARGO_BIN_EXE_bench-dragon");
-    let arguments = [
-        "tests/python/conduct_page.py",
-        scenario,
-        program,
-        &unique(&format!("c_{}", &scenario[..6])),
-        scene.to_str().unwrap(),
-    ];
-    let output = Process::start(python().args(arguments)).output_within(320);
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    run_scenario("conduct_page.py", scenario, &[cued_scene(scenario).to_str().unwrap()]);
 }
 
 #[test]

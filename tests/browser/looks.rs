@@ -4,58 +4,70 @@
 //! `stage_dragons.py` and `stage_ground.py`. No test asserts a speed.
 
 use crate::harness::{can_run, python_modules};
-use crate::view::run_scenario;
+use crate::run_scenario;
 
 #[test]
 fn header_says_what_the_show_does() {
-    run_scenario("tests/python/stage_transport.py", "header_says_what_the_show_does");
+    run_scenario("stage_transport.py", "header_says_what_the_show_does", &[]);
 }
 
 #[test]
 fn show_is_locked() {
-    run_scenario("tests/python/stage_show.py", "show_is_locked");
+    run_scenario("stage_show.py", "show_is_locked", &[]);
 }
 
 #[test]
 fn coming_lanterns_burn_white() {
-    run_scenario("tests/python/stage_show.py", "coming_lanterns_burn_white");
+    run_scenario("stage_show.py", "coming_lanterns_burn_white", &[]);
 }
 
 #[test]
 fn labels_point_at_their_boards() {
-    run_scenario("tests/python/stage_labels.py", "labels_point_at_their_boards");
+    run_scenario("stage_labels.py", "labels_point_at_their_boards", &[]);
 }
 
 #[test]
 fn labels_move_with_their_boards() {
-    run_scenario("tests/python/stage_labels.py", "labels_move_with_their_boards");
+    run_scenario("stage_labels.py", "labels_move_with_their_boards", &[]);
 }
 
 #[test]
 fn turns_keep_the_colours_of_boards() {
-    run_scenario("tests/python/stage_colours.py", "turns_keep_the_colours_of_boards");
+    run_scenario("stage_colours.py", "turns_keep_the_colours_of_boards", &[]);
 }
 
 #[test]
 fn seat_shows_the_dragon() {
-    run_scenario("tests/python/stage_seat.py", "seat_shows_the_dragon");
+    run_scenario("stage_seat.py", "seat_shows_the_dragon", &[]);
 }
 
 #[test]
 fn slow_computer_shows_stills() {
-    run_scenario("tests/python/stage_seat.py", "slow_computer_shows_stills");
+    run_scenario("stage_seat.py", "slow_computer_shows_stills", &[]);
 }
 
 #[test]
 fn cameras_are_kept() {
-    run_scenario("tests/python/stage_seat.py", "cameras_are_kept");
+    run_scenario("stage_seat.py", "cameras_are_kept", &[]);
 }
 
 /// Runs a scenario of several dragons, whose distances shapely computes.
 fn of_several(scenario: &str) {
     if can_run(python_modules(&["shapely"])) {
-        run_scenario("tests/python/stage_dragons.py", scenario);
+        run_scenario("stage_dragons.py", scenario, &[]);
     }
+}
+
+/// Runs a scenario of a stage with obstacles, likewise.
+fn on_ground(scenario: &str) {
+    if can_run(python_modules(&["shapely"])) {
+        run_scenario("stage_ground.py", scenario, &[]);
+    }
+}
+
+#[test]
+fn two_dragons_are_drawn_apart() {
+    of_several("two_are_drawn_apart");
 }
 
 #[test]
@@ -75,10 +87,20 @@ fn each_dragon_has_its_light() {
 
 #[test]
 fn obstacles_are_drawn() {
-    run_scenario("tests/python/stage_ground.py", "obstacles_are_drawn");
+    on_ground("obstacles_are_drawn");
+}
+
+#[test]
+fn lines_join_what_is_nearest() {
+    on_ground("lines_join_what_is_nearest");
+}
+
+#[test]
+fn curve_stays_in_its_place() {
+    on_ground("curve_stays_in_its_place");
 }
 
 #[test]
 fn a_board_meets_an_obstacle() {
-    run_scenario("tests/python/stage_ground.py", "a_board_meets_an_obstacle");
+    on_ground("a_board_meets_an_obstacle");
 }

@@ -1,21 +1,17 @@
 //! The proved results of a show: found by the hash of its scene's text, which the stage carries, and a certificate of
 //! the same text. `tests/python/stage_proofs.py` tests the browser. No test asserts a speed.
 
-use crate::{ONE_AT_A_TIME, harness};
+use crate::{harness, run_scenario};
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
-use std::sync::PoisonError;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use harness::{Process, can_run, chromium, json_lines, program, python, python_modules, text, unique};
+use harness::{Process, can_run, json_lines, program, python, python_modules, text, unique};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tungstenite::Message;
 use tungstenite::stream::MaybeTlsStream;
-
-/// Deadline of every wait, seconds.
-const DEADLINE: u64 = 120;
 
 /// Returns the school's scene in a folder, with another first line.
 fn scene(folder: &Path, first_line: &str) -> PathBuf {
@@ -25,7 +21,7 @@ fn scene(folder: &Path, first_line: &str) -> PathBuf {
 }
 
 fn done(arguments: &[&str]) -> Output {
-    let output = Process::start(program("done").args(arguments)).output_within(DEADLINE);
+    let output = Process::start(program("done").args(arguments)).output();
     assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
     output
 }
@@ -39,7 +35,7 @@ fn publisher(name: &str, scene: &Path) -> Process {
 fn hashes(name: &str, scene: &Path) -> Value {
     let mut peer = python();
     peer.args(["tests/python/scene_hash.py", "--name", &unique(name), "--scene"]).arg(scene);
-    let output = Process::start(&mut peer).output_within(DEADLINE);
+    let output = Process::start(&mut peer).output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     json_lines(&output).pop().unwrap()
 }
@@ -103,7 +99,7 @@ fn what_is_no_certificate_is_refused_with_a_sentence() {
     ];
     for (file, expected) in refused {
         let arguments = ["view", "--port", "0", "--certificate", file.to_str().unwrap()];
-        let output = Process::start(program("refused").args(arguments)).output_within(DEADLINE);
+        let output = Process::start(program("refused").args(arguments)).output();
         let sentence = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{}: {sentence}", file.display());
         assert!(sentence.contains(expected) && sentence.contains(file.to_str().unwrap()), "{sentence}");
@@ -114,11 +110,11 @@ fn what_is_no_certificate_is_refused_with_a_sentence() {
     let arguments = ["view", "--port", "0", "--json", "--certificate", cut.to_str().unwrap()];
     let mut view = Process::start(program("cut").args(arguments));
     let lines = view.lines();
-    let verdict: Value = serde_json::from_str(&lines.until("\"certificate\"", DEADLINE)).unwrap();
+    let verdict: Value = serde_json::from_str(&lines.until("\"certificate\"")).unwrap();
     assert_eq!(verdict["verdict"], "refused");
     assert!(verdict["problem"].as_str().unwrap().ends_with("the file ends before its results"), "{verdict}");
     view.signal(Signal::SIGTERM);
-    let output = view.output_within(DEADLINE);
+    let output = view.output();
     let logged = text(&output.stderr);
     assert!(output.status.success(), "{logged}");
     assert!(logged.contains("ERROR") && logged.contains("nothing is proved by this certificate"), "{logged}");
@@ -132,14 +128,14 @@ fn a_program_is_told_what_is_proved() {
     done(&["--scene", scene.to_str().unwrap(), "events", "--certify", proof]);
     let verdict = json_lines(&done(&["verify", "--json", proof])).pop().unwrap();
     let mut view = Process::start(program("told").args(["view", "--port", "0", "--json", "--certificate", proof]));
-    let ready: Value = serde_json::from_str(&view.first_line_within(DEADLINE)).unwrap();
+    let ready: Value = serde_json::from_str(&view.first_line()).unwrap();
     let _run = publisher("told", &scene);
     let address = ready["url"].as_str().unwrap().replace("http", "ws") + "frames";
     let (mut socket, _) = tungstenite::connect(address).unwrap();
     if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
-        stream.set_read_timeout(Some(Duration::from_secs(DEADLINE))).unwrap();
+        stream.set_read_timeout(Some(harness::patience())).unwrap();
     }
-    let deadline = Instant::now() + Duration::from_secs(DEADLINE);
+    let deadline = Instant::now() + harness::patience();
     loop {
         assert!(Instant::now() < deadline, "nothing was proved");
         let Message::Text(message) = socket.read().unwrap() else { continue };
@@ -156,14 +152,7 @@ fn a_program_is_told_what_is_proved() {
 }
 
 fn in_a_browser(scenario: &str) {
-    if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
-        return;
-    }
-    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let script = "tests/python/stage_proofs.py";
-    let arguments = [script, scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&format!("p_{}", &scenario[..6]))];
-    let output = Process::start(python().args(arguments)).output_within(180);
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    run_scenario("stage_proofs.py", scenario, &[]);
 }
 
 #[test]

@@ -2,24 +2,18 @@
 //! `tests/python/several_page.py` tests the browser; `tests/python/psn_peer.py` tests the desk. No test asserts a
 //! speed.
 
-use crate::{ONE_AT_A_TIME, harness};
+use crate::{harness, run_scenario};
 
 use std::net::UdpSocket;
-use std::sync::PoisonError;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use harness::{
-    Process, can_run, chromium, http_get, program, python, python_modules, scene_file, summary, text, unique, wait,
-};
+use harness::{Process, can_run, http_get, program, python, python_modules, scene_file, summary, text, unique, wait};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tungstenite::Message;
 
 /// A solver with which the publisher starts at once, even if the program is not optimised.
 const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
-/// Deadline of every wait, seconds.
-const DEADLINE: u64 = 120;
-
 fn publisher(name: &str, arguments: &[&str]) -> Process {
     let scene = scene_file(name, &[NEWTON]);
     let mut run = program(name);
@@ -36,7 +30,7 @@ fn of_several(names: &[&str]) -> std::process::Command {
 #[test]
 fn a_command_of_one_publisher_refuses_a_second_name() {
     let refused = |arguments: &[&str]| {
-        let output = Process::start(of_several(&["one"]).args(arguments)).output_within(DEADLINE);
+        let output = Process::start(of_several(&["one"]).args(arguments)).output();
         let printed = text(&output.stderr);
         assert_eq!((output.status.code(), printed.lines().count()), (Some(2), 1), "{arguments:?}: {printed}");
         printed
@@ -89,7 +83,7 @@ fn a_program_reads_each_dragon_by_its_name() {
     let names = ["socket_a", "socket_b"];
     let _publishers = names.map(|name| publisher(name, &["--start", "100"]));
     let mut server = Process::start(of_several(&names).args(["view", "--json", "--port", "0"]));
-    let ready: Value = serde_json::from_str(&server.first_line_within(20)).unwrap();
+    let ready: Value = serde_json::from_str(&server.first_line()).unwrap();
     let address = ready["url"].as_str().unwrap().trim_start_matches("http://").trim_end_matches('/').to_owned();
     let seen = names.map(|name| stage_and_run(&address, &format!("?rate=10&name={}", unique(name))));
     for (name, (stage, run)) in names.iter().zip(&seen) {
@@ -126,25 +120,25 @@ fn one_desk_hears_two_dragons_under_numbers_that_stay() {
     peer.args(["tests/python/psn_peer.py", "--progress", "--port", &port, "--first-id", "11", "--id-step", "300"]);
     let mut peer = Process::start(peer.args(names.iter().flat_map(|name| ["--name".to_owned(), unique(name)])));
     let lines = peer.lines();
-    lines.until("listening", DEADLINE);
+    lines.until("listening");
     let mut send = of_several(&names);
     send.args(["send", "psn", "--to", &format!("127.0.0.1:{port}"), "--interface", "127.0.0.1"]);
     let mut sender = Process::start(send.args(["--first-id", "11", "--id-step", "300"]));
     let said = sender.lines();
     let team = |name: &str, first: u32| {
-        let line = said.until("of 224 handles", DEADLINE);
+        let line = said.until("of 224 handles");
         let (name, last) = (unique(name), first + 223);
         assert!(line.contains(&format!("({first} = {name} head to {last} = {name} tail)")), "{line}");
     };
     let ended = |process: Process| {
         process.signal(Signal::SIGTERM);
-        summary(&process.output_within(DEADLINE));
+        summary(&process.output());
     };
     // Waits until the dragon at this place has stopped `stopped` times, and has then been received in `equal` frames.
     let hears = |place: usize, stopped: u64, equal: u64| {
-        let deadline = Instant::now() + Duration::from_secs(DEADLINE);
+        let deadline = Instant::now() + harness::patience();
         loop {
-            let heard: Value = serde_json::from_str(&lines.until("\"progress\"", DEADLINE)).unwrap();
+            let heard: Value = serde_json::from_str(&lines.until("\"progress\"")).unwrap();
             let [times, frames] = ["stopped", "equal"].map(|what| heard[what][place].as_u64().unwrap());
             if times == stopped && frames >= equal {
                 return;
@@ -158,20 +152,20 @@ fn one_desk_hears_two_dragons_under_numbers_that_stay() {
     team(names[1], 311);
     hears(1, 0, 60);
     ended(second);
-    let stopped = |name: &str| said.until(&format!("No frames come from \"{}\"", unique(name)), DEADLINE);
+    let stopped = |name: &str| said.until(&format!("No frames come from \"{}\"", unique(name)));
     stopped(names[1]);
     let second = publisher(names[1], &["--start", "300", "--rate", "60"]);
-    said.until(&format!("Frames come from \"{}\" again", unique(names[1])), DEADLINE);
+    said.until(&format!("Frames come from \"{}\" again", unique(names[1])));
     hears(1, 1, 60);
     hears(0, 0, 150);
     ended(first);
     stopped(names[0]);
     hears(0, 1, 0);
     sender.signal(Signal::SIGTERM);
-    said.rest(DEADLINE);
+    said.rest();
     ended(second);
-    let last = lines.rest(DEADLINE).pop();
-    let output = peer.output_within(DEADLINE);
+    let last = lines.rest().pop();
+    let output = peer.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     let heard: Value = serde_json::from_str(&last.unwrap()).unwrap();
     println!("{} frames: {}", heard["frames"], heard["publishers"]);
@@ -194,9 +188,9 @@ fn metrics_and_osc_tell_two_dragons_apart() {
     let names = ["figures_a", "figures_b"];
     let publishers = names.map(|name| publisher(name, &["--start", "100"]));
     let mut metrics = Process::start(of_several(&names).args(["metrics", "--json", "--listen", "127.0.0.1:0"]));
-    let ready: Value = serde_json::from_str(&metrics.first_line_within(DEADLINE)).unwrap();
+    let ready: Value = serde_json::from_str(&metrics.first_line()).unwrap();
     let desk = UdpSocket::bind("127.0.0.1:0").unwrap();
-    desk.set_read_timeout(Some(Duration::from_secs(DEADLINE))).unwrap();
+    desk.set_read_timeout(Some(harness::patience())).unwrap();
     let to = desk.local_addr().unwrap().to_string();
     let _osc = Process::start(of_several(&names).args(["send", "osc", "--to", &to]));
     for name in names {
@@ -212,7 +206,7 @@ fn metrics_and_osc_tell_two_dragons_apart() {
         answer.lines().any(|line| line == format!("bench_dragon_up{{name=\"{}\"}} {value}", unique(name)))
     };
     let until = |expected: [u8; 2]| {
-        let answers = (0..DEADLINE * 10).map(|_| {
+        let answers = (0..harness::patience().as_secs() * 10).map(|_| {
             wait(0.1);
             http_get(ready["url"].as_str().unwrap(), "*/*")
         });
@@ -227,19 +221,7 @@ fn metrics_and_osc_tell_two_dragons_apart() {
 }
 
 fn in_a_browser(scenario: &str) {
-    if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
-        return;
-    }
-    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let arguments = [
-        "tests/python/several_page.py",
-        scenario,
-        env!("CARGO_BIN_EXE_bench-dragon"),
-        &unique(&format!("s_{}", &scenario[..3])),
-    ];
-    let output = Process::start(python().args(arguments)).output_within(200);
-    println!("{}", text(&output.stdout));
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    run_scenario("several_page.py", scenario, &[]);
 }
 
 #[test]

@@ -3,14 +3,13 @@
 //! The browser is Debian's Chromium; its tests are in `tests/python/stage_picture.py`, `stage_motion.py`,
 //! `stage_show.py`, `stage_places.py` and `stage_reach.py`. No test asserts a speed.
 
-use crate::{ONE_AT_A_TIME, harness};
+use crate::{harness, run_scenario};
 
 use std::net::TcpStream;
-use std::sync::PoisonError;
 use std::time::Duration;
 
 use bench_dragon::client::clock::monotonic_ns;
-use harness::{Process, can_run, chromium, long, program, python, python_modules, text, unique, wait};
+use harness::{Process, can_run, program, python, python_modules, text, unique, wait};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use tungstenite::stream::MaybeTlsStream;
@@ -21,7 +20,7 @@ type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
 /// Returns a server on a free port, and its address without the scheme and the last slash.
 fn server(name: &str) -> (Process, String) {
     let mut server = Process::start(program(name).args(["view", "--json", "--port", "0"]));
-    let ready: Value = serde_json::from_str(&server.first_line_within(20)).unwrap();
+    let ready: Value = serde_json::from_str(&server.first_line()).unwrap();
     assert_eq!(ready["type"], "ready");
     let url = ready["url"].as_str().unwrap();
     let address = url.strip_prefix("http://").and_then(|url| url.strip_suffix('/')).unwrap();
@@ -137,7 +136,7 @@ fn the_python_example_reads_the_socket() {
     let read = |name: &str| {
         let url = format!("ws://{address}/frames?name={name}");
         let arguments = ["examples/python/stage_socket.py", "--url", &url, "--seconds", "4"];
-        Process::start(python().args(arguments)).output_within(30)
+        Process::start(python().args(arguments)).output()
     };
     let refused = read("nobody");
     let sentence = text(&refused.stderr);
@@ -217,62 +216,49 @@ fn foreign_origins_are_refused() {
 #[test]
 fn listening_beyond_this_machine_is_said_aloud() {
     let mut open = Process::start(program("aloud").args(["view", "--port", "0", "--listen", "0.0.0.0"]));
-    assert!(open.first_line_within(20).contains("of every address of this machine"));
+    assert!(open.first_line().contains("of every address of this machine"));
     open.signal(Signal::SIGTERM);
-    let printed = text(&open.output_within(20).stderr);
+    let printed = text(&open.output().stderr);
     assert!(printed.contains("WARNING") && printed.contains("anyone"), "{printed}");
     let mut closed = Process::start(program("quiet").args(["view", "--port", "0"]));
-    assert!(closed.first_line_within(20).contains("http://127.0.0.1:"));
+    assert!(closed.first_line().contains("http://127.0.0.1:"));
     closed.signal(Signal::SIGTERM);
-    assert_eq!(text(&closed.output_within(20).stderr), "");
+    assert_eq!(text(&closed.output().stderr), "");
 }
 
 #[test]
 fn an_address_that_cannot_be_used_is_one_sentence() {
     let (_server, address) = server("taken");
     let port = address.rsplit(':').next().unwrap();
-    let taken = Process::start(program("taken").args(["view", "--port", port])).output_within(20);
+    let taken = Process::start(program("taken").args(["view", "--port", port])).output();
     let printed = text(&taken.stderr);
     assert_eq!(taken.status.code(), Some(1), "{printed}");
     assert!(printed.contains("--port") && printed.lines().count() == 1, "{printed}");
     // 192.0.2.0/24 is for documentation: no machine has it.
-    let other = Process::start(program("other").args(["view", "--listen", "192.0.2.1"])).output_within(20);
+    let other = Process::start(program("other").args(["view", "--listen", "192.0.2.1"])).output();
     let printed = text(&other.stderr);
     assert_eq!(other.status.code(), Some(2), "{printed}");
     assert!(printed.contains("--listen") && printed.lines().count() == 1, "{printed}");
 }
 
 fn in_a_browser(scenario: &str) {
-    run_scenario("tests/python/stage_picture.py", scenario);
+    run_scenario("stage_picture.py", scenario, &[]);
 }
 
 fn in_motion(scenario: &str) {
-    run_scenario("tests/python/stage_motion.py", scenario);
+    run_scenario("stage_motion.py", scenario, &[]);
 }
 
 fn on_stage(scenario: &str) {
-    run_scenario("tests/python/stage_show.py", scenario);
+    run_scenario("stage_show.py", scenario, &[]);
 }
 
 fn in_place(scenario: &str) {
-    run_scenario("tests/python/stage_places.py", scenario);
+    run_scenario("stage_places.py", scenario, &[]);
 }
 
 fn in_reach(scenario: &str) {
-    run_scenario("tests/python/stage_reach.py", scenario);
-}
-
-pub(crate) fn run_scenario(script: &str, scenario: &str) {
-    if !can_run(chromium().and_then(|()| python_modules(&["playwright", "numpy"]))) {
-        return;
-    }
-    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let arguments = [script, scenario, env!("CARGO_BIN_EXE_bench-dragon"), &unique(&scenario[..6])];
-    // If long tests are requested, the scenario of ten minutes ends itself.
-    let limit = if long() { 900 } else { 180 };
-    let output = Process::start(python().args(arguments)).output_within(limit);
-    println!("{}", text(&output.stdout));
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    run_scenario("stage_reach.py", scenario, &[]);
 }
 
 #[test]

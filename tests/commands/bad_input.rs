@@ -240,3 +240,16 @@ fn a_million_benches_at_a_rate_nobody_can_meet_are_no_bad_input() {
     assert_eq!(frames + skipped, 40_000, "{summary}");
     assert!(frames > 0 && overruns > 0, "{summary}");
 }
+
+#[test]
+fn a_scene_without_its_option_is_told_the_option() {
+    let commands = "check|run|solve --at 1|events|draw|trade|plan pitch|plan speed|plan turn|soak|";
+    for command in commands.split('|') {
+        let arguments: Vec<&str> = command.split_whitespace().chain(["config/paper.toml"]).collect();
+        let sentence = "error: unexpected argument 'config/paper.toml', expected --scene config/paper.toml\n";
+        assert_eq!(refusal(&arguments), sentence, "{arguments:?}");
+    }
+    // Other arguments are refused in clap's words.
+    assert!(refusal(&["check", "paper"]).contains("'paper'"));
+    assert!(!refusal(&["check", "paper"]).contains("--scene paper"));
+}

@@ -79,8 +79,22 @@ fn the_program_proves_the_contact_of_two_dragons() {
     assert!(code == Some(0) && said.contains("Of gold, contact:\n           Proved."), "{said}");
     let (_, said, code) = program(&["view", "--port", "0", "--certificate", file]);
     assert!(code == Some(2) && said.contains("certificate of several dragons"), "{said}");
-    let (_, said, code) = program(&["--scene", scene, "check", "--prove"]);
-    assert!(code == Some(2) && said.contains("several dragons, whose clearance no proof knows"), "{said}");
+    // Until they touch, at 0; alone each is on a line, with two holes between benches 1 and 3.
+    let (said, errors, code) = program(&["--scene", scene, "check", "--prove", "--certify", file]);
+    assert_eq!((errors.as_str(), code), ("", Some(0)), "{said}");
+    assert!(said.contains("The least clearance of the show is"), "{said}");
+    // That of the show is that between dragons, and is said once.
+    assert!(!said.contains("The least clearance between dragons"), "{said}");
+    assert!(said.contains("The least clearance of gold and jade: Proved: it is"), "{said}");
+    let (lines, errors, code) = program(&["--scene", scene, "check", "--prove", "--json"]);
+    assert_eq!((errors.as_str(), code), ("", Some(0)));
+    let parts: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let names: Vec<String> = parts.iter().map(|part| part["dragons"].to_string()).collect();
+    assert_eq!(names, ["[\"gold\"]", "[\"jade\"]", "[\"gold\",\"jade\"]"]);
+    assert!(parts.iter().all(|part| part["least_clearance_status"] == "proved"), "{lines}");
+    let (said, _, code) = program(&["verify", file]);
+    assert!(code == Some(0) && said.contains("gold and jade, least clearance from the start"), "{said}");
+    assert!(said.contains("no board of the one and board of the other are nearer than"), "{said}");
 }
 
 /// A certificate is made, checked, refused after a change of one digit, and printed for its own scene only.

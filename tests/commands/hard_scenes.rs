@@ -38,7 +38,7 @@ fn newton(scene: &Scene) -> Newton {
 
 /// Returns the program's output within ten minutes, a deadline for hanging and no measure of speed.
 fn answer(arguments: &[&str]) -> (i32, String, String) {
-    let output = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments)).output_within(600);
+    let output = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments)).output();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }
@@ -145,7 +145,7 @@ fn bends_as_wide_as_a_link_are_searched() {
             heading_turns: 0.0,
             steps: vec![
                 RouteStep::Line { length: 3.0 * link },
-                RouteStep::Arc { side: Side::Left, radius, turns: 0.5 },
+                RouteStep::Arc { side: Side::Left, radius, turns: 0.5.into() },
                 RouteStep::Line { length: 6.0 * link },
             ],
         };
@@ -183,8 +183,9 @@ fn the_fastest_handle_is_the_highest_peak() {
     let scene = scene("plan_speed_wrong");
     let plan = greatest_speed(&scene, &timeline(&scene), 1.0, &mut |_| ()).unwrap();
     assert!((plan.ratio - 3828.99).abs() < 0.1 && (plan.time - 8.325).abs() < 1e-3, "{plan:?}");
-    // This near a lock, doubles enclose no step that holds the peak: there is no bound, and no proof is claimed.
-    assert!(!plan.proved && plan.value_lo == 0.0 && plan.value_hi < 1.0 / 3828.0, "{plan:?}");
+    // This near a lock, doubles enclose the peak, but not to a nanometre a second: no proof is claimed.
+    let (lo, hi) = (plan.value_lo, plan.value_hi);
+    assert!(!plan.proved && lo < 1.0 / 3828.99 && hi > 1.0 / 3828.99 && hi < 1.0 / 3828.0, "{plan:?}");
 }
 
 /// N8: boards that touch in a bend far outside with small pitches, and boards that overlap on a straight line.

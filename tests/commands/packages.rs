@@ -18,14 +18,14 @@ fn read(file: &str) -> String {
 /// Returns the manual in a new folder.
 fn manual() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let output = Process::start(program("manual").arg("write-manual").arg(folder.path())).output_within(60);
+    let output = Process::start(program("manual").arg("write-manual").arg(folder.path())).output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     folder
 }
 
 /// Returns the commands that `bench-dragon --help` lists.
 fn listed_commands() -> Vec<String> {
-    let help = text(&Process::start(program("manual").arg("--help")).output_within(60).stdout);
+    let help = text(&Process::start(program("manual").arg("--help")).output().stdout);
     let (_, commands) = help.split_once("Commands:\n").expect("a list of commands");
     let lines = commands.lines().take_while(|line| !line.is_empty()).filter(|line| line.starts_with("  "));
     let words = lines.filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next());
@@ -55,7 +55,7 @@ fn every_command_has_a_man_page_and_completions() {
     assert!(!hidden.into_iter().any(|name| name.contains("soak-") || name.contains("manual")), "a hidden command");
     let mut bash = Command::new("bash");
     bash.arg("-n").arg(folder.path().join("completions/bench-dragon"));
-    assert!(Process::start(&mut bash).output_within(60).status.success(), "bash does not read its completions");
+    assert!(Process::start(&mut bash).output().status.success(), "bash does not read its completions");
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn versions_are_one_and_the_program_prints_them() {
             expected.insert(format!("{name}/{number}"));
         }
     }
-    let printed = text(&Process::start(program("versions").arg("--version")).output_within(60).stdout);
+    let printed = text(&Process::start(program("versions").arg("--version")).output().stdout);
     let lines: Vec<_> = printed.lines().collect();
     assert_eq!(lines[..2], [format!("bench-dragon {version}"), format!("iceoryx2 {iceoryx2}")]);
     let layouts = lines[2].strip_prefix("layouts ").unwrap().split(", ").map(str::to_owned);
@@ -144,7 +144,7 @@ fn the_ros_2_package_installs_what_its_launch_file_names() {
     let (compiled, mut input) = Process::start_with_input(&mut compile);
     std::io::Write::write_all(&mut input, launch.as_bytes()).unwrap();
     drop(input);
-    let output = compiled.output_within(60);
+    let output = compiled.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     let lists = read(&format!("{folder}/CMakeLists.txt"));
     for (named, file) in
@@ -165,7 +165,7 @@ fn run_in_the_long_run(script: &str, arguments: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let mut script = Command::new(script);
     script.current_dir(ROOT).arg(folder.path().join("made")).args(arguments);
-    let output = Process::start(&mut script).output_within(3600);
+    let output = Process::start(&mut script).output();
     assert!(output.status.success(), "{}\n{}", text(&output.stdout), text(&output.stderr));
 }
 

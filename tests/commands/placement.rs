@@ -43,6 +43,8 @@ fn check_names_the_parts_of_a_placement_that_change_something() {
     let words = "Placement: the path's coordinates mirrored, then turned by 0.25 turns, then moved by (1, -2.5) m.";
     assert_eq!(told(whole), [words]);
     assert_eq!(told("rotation_turns = 0.25"), ["Placement: the path's coordinates turned by 0.25 turns."]);
+    assert_eq!(told("rotation_turns = 0.5"), ["Placement: the path's coordinates turned by 0.5 turns."]);
+    assert_eq!(told("rotation_turns = -0.25"), ["Placement: the path's coordinates turned by -0.25 turns."]);
     assert_eq!(told("origin = [0.0, 3.0]"), ["Placement: the path's coordinates moved by (0, 3) m."]);
     assert!(told("origin = [0.0, 0.0]\nrotation_turns = 0.0").is_empty());
 }

@@ -1,4 +1,4 @@
-//! `plan turn`: a ratio that no formula gives against another search, and bad input.
+//! `plan turn`: a ratio that no formula gives and wide boards against another search, and bad input.
 
 use std::io::Write;
 use std::process::Command;
@@ -6,9 +6,10 @@ use std::process::Command;
 use crate::harness::{can_run, python, python_modules, text};
 use serde_json::Value;
 
-/// Plans a turn of the turnaround's team with 12 benches.
-fn planned(ratio: &str) -> Value {
+/// Plans a turn of the turnaround's team with 12 benches of a width in metres.
+fn planned(ratio: &str, width: &str) -> Value {
     let scene = include_str!("../../config/turnaround.toml").replace("benches = 223", "benches = 12");
+    let scene = scene.replace("width = 0.30", &format!("width = {width}"));
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     file.write_all(scene.as_bytes()).unwrap();
     let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
@@ -26,21 +27,45 @@ fn number(line: &Value, field: &str) -> f64 {
 fn the_least_turn_of_a_third_ratio_is_that_of_another_search() {
     // By `tests/python/least_turn.py`: the head's link locks at the junction of the arcs.
     const RADIUS: f64 = 3.552348981005;
-    let line = planned("1.5");
-    let (lo, value) = (number(&line, "value_lo"), number(&line, "value"));
-    assert!(lo <= RADIUS + 1e-11 && RADIUS - lo < 1e-8, "{line}");
-    assert!((value - RADIUS).abs() < 1e-8 && number(&line, "value_hi") > RADIUS - 1e-11, "{line}");
+    let line = planned("1.5", "0.30");
+    encloses(&line, RADIUS);
     assert_eq!((&line["limit"], &line["bench_a"]), (&"lock".into(), &0.into()), "{line}");
-    let a = 1.7 / std::f64::consts::TAU;
-    let length = 2.0 * RADIUS.hypot(a) * (RADIUS / a).atan();
-    assert!((number(&line, "length") - length).abs() < 1e-7, "{line}");
-    if !can_run(python_modules(&["math"])) {
-        return;
+    if can_run(python_modules(&["math"])) {
+        let (radius, printed) = other_search(&["1.5"], 0);
+        assert!((radius - RADIUS).abs() < 5e-9, "{printed}");
     }
-    let peer = python().args(["tests/python/least_turn.py", "1.7", "2.86", "1.5"]).output().unwrap();
-    let printed = text(&peer.stdout);
-    let found = printed.split(' ').next().and_then(|radius| radius.parse::<f64>().ok());
-    assert!((found.unwrap_or(f64::NAN) - RADIUS).abs() < 5e-9, "{printed}{}", text(&peer.stderr));
+}
+
+#[test]
+fn the_least_turn_of_wide_boards_is_that_of_another_search() {
+    // By `tests/python/least_turn.py`: the head meets the tail.
+    const RADIUS: f64 = 4.470396276098;
+    let line = planned("2", "1.3");
+    encloses(&line, RADIUS);
+    assert_eq!((&line["limit"], &line["bench_a"], &line["bench_b"]), (&"contact".into(), &0.into(), &11.into()));
+    if can_run(python_modules(&["math"])) {
+        let (radius, printed) = other_search(&["2", "12", "1.65", "0.275", "1.3"], 1);
+        assert!((radius - RADIUS).abs() < 5e-11 && printed.ends_with(" 0 11\n"), "{printed}");
+    }
+}
+
+/// Asserts that a radius is enclosed within a nanometre with a proof, and the length of its S.
+fn encloses(line: &Value, radius: f64) {
+    let (lo, hi) = (number(line, "value_lo"), number(line, "value_hi"));
+    assert!(lo <= radius + 2e-11 && hi >= radius - 2e-11 && hi - lo <= 1e-9, "{line}");
+    assert_eq!((&line["status"], &line["value"]), (&"proved".into(), &line["value_hi"]), "{line}");
+    let a = 1.7 / std::f64::consts::TAU;
+    let length = 2.0 * radius.hypot(a) * (radius / a).atan();
+    assert!((number(line, "length") - length).abs() < 1e-7, "{line}");
+}
+
+/// Returns the radius in a line that `least_turn.py` prints, and all that it prints.
+fn other_search(ratio_and_team: &[&str], line: usize) -> (f64, String) {
+    let mut program = python();
+    let peer = program.args(["tests/python/least_turn.py", "1.7", "2.86"]).args(ratio_and_team).output().unwrap();
+    let radius = |line: &str| line.split(' ').next().and_then(|radius| radius.parse().ok());
+    let found = text(&peer.stdout).lines().nth(line).and_then(radius);
+    (found.unwrap_or(f64::NAN), format!("{}{}", text(&peer.stderr), text(&peer.stdout)))
 }
 
 #[test]

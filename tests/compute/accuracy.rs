@@ -67,7 +67,7 @@ fn assert_kept(motion: &Motion, wish: f64, solver: &mut dyn Solver, times: &[f64
         if newton.solve_at(motion.head_speed() * time, &mut truth).is_err() {
             continue;
         }
-        motion.placement().chain(&mut truth);
+        motion.placement().chain(&mut truth.all_mut());
         solver.solve(time, &mut found).unwrap_or_else(|none| panic!("{wish:e} at {time} s: {none}"));
         let at =
             |handle: usize| format!("{wish:e} m at {time} s, handle {handle}: {:?} {team:?}", motion.description());
@@ -250,7 +250,11 @@ fn motions() -> impl Strategy<Value = Motion> {
     let route = prop::collection::vec(step, 1..8).prop_map(|steps| {
         let steps = steps.into_iter().map(|(size, turns, left, line)| {
             let side = if left { Side::Left } else { Side::Right };
-            if line { RouteStep::Line { length: 2.0 * size } } else { RouteStep::Arc { side, radius: size, turns } }
+            if line {
+                RouteStep::Line { length: 2.0 * size }
+            } else {
+                RouteStep::Arc { side, radius: size, turns: turns.into() }
+            }
         });
         PathDescription::Route { heading_turns: 0.17, steps: steps.collect() }
     });

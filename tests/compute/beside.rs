@@ -216,3 +216,72 @@ fn changed_certificates_of_clearances_are_refused() {
         }
     }
 }
+
+/// Boards that overlap a wall by 20 mm all the way: a claim of a little more overlap follows from Lemma 11 with m < 0, a
+/// claim of less is false. No translation of 0.3 m frees boards between two walls, or boards within a polygon.
+#[test]
+fn claims_of_overlaps_are_checked() {
+    let scene = "[team]\nbenches = 3\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\
+                 [motion]\nhead_speed = 1.0\n[path]\nkind = \"pieces\"\npieces = [{ kind = \"line\", length = 4.0 }]\n";
+    let lines = enclosed(scene).lines;
+    let claimed = |stage: &str, metres: f64| {
+        let mut changed = String::new();
+        for line in lines.lines() {
+            let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
+            match line["type"].as_str().unwrap() {
+                "certificate" => line["scene"] = format!("{scene}[stage]\n{stage}\n").into(),
+                "step" => line["beside"] = vec![metres].into(),
+                _ => (),
+            }
+            changed += &format!("{line}\n");
+        }
+        changed += &format!(
+            "{{\"type\":\"obstacle_clearance\",\"obstacle\":0,\"lo\":{metres:?},\"hi\":null,\"until\":\"path_end\",\
+             \"time_until\":null,\"bench\":null}}\n"
+        );
+        check(&changed).map(|proved| proved.obstacle_clearances[0].lo)
+    };
+    let is_refused = |stage: &str, metres: f64| {
+        let said = claimed(stage, metres).map_err(|refused| refused.to_string());
+        assert!(said.as_ref().is_err_and(|said| said.contains("Lemma 11")), "{stage} {metres}: {said:?}");
+    };
+    // Half of the width is 0.15 m.
+    let wall = |y: f64, far: f64| {
+        format!(
+            "[[stage.obstacles]]\nname = \"wall\"\npolygon = [[-50.0, {y}], [50.0, {y}], [50.0, {far}], [-50.0, {far}]]"
+        )
+    };
+    let fence = "[[stage.obstacles]]\nname = \"fence\"\nline = [[-50.0, 0.13], [50.0, 0.13]]";
+    for stage in [wall(0.13, 9.0), wall(-0.13, -9.0), fence.to_owned()] {
+        for (metres, more) in [(-0.0201, -0.0199), (-0.1, 0.0)] {
+            assert_eq!(claimed(&stage, metres).unwrap(), Some(metres), "{stage}");
+            is_refused(&stage, more);
+        }
+    }
+    let boundary = |half: f64| {
+        format!("boundary = {{ polygon = [[-50.0, -{half}], [50.0, -{half}], [50.0, {half}], [-50.0, {half}]] }}")
+    };
+    // With walls 2.8 m apart the boundary frees boards, with walls 0.26 m apart it does not.
+    assert_eq!(claimed(&boundary(1.4), -0.1).unwrap(), Some(-0.1));
+    for metres in [-0.0201, -0.1, -0.14, -0.27, -0.29] {
+        is_refused(&boundary(0.13), metres);
+        is_refused(&wall(-1.4, 1.4), metres);
+    }
+}
+
+/// A polygon without a keep-out ends this show: boards touch it, and the lower bound of the clearance is below 0.
+#[test]
+fn a_show_that_ends_at_a_wall_is_enclosed_about_zero() {
+    let text = "[team]\nbenches = 3\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\
+                [motion]\nhead_speed = 1.0\non_contact = \"stop\"\n[path]\nkind = \"pieces\"\n\
+                pieces = [{ kind = \"line\", length = 2.0 }, \
+                { kind = \"arc\", radius = 4.0, side = \"left\", turns = 0.3 }]\n[alerts]\n[[stage.obstacles]]\n\
+                name = \"house\"\npolygon = [[5.0, -3.0], [9.0, -3.0], [9.0, 9.0], [5.0, 9.0], [6.0, 4.0]]\n";
+    let Enclosed { enclosures, lines, .. } = enclosed(text);
+    let ObstacleEnclosure { lo, hi, until, .. } = enclosures.obstacles[0].unwrap();
+    assert!(lo < 0.0 && lo > -1e-9 && hi - lo <= 1e-9 && until.is_none(), "{lo} {hi} {until:?}");
+    let claim = &check(&lines).unwrap().obstacle_clearances[0];
+    assert_eq!(claim.lo, Some(lo), "{claim:?}");
+    // Enclosed over the whole show, and true by the brute force.
+    assert_eq!(compared(text, 400).1, 1);
+}

@@ -10,6 +10,7 @@ use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::Scene;
 
+use crate::harness;
 use crate::oracle::scenes;
 
 const KINDS: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
@@ -86,7 +87,32 @@ fn paper_with(key: &str, value: &str) -> Scene {
     Scene::parse(&text.replace(&line, &format!("{key} = {value}")), "changed", "changed").unwrap()
 }
 
-/// Boards that meet slowly, long paths and heavy heads: every enclosure is at most a nanosecond wide.
+/// Spirals of three kinds: head and body alike, pitches at which boards meet slowly, long heads. Each has benches, head,
+/// body, width, inset, pitch, turns and speed.
+const SPIRALS: [(u32, [f64; 7]); 9] = [
+    (219, [1.917, 1.917, 0.336, 0.141, 0.9121, 21.05, 0.68]),
+    (83, [2.028, 2.028, 0.228, 0.222, 0.6204, 16.5, 0.89]),
+    (97, [2.941, 2.941, 0.364, 0.19, 0.8212, 21.42, 1.41]),
+    (220, [3.582, 2.37, 0.362, 0.122, 0.4634, 25.92, 0.63]),
+    (145, [3.086, 1.955, 0.389, 0.233, 0.5618, 24.57, 0.65]),
+    (223, [2.486, 2.201, 0.39, 0.207, 0.541, 21.82, 0.75]),
+    (177, [7.649, 2.888, 0.37, 0.125, 0.66, 14.35, 0.6]),
+    (147, [4.564, 1.743, 0.293, 0.231, 0.6178, 22.57, 1.5]),
+    (73, [7.446, 2.939, 0.312, 0.149, 0.7643, 19.62, 1.16]),
+];
+
+/// Returns one of [`SPIRALS`].
+fn spiral((benches, [head, body, width, inset, pitch, turns, speed]): (u32, [f64; 7])) -> Scene {
+    let text = format!(
+        "[team]\nbenches = {benches}\nhead_length = {head}\nbody_length = {body}\nwidth = {width}\n\
+         hole_inset = {inset}\n[path]\nkind = \"spiral\"\npitch = {pitch}\nstart_turn = {turns:?}\n\
+         [motion]\nhead_speed = {speed}\n"
+    );
+    Scene::parse(&text, "spiral", "spiral").unwrap()
+}
+
+/// Boards that meet slowly, long paths, heavy heads, a U-turn hardly narrower than a link: every enclosure is at most a
+/// nanosecond wide.
 #[test]
 fn enclosures_are_a_nanosecond_wide() {
     let changes = [
@@ -100,7 +126,12 @@ fn enclosures_are_a_nanosecond_wide() {
     ];
     let scenes = changes.iter().map(|(key, value)| (format!("{key} {value}"), paper_with(key, value)));
     let named = ["school", "tight", "wide"].map(|name| (name.to_owned(), load(&format!("config/{name}.toml"))));
-    for (name, scene) in scenes.chain(named) {
+    let found = ["pp_16", "lock_skipped", "jump_uturn"]
+        .map(|name| (name.to_owned(), load(&format!("tests/scenes/{name}.toml"))));
+    // One of each kind; the long run has all.
+    let spirals = SPIRALS.into_iter().step_by(if harness::long() { 1 } else { 3 });
+    let spirals = spirals.map(|numbers| (format!("{numbers:?}"), spiral(numbers)));
+    for (name, scene) in scenes.chain(named).chain(found).chain(spirals) {
         let (outcomes, timeline) = outcomes(&scene, STEPS);
         let (wrong, undecided) = compared(&outcomes, &timeline);
         assert!(wrong.is_empty() && undecided == 0, "{name}: {wrong:?} {outcomes:?}");
@@ -127,21 +158,8 @@ fn a_wide_enclosure_has_a_reason() {
 fn every_scene_of_the_repository_agrees() {
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
     // The search gives up, and reports that: handles at distances that no double can tell from the link's, paths of
-    // 1e10 metres, boards that stay a fraction of a millimetre apart for a kilometre. A U-turn hardly narrower than a
-    // link takes 150,000 steps.
-    let given_up = [
-        "bigspeed",
-        "hang_uturn",
-        "jump_uturn",
-        "lock_skipped",
-        "midspeed",
-        "plan_pitch_wrong",
-        "ut2",
-        "ut3",
-        "x2",
-        "x4",
-        "x5",
-    ];
+    // 1e10 metres, boards that stay a fraction of a millimetre apart for a kilometre.
+    let given_up = ["bigspeed", "hang_uturn", "midspeed", "plan_pitch_wrong", "ut2", "ut3", "x2", "x4", "x5"];
     let mut decided = 0;
     for folder in ["config", "tests/scenes"] {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -236,7 +254,8 @@ fn a_scene_that_doubles_cannot_decide_is_reported_so() {
     let (outcomes, _) = outcomes(&load("tests/scenes/hang_uturn.toml"), STEPS);
     for outcome in &outcomes {
         let Status::Undecided { time_lo, because } = &outcome.status else { panic!("{outcome:?}") };
-        assert!(*time_lo > 14.0 && because.contains("cannot be enclosed"), "{outcome:?}");
+        let is_reason = ["cannot be enclosed", "doubles cannot tell"].iter().any(|words| because.contains(words));
+        assert!(*time_lo > 14.0 && is_reason, "{outcome:?}");
     }
 }
 

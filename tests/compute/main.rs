@@ -5,6 +5,7 @@ mod accepted;
 mod accuracy;
 mod beside;
 mod certificates;
+mod certified_pair_clearances;
 mod certified_pairs;
 mod display;
 mod events;

@@ -35,7 +35,7 @@ fn timeline(scene: &Scene) -> Timeline {
 fn chain_at(scene: &Scene, travelled: f64, chain: &mut Chain) -> bool {
     let newton = Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed);
     let solved = newton.solve_at(travelled, chain).is_ok();
-    scene.motion.placement().chain(chain);
+    scene.motion.placement().chain(&mut chain.all_mut());
     solved
 }
 

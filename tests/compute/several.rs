@@ -8,7 +8,7 @@ use bench_dragon::motion::model::team::Team;
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::{TimedEvent, Timeline};
-use bench_dragon::show::scene::Scene;
+use bench_dragon::show::scene::{AtEnd, Scene};
 use bench_dragon::show::{Playback, Show};
 use fastrand::Rng;
 
@@ -39,7 +39,7 @@ fn contact(text: &str) -> Option<TimedEvent> {
 }
 
 /// Corners of a board, from its two handles.
-type Corners = [[f64; 2]; 4];
+pub type Corners = [[f64; 2]; 4];
 
 fn corners(front: [f64; 2], rear: [f64; 2], team: &Team) -> Corners {
     let (dx, dy) = (front[0] - rear[0], front[1] - rear[1]);
@@ -52,7 +52,7 @@ fn corners(front: [f64; 2], rear: [f64; 2], team: &Team) -> Corners {
 }
 
 /// The largest gap along the normals of two rectangles: below 0 where they overlap, and never more than their distance.
-fn gap(a: &Corners, b: &Corners) -> f64 {
+pub fn gap(a: &Corners, b: &Corners) -> f64 {
     let along = |corners: &Corners, x: f64, y: f64| {
         let places = corners.map(|corner| corner[0] * x + corner[1] * y);
         (places.iter().copied().fold(f64::INFINITY, f64::min), places.iter().copied().fold(f64::NEG_INFINITY, f64::max))
@@ -68,7 +68,7 @@ fn gap(a: &Corners, b: &Corners) -> f64 {
 }
 
 /// The boards of all dragons at a time of the show, by exact motion, with their numbers.
-fn all_boards(ensemble: &Ensemble, time: f64) -> Option<Vec<(usize, Corners)>> {
+pub fn all_boards(ensemble: &Ensemble, time: f64) -> Option<Vec<(usize, Corners)>> {
     let mut boards = Vec::new();
     let mut first = 0;
     for Dragon { motion, delay, .. } in ensemble.dragons() {
@@ -77,7 +77,7 @@ fn all_boards(ensemble: &Ensemble, time: f64) -> Option<Vec<(usize, Corners)>> {
         let newton = Newton::new(motion.path().clone(), team, motion.head_speed(), Velocities::Omitted);
         let mut chain = Chain::new(team.handles());
         newton.solve_at(motion.head_speed() * own, &mut chain).ok()?;
-        motion.placement().chain(&mut chain);
+        motion.placement().chain(&mut chain.all_mut());
         let handle = |k: usize| [chain.x[k], chain.y[k]];
         boards.extend((0..team.benches).map(|k| (first + k, corners(handle(k), handle(k + 1), &team))));
         first += team.handles();
@@ -198,7 +198,7 @@ fn heads_that_meet_on_parallel_lines() {
     let scene = scene(&(east + &beside));
     let least = scene.ensemble.as_ref().unwrap();
     let timeline = scene.timeline(&mut |_| ());
-    let least = least.least_clearance(timeline.end(), &mut |_| ()).unwrap();
+    let least = least.least_clearances(timeline.end(), &mut |_| ()).of_show().unwrap();
     assert!((least.least.value - 0.01).abs() < 1e-12, "{}", least.least.value);
 }
 
@@ -266,15 +266,14 @@ fn a_frame_has_the_handles_of_all_and_the_least_clearance_of_any_two() {
     let text = format!("[motion]\non_contact = \"continue\"\n[alerts]\n{gold}{jade}{rose}");
     let scene = scene(&text);
     let ensemble = scene.ensemble.as_ref().unwrap();
-    let teams: Vec<Team> = ensemble.dragons().iter().map(|dragon| *dragon.motion.team()).collect();
     let mut show = Show::new(&scene, scene.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
-    let solvers = ensemble.dragons().iter().map(|dragon| dragon.motion.solver(Velocities::Computed).solver);
-    let chains = teams.iter().map(|team| Chain::new(team.handles()));
-    let mut own: Vec<_> = solvers.zip(chains).collect();
+    let of = |Dragon { motion, .. }: &Dragon| {
+        (motion.solver(Velocities::Computed).solver, Chain::new(motion.team().handles()))
+    };
+    let mut own: Vec<_> = ensemble.dragons().iter().map(of).collect();
     for tick in (0..6000).step_by(7) {
         let frame = show.frame(tick);
         assert_eq!((frame.chain.handles(), frame.unsolved_frames), (62, 0));
-        let mut least = f64::INFINITY;
         for (k, (Dragon { motion, delay, .. }, (solver, chain))) in ensemble.dragons().iter().zip(&mut own).enumerate()
         {
             let end = motion.path().length() / motion.head_speed();
@@ -286,13 +285,64 @@ fn a_frame_has_the_handles_of_all_and_the_least_clearance_of_any_two() {
             assert_eq!(frame.chain.heading[handles.clone()], chain.heading, "{tick}");
             let still = frame.chain.vx[handles.clone()].iter().all(|vx| *vx == 0.0);
             assert_eq!(still, stands, "{tick}");
-            least = least.min(least_clearance_all_pairs(chain, motion.team()).unwrap().value);
         }
-        let between = nearest_between_all_pairs(&frame.chain, &teams).unwrap();
-        let expected = least.min(between.value);
+        let expected = least_by_all_pairs(ensemble, &frame.chain);
         assert!((frame.min_clearance - expected).abs() < 1e-12, "{tick}: {} {expected}", frame.min_clearance);
     }
     assert_eq!(show.frame(6000).unforeseen_contacts, 0);
+}
+
+/// Returns the least clearance of a chain of all dragons, by all pairs.
+fn least_by_all_pairs(ensemble: &Ensemble, chain: &Chain) -> f64 {
+    let teams: Vec<Team> = ensemble.dragons().iter().map(|dragon| *dragon.motion.team()).collect();
+    let own = teams.iter().enumerate().filter_map(|(k, team)| {
+        let mut own = Chain::new(team.handles());
+        own.x.copy_from_slice(&chain.x[ensemble.handles_of(k)]);
+        own.y.copy_from_slice(&chain.y[ensemble.handles_of(k)]);
+        least_clearance_all_pairs(&own, team)
+    });
+    let all = own.chain(nearest_between_all_pairs(chain, &teams));
+    all.map(|pair| pair.value).fold(f64::INFINITY, f64::min)
+}
+
+/// Shows of two or three dragons, played for a while, then with jumps to any time.
+#[test]
+fn the_least_clearance_of_a_frame_is_that_of_all_pairs_after_any_jump() {
+    let mut rng = Rng::with_seed(41);
+    let mut compared = 0;
+    for case in 0..60 {
+        let accuracy = ["", "accuracy = 1e-3\n", "accuracy = 1e-6\n"][case % 3];
+        let names = &["gold", "jade", "rose"][..rng.usize(2..4)];
+        let dragons: String = names.iter().map(|name| any_dragon(&mut rng, name)).collect();
+        let dragons = dragons.replace("[dragons.motion]\n", &format!("[dragons.motion]\n{accuracy}"));
+        let text = format!("[motion]\non_contact = \"continue\"\n[alerts]\n{dragons}");
+        let Ok(scene) = Scene::parse_any(&text, "jumps.toml", "jumps") else { continue };
+        let ensemble = scene.ensemble.as_ref().unwrap();
+        let timeline = scene.timeline_without_contact();
+        let ticks = (60.0 * timeline.end().time) as u64;
+        // The show loops, so that later ticks are at any time of a showing, before or after the last.
+        let playback = Playback { at_end: AtEnd::Loop, ..Playback::of(&scene) };
+        let mut show = Show::new(&scene, timeline, playback).unwrap();
+        let jumps = Vec::from_iter((1..=60).map(|showing| showing * ticks + rng.u64(0..ticks)));
+        for tick in (0..60.min(ticks)).chain(jumps) {
+            let frame = show.frame(tick);
+            let least = least_by_all_pairs(ensemble, &frame.chain);
+            let difference = (frame.min_clearance - least).abs();
+            assert!(difference < 1e-12, "{case}, {tick}: {} {least}\n{text}", frame.min_clearance);
+            compared += 1;
+        }
+    }
+    assert!(compared > 5000, "{compared}");
+}
+
+#[test]
+fn of_dragons_that_coil_few_boards_are_tested() {
+    let scene = scene(&std::fs::read_to_string("config/coil.toml").unwrap());
+    let playback = Playback { start: 150.0, ..Playback::of(&scene) };
+    let mut show = Show::new(&scene, scene.timeline_without_contact(), playback).unwrap();
+    (0..600).for_each(|tick| _ = show.frame(tick));
+    // A search from frame to frame tests more than 20.
+    assert!(show.pairs_tested() < 600 * 8, "{} of 600 frames", show.pairs_tested());
 }
 
 #[test]

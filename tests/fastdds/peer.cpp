@@ -7,7 +7,8 @@
 // Both take --domain D. TOPIC and SERVICE are names on the wire without their prefixes: "rt/", or "rq/" and "rr/".
 // HEX is the request's body, little-endian, without the four bytes of the encapsulation.
 //
-// `subscribe` prints a JSON line for each sample, and one when the subscriber exists and when it has ended. It ends
+// `subscribe` prints a JSON line for each sample, and one when the subscriber exists and when it has ended, with the
+// quality of service that the publisher offers. It ends
 // after S seconds, or some time after N samples. With --joins that happens N times, each with a participant of its own.
 // `call` makes the first call of N new clients, each with a participant that knows the server before, and prints a JSON
 // line for each. Called by tests/ros2/fast_dds.rs, which builds this file.
@@ -20,6 +21,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <string>
@@ -29,6 +32,8 @@
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/log/StdoutErrConsumer.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -142,7 +147,16 @@ public:
   }
 
   void on_publisher_discovery(DomainParticipant*, eprosima::fastrtps::rtps::WriterDiscoveryInfo&& found) override {
-    note("writes " + found.info.topicName().to_string());
+    const std::string topic = found.info.topicName().to_string();
+    const auto& qos = found.info.m_qos;
+    const bool is_reliable = qos.m_reliability.kind == RELIABLE_RELIABILITY_QOS;
+    const bool is_transient_local = qos.m_durability.kind == TRANSIENT_LOCAL_DURABILITY_QOS;
+    {
+      const std::lock_guard<std::mutex> guard(lock);
+      offers[topic] = std::string(is_reliable ? "reliable " : "best_effort ") +
+                      (is_transient_local ? "transient_local" : "volatile");
+    }
+    note("writes " + topic);
   }
 
   void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
@@ -172,6 +186,12 @@ public:
 
   bool knows(const std::string& what) const { return known.count(what) > 0; }
 
+  // Returns the reliability and durability of the latest writer of a topic, as discovery tells them.
+  std::string offered(const std::string& topic) {
+    const std::lock_guard<std::mutex> guard(lock);
+    return offers[topic];
+  }
+
   bool take_data() { return std::exchange(data, false); }
 
   int readers = 0;
@@ -187,6 +207,7 @@ private:
   std::mutex lock;
   std::condition_variable changed;
   std::set<std::string> known;
+  std::map<std::string, std::string> offers;
   bool data = false;
 };
 
@@ -300,8 +321,8 @@ void subscribe(const std::string& name, const std::string& type, const Options& 
         if (samples == options.samples) end = std::min(end, in(options.linger));
       }
     }
-    std::printf("{\"type\":\"end\",\"made_ns\":%lld,\"samples\":%llu,\"writers\":%d}\n", made,
-                static_cast<unsigned long long>(samples), events.writers);
+    std::printf("{\"type\":\"end\",\"made_ns\":%lld,\"samples\":%llu,\"writers\":%d,\"offered\":\"%s\"}\n", made,
+                static_cast<unsigned long long>(samples), events.writers, events.offered("rt/" + name).c_str());
     std::fflush(stdout);
   }
 }
@@ -360,6 +381,9 @@ void call(const std::string& service, const std::string& request_type, const std
 }  // namespace
 
 int main(int count, char** arguments) {
+  // Fast DDS prints its errors on standard output, where the lines of JSON are.
+  Log::ClearConsumers();
+  Log::RegisterConsumer(std::make_unique<StdoutErrConsumer>());
   const std::string command = count > 1 ? arguments[1] : "";
   if (command == "subscribe" && count >= 4) {
     subscribe(arguments[2], arguments[3], Options(4, count, arguments));

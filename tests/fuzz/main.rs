@@ -80,6 +80,17 @@ fn written(target: &Target, input: &[u8]) -> PathBuf {
     file
 }
 
+/// Returns an input at random. Each is as likely as it is short: long ones take as much time together as short ones.
+fn chosen<'i>(inputs: &'i [Vec<u8>], random: &mut Rng) -> &'i Vec<u8> {
+    let weight = |input: &Vec<u8>| 1.0 / (64 + input.len()) as f64;
+    let mut left = random.f64() * inputs.iter().map(weight).sum::<f64>();
+    let at = inputs.iter().position(|input| {
+        left -= weight(input);
+        left < 0.0
+    });
+    &inputs[at.unwrap_or(0)]
+}
+
 fn fuzz(name: &str) {
     count_panics();
     let target = TARGETS.iter().find(|target| target.name == name).unwrap();
@@ -111,8 +122,7 @@ fn fuzz(name: &str) {
     let mut inputs = seeds.clone();
     for _ in 0..cases {
         let from_kept = inputs.is_empty() || !corpus.is_empty() && random.u32(..KEPT) == 0;
-        let from =
-            if from_kept { &corpus[random.usize(..corpus.len())] } else { &inputs[random.usize(..inputs.len())] };
+        let from = if from_kept { &corpus[random.usize(..corpus.len())] } else { chosen(&inputs, &mut random) };
         let input = (target.mutate)(from, &mut random);
         let is_in = run(&input);
         got_in += u64::from(is_in);

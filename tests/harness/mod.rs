@@ -24,6 +24,12 @@ fn executable() -> &'static str {
     FILE.expect("a test program that is built with the program")
 }
 
+/// Returns the time after which a process or its next line is missing: longer than a busy machine needs. It bounds a
+/// hang, not a speed.
+pub fn patience() -> Duration {
+    Duration::from_secs(if long() { 3600 } else { 600 })
+}
+
 /// A process that does not outlive its test.
 pub struct Process(Child);
 
@@ -78,7 +84,7 @@ impl Process {
         drop(self.0.stderr.take());
     }
 
-    /// Returns the lines of standard output as they come; `output_within` must not be called afterwards.
+    /// Returns the lines of standard output as they come; `output` must not be called afterwards.
     pub fn lines(&mut self) -> Lines {
         let (sender, lines) = channel();
         let stdout = self.0.stdout.take().unwrap();
@@ -89,8 +95,8 @@ impl Process {
         Lines(lines)
     }
 
-    /// Returns the first line that the process prints within `seconds`.
-    pub fn first_line_within(&mut self, seconds: u64) -> String {
+    /// Returns the first line that the process prints.
+    pub fn first_line(&mut self) -> String {
         let mut output = BufReader::new(self.0.stdout.take().unwrap());
         let (sender, receiver) = channel();
         std::thread::spawn(move || {
@@ -100,13 +106,13 @@ impl Process {
             // A closed pipe would end the process.
             let _ = std::io::copy(&mut output, &mut std::io::sink());
         });
-        receiver.recv_timeout(Duration::from_secs(seconds)).unwrap()
+        receiver.recv_timeout(patience()).unwrap()
     }
 
-    /// Returns the output of the process, which must end by itself within `seconds`; without standard output after
-    /// [`first_line_within`](Self::first_line_within).
-    pub fn output_within(mut self, seconds: u64) -> Output {
-        let deadline = Instant::now() + Duration::from_secs(seconds);
+    /// Returns the output of the process, which must end by itself; without standard output after
+    /// [`first_line`](Self::first_line).
+    pub fn output(mut self) -> Output {
+        let deadline = Instant::now() + patience();
         // Read while waiting: a full pipe would stop the process.
         let [stdout, stderr] =
             [std::thread::spawn(reading(self.0.stdout.take())), std::thread::spawn(reading(self.0.stderr.take()))];
@@ -114,7 +120,7 @@ impl Process {
             if let Some(status) = self.0.try_wait().unwrap() {
                 break status;
             }
-            assert!(Instant::now() < deadline, "the process did not end within {seconds} s");
+            assert!(Instant::now() < deadline, "the process did not end within {:?}", patience());
             std::thread::sleep(Duration::from_millis(10));
         };
         Output { status, stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() }
@@ -125,47 +131,47 @@ impl Process {
 pub struct Lines(Receiver<String>);
 
 impl Lines {
-    /// Returns the next line that contains `what`, which must come within `seconds`; earlier lines are dropped.
-    pub fn until(&self, what: &str, seconds: u64) -> String {
+    /// Returns the next line that contains `what`; earlier lines are dropped.
+    pub fn until(&self, what: &str) -> String {
         // The last of these lines is the requested one.
-        self.all_until(what, seconds).pop().unwrap()
+        self.all_until(what).pop().unwrap()
     }
 
-    /// Returns the lines up to and including the next one that contains `what`, which must come within `seconds`.
-    pub fn all_until(&self, what: &str, seconds: u64) -> Vec<String> {
-        self.all_until_one(|line| line.contains(what), what, seconds)
+    /// Returns the lines up to and including the next one that contains `what`.
+    pub fn all_until(&self, what: &str) -> Vec<String> {
+        self.all_until_one(|line| line.contains(what), what)
     }
 
-    /// Returns the lines up to and including the next one that `is_it` accepts, which must come within `seconds`.
-    pub fn all_until_one(&self, is_it: impl Fn(&str) -> bool, what: &str, seconds: u64) -> Vec<String> {
-        let deadline = Instant::now() + Duration::from_secs(seconds);
+    /// Returns the lines up to and including the next one that `is_it` accepts.
+    pub fn all_until_one(&self, is_it: impl Fn(&str) -> bool, what: &str) -> Vec<String> {
+        let deadline = Instant::now() + patience();
         let mut lines = Vec::new();
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
-            lines.push(self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {seconds} s")));
+            lines.push(self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {:?}", patience())));
             if lines.last().is_some_and(|line| is_it(line)) {
                 return lines;
             }
         }
     }
 
-    /// Returns all lines until the process ends, which must happen within `seconds`.
-    pub fn rest(&self, seconds: u64) -> Vec<String> {
-        let deadline = Instant::now() + Duration::from_secs(seconds);
+    /// Returns all lines until the process ends.
+    pub fn rest(&self) -> Vec<String> {
+        let deadline = Instant::now() + patience();
         let mut lines = Vec::new();
         loop {
             use std::sync::mpsc::RecvTimeoutError;
             match self.0.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
                 Ok(line) => lines.push(line),
                 Err(RecvTimeoutError::Disconnected) => return lines,
-                Err(RecvTimeoutError::Timeout) => panic!("the process did not end within {seconds} s"),
+                Err(RecvTimeoutError::Timeout) => panic!("the process did not end within {:?}", patience()),
             }
         }
     }
 }
 
 /// A setting of a scene with which a subscriber loses nothing while a busy machine does not run it. The default queue
-/// lasts a third of a second at 200 Hz, this queue two and a half seconds.
+/// lasts a third of a second at 200 Hz, this queue two and a half seconds, and five at 100 Hz.
 pub const LONG_QUEUE: &str = "queue = 500";
 
 /// A separate iceoryx2: processes of other places are not visible, and stale files can be counted.
@@ -212,7 +218,7 @@ impl Place {
         let mut command = Command::new("setpriv");
         command.args([&format!("--reuid={NOBODY}"), &format!("--regid={NOBODY}"), "--clear-groups"]);
         command.arg(copy).args(arguments).current_dir(self.folder());
-        Process::start(&mut command).output_within(300)
+        Process::start(&mut command).output()
     }
 
     /// Returns the files that exist in this place.
@@ -296,7 +302,8 @@ fn assert_used_by_one_module(name: &str) {
 pub fn python() -> Command {
     let interpreter = std::env::var_os("BENCH_DRAGON_PYTHON").unwrap_or("python3".into());
     let mut command = Command::new(interpreter);
-    command.current_dir(env!("CARGO_MANIFEST_DIR"));
+    // A test reads each line as it is printed.
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).env("PYTHONUNBUFFERED", "1");
     command
 }
 
@@ -313,7 +320,8 @@ pub fn text(bytes: &[u8]) -> String {
 }
 
 pub fn json_lines(output: &Output) -> Vec<Value> {
-    text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    let value = |line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{line:?} is no JSON: {error}"));
+    text(&output.stdout).lines().map(value).collect()
 }
 
 pub fn summary(output: &Output) -> Value {
@@ -324,7 +332,7 @@ pub fn summary(output: &Output) -> Value {
 /// Ends a process and returns the summary that it prints.
 pub fn stopped(process: Process) -> Value {
     process.signal(nix::sys::signal::Signal::SIGINT);
-    summary(&process.output_within(60))
+    summary(&process.output())
 }
 
 /// Waits until a file has `bytes` bytes.
@@ -417,9 +425,9 @@ pub fn root(what_for: &str) -> Result<(), String> {
 
 /// Waits until a condition holds, for a minute at most.
 pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
-    let deadline = Instant::now() + Duration::from_secs(60);
+    let deadline = Instant::now() + patience();
     while !holds() {
-        assert!(Instant::now() < deadline, "not within a minute: {what}");
+        assert!(Instant::now() < deadline, "not within {:?}: {what}", patience());
         std::thread::sleep(Duration::from_millis(10));
     }
 }

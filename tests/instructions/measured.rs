@@ -1,6 +1,7 @@
 //! The counted code: the parts of a step of the loop, and steps of a certificate. The test in `main.rs` starts [`run`]
 //! under callgrind and reads its output.
 
+use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use bench_dragon::certify::{CertificateLine, certify};
@@ -89,7 +90,10 @@ pub fn run() {
     ];
     let obstacles = shapes.map(|shape| Obstacle { name: String::new(), shape, keep_out: 0.2 });
     let obstacles = ObstacleMonitor::new(team, Ground::new(obstacles.into()), Some(&table));
-    obstacle_clearance(obstacles, table.for_frames(), team.handles());
+    obstacle_clearance("clearance of four obstacles", obstacles, table.for_frames(), team.handles());
+    let star = Obstacle { name: String::new(), shape: Shape::polygon(star()), keep_out: 0.2 };
+    let overlap = ObstacleMonitor::new(team, Ground::new(vec![star]), Some(&table));
+    obstacle_clearance("clearance of a star of 16 corners in overlap", overlap, table.for_frames(), team.handles());
     clearance(ClearanceMonitor::new(path, team, &table), table, team.handles());
     // A search for the contact would take long.
     let timeline = paper.motion.timeline_without_contact();
@@ -116,22 +120,31 @@ fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
         &mut on,
         |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
         |(_, chain, monitor), number| {
-            black_box(monitor.least_clearance(black_box(chain), time(number)));
+            black_box(monitor.least_clearance(&*black_box(chain), time(number)));
         },
     );
 }
 
+/// Returns the corners of a star on which the head and benches of other turns stand from [`START`] on.
+fn star() -> Vec<Point> {
+    let corner = |k: u32| {
+        let (angle, radius) = (f64::from(k) * TAU / 16.0, if k.is_multiple_of(2) { 1.5 } else { 0.7 });
+        Point::new(3.6 + radius * angle.cos(), -5.4 + radius * angle.sin())
+    };
+    (0..16).map(corner).collect()
+}
+
 /// Counts the obstacles' share of a frame's clearance. The head is where [`clearance`] has it; the nearest two boards
 /// are a quarter of a metre apart.
-fn obstacle_clearance(monitor: ObstacleMonitor, table: FollowerTable, handles: usize) {
+fn obstacle_clearance(name: &str, monitor: ObstacleMonitor, table: FollowerTable, handles: usize) {
     let mut on = (table, Chain::new(handles), monitor);
     let time = |number: u64| START + number as f64 / 60.0;
     part(
-        "clearance of four obstacles",
+        name,
         &mut on,
         |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
         |(_, chain, monitor), number| {
-            black_box(monitor.nearest(black_box(chain), time(number), 0.25));
+            black_box(monitor.nearest(&*black_box(chain), time(number), 0.25));
         },
     );
 }

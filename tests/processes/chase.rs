@@ -37,7 +37,7 @@ fn sender(name: &str, arguments: &[&str]) -> Process {
 }
 
 fn result(name: &str, sender: Process) -> Value {
-    let output = sender.output_within(120);
+    let output = sender.output();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let file = result_file(name);
     let result = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
@@ -47,12 +47,12 @@ fn result(name: &str, sender: Process) -> Value {
 }
 
 fn state(lines: &Lines, state: &str) -> Value {
-    let line = lines.until(&format!("\"state\":\"{state}\""), 60);
+    let line = lines.until(&format!("\"state\":\"{state}\""));
     serde_json::from_str(&line).unwrap()
 }
 
 fn control(name: &str, arguments: &[&str]) {
-    let output = Process::start(program(name).arg("control").args(arguments)).output_within(60);
+    let output = Process::start(program(name).arg("control").args(arguments)).output();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
@@ -133,7 +133,7 @@ fn a_second_chase_is_refused_and_holds_and_deaths_are_told() {
     let watched = watch.lines();
     let sender = sender(name, &["--port", &port, "--seconds", "60"]);
     state(&lines, "locked");
-    let second = Process::start(program(name).args(["chase", "artnet", "--listen", &at])).output_within(60);
+    let second = Process::start(program(name).args(["chase", "artnet", "--listen", &at])).output();
     assert_eq!(second.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&second.stderr).contains("another chase steers the show"));
     control(name, &["hold"]);
@@ -144,22 +144,22 @@ fn a_second_chase_is_refused_and_holds_and_deaths_are_told() {
     state(&lines, "locked");
     control(name, &["seek", "100"]);
     state(&lines, "sought");
-    watched.until("\"state\":\"sought\"", 60);
+    watched.until("\"state\":\"sought\"");
     control(name, &["pause"]);
     control(name, &["resume"]);
     state(&lines, "locked");
     // The publisher dies and comes back: the same chase follows the next run.
     first.signal(Signal::SIGKILL);
     drop(std::mem::replace(&mut first, publisher(name, &["--paused"])));
-    watched.until("\"state\":\"moving\"", 60);
+    watched.until("\"state\":\"moving\"");
     let is_locked = |line: &str| {
         let line: Value = serde_json::from_str(line).unwrap();
         line["chase"]["state"] == "locked" && line["chase"]["error"].as_f64().is_some_and(|error| error.abs() < 0.1)
     };
-    watched.all_until_one(is_locked, "a locked chase", 60);
+    watched.all_until_one(is_locked, "a locked chase");
     // A chase that is killed leaves the show at its last rate, and `watch` reports that.
     chased.signal(Signal::SIGKILL);
-    let line: Value = serde_json::from_str(&watched.until("\"has_died\":true", 60)).unwrap();
+    let line: Value = serde_json::from_str(&watched.until("\"has_died\":true")).unwrap();
     assert_eq!(line["chase"]["state"], "locked");
     drop(sender);
 }
@@ -210,7 +210,7 @@ fn a_show_of_two_follows_the_head_of_one() {
         let line: Value = serde_json::from_str(line).unwrap();
         line["sim_time"].as_f64().is_some_and(|time| (time - 105.0).abs() < 0.05)
     };
-    watched.all_until_one(arrived, "the show at 105 s", 60);
+    watched.all_until_one(arrived, "the show at 105 s");
 }
 
 #[test]
@@ -224,9 +224,9 @@ fn the_log_of_a_chased_show_replays_bit_for_bit() {
     state(&lines, "locked");
     result(name, sender);
     run.signal(Signal::SIGINT);
-    let ended = run.output_within(60);
+    let ended = run.output();
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
-    let verified = Process::start(program(name).args(["--json", "verify"]).arg(&log)).output_within(120);
+    let verified = Process::start(program(name).args(["--json", "verify"]).arg(&log)).output();
     let verdict = String::from_utf8_lossy(&verified.stdout).into_owned();
     assert!(verified.status.success(), "{verdict}{}", String::from_utf8_lossy(&verified.stderr));
     println!("{verdict}");
@@ -257,7 +257,7 @@ fn bad_options_are_refused_with_one_sentence() {
     ] {
         let mut command = program(name);
         command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("chase").args(arguments);
-        let output = Process::start(&mut command).output_within(60);
+        let output = Process::start(&mut command).output();
         let sentence = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {sentence}");
         assert!(sentence.contains(expected), "{arguments:?}: {sentence}");
@@ -288,11 +288,11 @@ fn a_show_follows_the_art_net_timecode_of_another_library() {
     let sender = Process::start(&mut sender);
     let locked = state(&lines, "locked");
     assert_eq!((&locked["source"], &locked["frame_rate"]), (&"artnet".into(), &"25".into()));
-    let output = sender.output_within(60);
+    let output = sender.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     // The last label is 00:00:17:24; the show goes on for the time of the freewheel.
     state(&lines, "lost");
-    let shown = Process::start(program(name).args(["--json", "control", "state"])).output_within(60);
+    let shown = Process::start(program(name).args(["--json", "control", "state"])).output();
     let time = serde_json::from_slice::<Value>(&shown.stdout).unwrap()["sim_time"].as_f64().unwrap();
     assert!((17.9..22.0).contains(&time), "{time}");
 }

@@ -33,8 +33,8 @@ fn observer(place: &Place) -> (Process, Lines) {
 /// Stops an observer, which must end without an error, and returns its observation.
 fn observed((process, lines): (Process, Lines)) -> Value {
     process.signal(SIGTERM);
-    let last = lines.rest(300).pop().unwrap();
-    let output = process.output_within(300);
+    let last = lines.rest().pop().unwrap();
+    let output = process.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     serde_json::from_str(&last).unwrap()
 }
@@ -77,9 +77,9 @@ fn refusal(output: &Output) -> String {
 #[test]
 fn killed_subscribers_take_nothing_with_them() {
     let place = Place::new("kills");
-    let publisher = publisher(&place, &["--rate", "200"]);
+    let publisher = publisher(&place, &["--rate", "100"]);
     let steady = observer(&place);
-    steady.1.until("\"status\":{", 300);
+    steady.1.until("\"status\":{");
     let kills = if long() { 1000 } else { 20 };
     for kill in 0..kills {
         let victim = Process::start(place.program().args(["watch", "--json"]));
@@ -87,16 +87,17 @@ fn killed_subscribers_take_nothing_with_them() {
         wait(0.015 * f64::from(kill % 20));
         victim.signal(SIGKILL);
     }
-    let late = Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(300);
+    let late = Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output();
     assert!(number(json_lines(&late).last().unwrap(), "received") > 0);
     publisher.signal(SIGINT);
-    let summary = summary(&publisher.output_within(300));
+    let summary = summary(&publisher.output());
     assert_nothing_lost(&observed(steady), &summary);
     // Files of a process killed halfway stay untouched for two seconds: the process could be alive and slow.
     wait(2.5);
-    Process::start(place.program().args(["watch", "--duration", "3"])).output_within(300);
-    // A file whose maker was killed before listing it remains unknown to every process.
-    place.assert_clean_but_for(kills as usize / 100);
+    Process::start(place.program().args(["watch", "--duration", "3"])).output();
+    // A file whose maker was killed before listing it remains unknown to every process. The slower the machine, the
+    // more kills fall into that time.
+    place.assert_clean_but_for(1 + kills as usize / 100);
 }
 
 #[test]
@@ -106,7 +107,7 @@ fn subscribers_survive_killed_publishers() {
     let outputs = monitors.each_mut().map(Process::lines);
     let steady = observer(&place);
     let start = || publisher(&place, &["--rate", "100"]);
-    let all_print = |what: &str| outputs.each_ref().map(|lines| lines.until(what, 300));
+    let all_print = |what: &str| outputs.each_ref().map(|lines| lines.until(what));
     let rounds = if long() { 100 } else { 5 };
     let mut longest = Duration::ZERO;
     for _ in 0..rounds {
@@ -123,15 +124,18 @@ fn subscribers_survive_killed_publishers() {
     all_print("is running");
     all_print("missed 0");
     last.signal(SIGINT);
-    summary(&last.output_within(300));
+    summary(&last.output());
     all_print("has ended");
     let seen = observed(steady);
     assert_nothing_wrong(&seen);
     assert_eq!(number(&seen, "runs"), rounds + 1, "{seen}");
     for (monitor, lines) in monitors.iter().zip(&outputs) {
         monitor.signal(SIGTERM);
-        lines.rest(300);
+        lines.rest();
     }
+    // Two processes that clean up after the same dead node can leave its unlisted folder to the next start.
+    wait(2.5);
+    Process::start(place.program().args(["watch", "--duration", "1"])).output();
     place.assert_clean();
 }
 
@@ -139,9 +143,9 @@ fn subscribers_survive_killed_publishers() {
 fn files_of_dead_runs_are_gone_after_the_next() {
     let place = Place::new("dead");
     let mut first = Process::start(place.program().args(["run", "--rate", "100"]));
-    observer(&place).1.until("\"status\":{", 300);
+    observer(&place).1.until("\"status\":{");
     first.signal(SIGKILL);
-    first.lines().rest(300);
+    first.lines().rest();
     assert!(place.left_behind().len() > 5, "a killed publisher leaves files");
     for start in 0..20 {
         let killed = Process::start(place.program().args(["run", "--rate", "100"]));
@@ -151,7 +155,7 @@ fn files_of_dead_runs_are_gone_after_the_next() {
     }
     // Files of a process killed halfway stay untouched for two seconds: the process could be alive and slow.
     wait(2.5);
-    summary(&Process::start(place.program().args(["run", "--json", "--duration", "3"])).output_within(300));
+    summary(&Process::start(place.program().args(["run", "--json", "--duration", "3"])).output());
     place.assert_clean();
 }
 
@@ -166,8 +170,7 @@ fn preloaded(name: &str) -> PathBuf {
 fn a_show_that_starts_on_a_slow_disk_is_found() {
     let place = Place::new("slow_disk");
     let mut slow = place.program();
-    slow.args(["run", "--json", "--rate", "100", "--duration", "30", "--scene"])
-        .arg(place.scene_publishing(LONG_QUEUE));
+    slow.args(["run", "--json", "--rate", "100", "--scene"]).arg(place.scene_publishing(LONG_QUEUE));
     let publisher = Process::start(slow.env("LD_PRELOAD", preloaded("slow_disk")));
     // Each of these looks, when it starts, for stale files of killed processes.
     let answers = || place.program().args(["--json", "control", "state"]).output().unwrap().status.success();
@@ -179,9 +182,9 @@ fn a_show_that_starts_on_a_slow_disk_is_found() {
     // A node's file and a service's file take longer than an unfinished file may exist: otherwise nothing was slow.
     assert!(began.elapsed() > Duration::from_secs(5), "the disk was not slowed down");
     let steady = observer(&place);
-    steady.1.until("\"status\":{", 300);
+    steady.1.until("\"status\":{");
     publisher.signal(SIGINT);
-    let summary = summary(&publisher.output_within(300));
+    let summary = summary(&publisher.output());
     assert_nothing_lost(&observed(steady), &summary);
     place.assert_clean();
 }
@@ -193,17 +196,17 @@ fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
     let stepped = |arguments: &[&str]| Process::start(place.program().env("LD_PRELOAD", &library).args(arguments));
     let alert_every_second = ["--start", "405", "--time-scale", "0.1"];
     let scene = place.scene_publishing(LONG_QUEUE);
-    let show = ["run", "--json", "--rate", "100", "--duration", "6", "--scene", scene.to_str().unwrap()];
+    let show = ["run", "--json", "--rate", "100", "--duration", "10", "--scene", scene.to_str().unwrap()];
     let publisher = stepped(&[&show[..], &alert_every_second].concat());
     let monitor = stepped(&["watch", "--json"]);
     let steady = observer(&place);
-    let summary = summary(&publisher.output_within(300));
+    let summary = summary(&publisher.output());
     // A counted hour would be 360,000 periods in one direction, and an endless run in the other.
-    assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 600, "{summary}");
+    assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 1000, "{summary}");
     assert!(number(&summary, "skipped") < 300, "{summary}");
     assert_nothing_lost(&observed(steady), &summary);
     monitor.signal(SIGTERM);
-    let lines = json_lines(&monitor.output_within(300));
+    let lines = json_lines(&monitor.output());
     let latencies = lines.iter().filter_map(|line| line["latency_ns"]["max"].as_u64());
     assert!(latencies.max().is_some_and(|longest| longest < 3_000_000_000_000), "{lines:?}");
     // The steps did reach the publisher: its stamps, which are from the wall clock, are an hour ahead and behind.
@@ -218,14 +221,14 @@ fn a_stepped_wall_clock_moves_the_stamps_and_nothing_else() {
 #[test]
 fn a_stopped_publisher_skips_whole_periods_and_catches_nothing_up() {
     let place = Place::new("stopped");
-    let publisher = publisher(&place, &["--rate", "100", "--duration", "8"]);
+    let publisher = publisher(&place, &["--rate", "100", "--duration", "15"]);
     let steady = observer(&place);
-    steady.1.until("\"status\":{", 300);
+    steady.1.until("\"status\":{");
     publisher.stop();
     wait(5.0);
     publisher.signal(SIGCONT);
-    let summary = summary(&publisher.output_within(300));
-    assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 800, "{summary}");
+    let summary = summary(&publisher.output());
+    assert_eq!(number(&summary, "frames") + number(&summary, "skipped"), 1500, "{summary}");
     // One incident of five seconds; the machine itself may add stalls, of at least a period each.
     let [skipped, overruns] = ["skipped", "overruns"].map(|key| number(&summary, key));
     assert!(skipped >= 498 && overruns >= 1 && overruns - 1 <= skipped - 498, "{summary}");
@@ -246,11 +249,11 @@ fn of_publishers_that_race_for_a_name_one_wins() {
         if round == 3 {
             // From here on they also find the stale files of a dead publisher.
             let doomed = Process::start(place.program().args(["run", "--rate", "100"]));
-            observer(&place).1.until("\"status\":{", 300);
+            observer(&place).1.until("\"status\":{");
             doomed.signal(SIGKILL);
         }
         let start = || Process::start(place.program().args(["run", "--json", "--duration", "2"]));
-        let outputs = [start(), start(), start()].map(|racer| racer.output_within(300));
+        let outputs = [start(), start(), start()].map(|racer| racer.output());
         let (winners, losers): (Vec<_>, Vec<_>) = outputs.iter().partition(|output| output.status.success());
         assert_eq!(winners.len(), 1, "round {round}: {outputs:?}");
         assert_eq!(number(&summary(winners[0]), "frames") + number(&summary(winners[0]), "skipped"), 120);
@@ -270,9 +273,9 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
         let publisher = Process::start(place.program().args(["run", "--json", "--scene"]).arg(scene));
         let mut admitted: Vec<_> = (0..limit).map(|_| observer(&place)).collect();
         for subscriber in &admitted {
-            subscriber.1.until("\"status\":{", 300);
+            subscriber.1.until("\"status\":{");
         }
-        let watch = || Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output_within(300);
+        let watch = || Process::start(place.program().args(["watch", "--json", "--duration", "2"])).output();
         let printed = refusal(&watch());
         assert!(
             printed.contains(&format!("{limit} subscribers")) && printed.contains("publish.subscribers"),
@@ -282,7 +285,7 @@ fn one_subscriber_too_many_is_told_the_limit_and_the_setting() {
         let next = watch();
         assert!(number(json_lines(&next).last().unwrap(), "received") > 0, "{}", text(&next.stderr));
         publisher.signal(SIGINT);
-        let summary = summary(&publisher.output_within(300));
+        let summary = summary(&publisher.output());
         for subscriber in admitted {
             assert_nothing_lost(&observed(subscriber), &summary);
         }
@@ -309,7 +312,7 @@ fn mounts() -> Result<(), String> {
 fn with_shared_memory(place: &Place, size: &str, script: &str) -> Output {
     let mut command = in_small_shared_memory(size, script);
     command.current_dir(place.folder()).env("PROGRAM", env!("CARGO_BIN_EXE_bench-dragon"));
-    Process::start(&mut command).output_within(300)
+    Process::start(&mut command).output()
 }
 
 #[test]
@@ -342,9 +345,9 @@ fn shared_memory_that_others_fill_does_not_stop_a_publisher() {
     let output = with_shared_memory(
         &place,
         "7m",
-        "(\"$PROGRAM\" run --scene scene.toml --json --rate 100 --duration 10 & publisher=$!; sleep 1.5
+        "(\"$PROGRAM\" run --scene scene.toml --json --rate 100 --duration 15 & publisher=$!; sleep 3
           \"$PROGRAM\" soak-subscriber --slow >slow & slow=$!
-          \"$PROGRAM\" soak-subscriber >steady & steady=$!; sleep 3
+          \"$PROGRAM\" soak-subscriber >steady & steady=$!; sleep 5
           dd if=/dev/zero of=/dev/shm/filler bs=4k 2>/dev/null
           \"$PROGRAM\" watch --duration 1 2>&1 | grep -q 'too little' || echo no refusal
           wait $publisher || echo publisher failed
@@ -352,7 +355,7 @@ fn shared_memory_that_others_fill_does_not_stop_a_publisher() {
     );
     let lines = json_lines(&output);
     assert_eq!(lines.len(), 2, "{lines:?} {}", text(&output.stderr));
-    assert_eq!(number(&lines[0], "frames") + number(&lines[0], "skipped"), 1000);
+    assert_eq!(number(&lines[0], "frames") + number(&lines[0], "skipped"), 1500);
     assert_nothing_lost(&lines[1], &lines[0]);
 }
 
@@ -377,7 +380,7 @@ fn a_page_that_cannot_be_had_is_a_sentence() {
     }
     // The signal that Linux sends if a page of a full /dev/shm is written.
     monitor.signal(SIGBUS);
-    assert!(refusal(&monitor.output_within(300)).contains("/dev/shm is full"));
+    assert!(refusal(&monitor.output()).contains("/dev/shm is full"));
 }
 
 #[test]
@@ -385,7 +388,7 @@ fn without_ros2_there_is_no_network_socket() {
     let place = Place::new("sockets");
     let publisher = Process::start(place.program().args(["run", "--json"]));
     let steady = observer(&place);
-    steady.1.until("\"status\":{", 300);
+    steady.1.until("\"status\":{");
     let protocols = ["tcp", "tcp6", "udp", "udp6", "raw", "raw6", "udplite", "udplite6", "packet"];
     let tables = protocols.iter().filter_map(|protocol| std::fs::read_to_string(format!("/proc/net/{protocol}")).ok());
     let tables: Vec<String> = tables.collect();
@@ -413,7 +416,7 @@ fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
     }
     let place = Place::new("users");
     let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100"]));
-    observer(&place).1.until("\"status\":{", 300);
+    observer(&place).1.until("\"status\":{");
     let shared = std::fs::read_dir("/dev/shm").unwrap().flatten();
     let modes: BTreeSet<_> = shared
         .filter(|file| {
@@ -433,5 +436,5 @@ fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
         assert!(printed.contains("another user"), "{printed}");
     }
     publisher.signal(SIGINT);
-    summary(&publisher.output_within(300));
+    summary(&publisher.output());
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
-use bench_dragon::messages::{FrameHeader, StageMessage};
+use bench_dragon::messages::{CollisionAlert, FrameHeader, StageMessage};
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::convert::stage;
@@ -80,11 +80,11 @@ fn a_publisher_restarted_between_two_polls_is_a_new_run() {
         let mut seen = Vec::new();
         let first = publisher(&name, &["--rate", "100", "--duration", "2"]);
         poll_until(&mut feed, &mut seen, |seen| seen.len() > 10);
-        let published = summary(&first.output_within(300))["frames"].as_u64().unwrap();
+        let published = summary(&first.output())["frames"].as_u64().unwrap();
         let second = publisher(&name, &["--rate", "100"]);
         // The feed is not polled until the second publisher publishes, which another process reports.
         let mut monitor = Process::start(program(&name).args(["watch", "--json"]));
-        monitor.lines().until("\"state\":\"moving\"", 300);
+        monitor.lines().until("\"state\":\"moving\"");
         drop(monitor);
         poll_until(&mut feed, &mut seen, |seen| runs(seen).len() > 1 && seen.len() > 20);
         second.signal(SIGKILL);
@@ -108,10 +108,16 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     const RATE: u64 = 100;
     let mut feed = Feed::new(&unique("again"), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All }).unwrap();
     let mut seen = Vec::new();
+    // The queue holds all frames of a publisher, however late this machine runs the test.
+    let scene = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let text = include_str!("../scenes/noalerts.toml").to_owned() + "[publish]\nqueue = 250\n";
+    std::fs::write(scene.path(), text).unwrap();
     let delays = [0, 40, 80, 120, 160, 200, 250, 400].map(Duration::from_millis);
     for delay in delays {
-        let publisher = publisher("again", &["--rate", &RATE.to_string(), "--duration", "2"]);
-        let ending = std::thread::spawn(move || publisher.output_within(300));
+        let mut run = program("again");
+        run.args(["run", "--json", "--rate", &RATE.to_string(), "--duration", "2", "--scene"]).arg(scene.path());
+        let publisher = Process::start(&mut run);
+        let ending = std::thread::spawn(move || publisher.output());
         while !ending.is_finished() {
             poll(&mut feed, &mut seen);
         }
@@ -147,7 +153,9 @@ fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
         wait(0.03);
         let before = seen.len();
         poll(&mut feed, &mut seen);
-        assert!(seen.len() <= before + 1, "{seen:?}");
+        // Beside the frame there may be the news that a busy machine holds the publisher up.
+        let frames = seen[before..].iter().filter(|one| matches!(one, Seen::Frame { .. })).count();
+        assert!(frames <= 1, "{seen:?}");
     }
     let [run] = runs(&seen)[..] else { panic!("{seen:?}") };
     let (first, last, received, missed) = span(&seen, run);
@@ -163,7 +171,7 @@ fn opened(name: &str, scene: &Scene, cues: usize, stage: StageMessage) -> Shared
         single_precision: None,
         queue: 64,
         subscribers: 2,
-        alerts: false,
+        alerts: true,
         cues,
         scene: String::new(),
         stage,
@@ -222,4 +230,60 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     }
     assert_eq!(runs[..4], [("stage", 8), ("scene", 8), ("started", 8), ("frame", 8)]);
     assert!(runs[4..].iter().all(|one| *one == ("frame", 8)), "{runs:?}");
+}
+
+/// A publisher delivers the stage to a late subscriber with its next maintenance, a frame and its alert at once. The
+/// alert waits for the stage, which names the alert's benches.
+#[test]
+fn an_alert_follows_the_stage_of_its_run() {
+    let scene = Scene::paper();
+    let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let name = unique("alert_order");
+    let mut sender = opened(&name, &scene, 0, stage(8, 0, [0; 32], &scene.motion, &show));
+    let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
+    let mut seen = Vec::new();
+    let mut poll = |seen: &mut Vec<&'static str>| {
+        let polled = feed.poll(Duration::from_millis(20), &mut |event| match event {
+            FeedEvent::Stage { .. } => seen.push("stage"),
+            FeedEvent::Frame { .. } => seen.push("frame"),
+            FeedEvent::Alert(alert) => seen.push(if alert.run_id == 8 { "alert" } else { "foreign alert" }),
+            _ => (),
+        });
+        polled.unwrap();
+    };
+    let deadline = Instant::now() + Duration::from_secs(300);
+    let mut sequence = 0;
+    // An alert with each frame, as many as it takes until the feed has connected.
+    while !seen.contains(&"frame") {
+        assert!(Instant::now() < deadline, "{seen:?}");
+        let header = FrameHeader { run_id: 8, sequence, handles: 224, ..FrameHeader::default() };
+        let alert = CollisionAlert { run_id: 8, tick: sequence, ..CollisionAlert::default() };
+        sender.publish(Outgoing { alerts: &[alert], ..Outgoing::new(&header, show.frame(sequence)) }).unwrap();
+        poll(&mut seen);
+        sequence += 1;
+    }
+    assert!(seen.iter().all(|one| *one == "frame"), "{seen:?}");
+    sender.maintain();
+    while !seen.contains(&"alert") {
+        assert!(Instant::now() < deadline, "{seen:?}");
+        poll(&mut seen);
+    }
+    let first = |kind| seen.iter().position(|one| *one == kind);
+    assert!(first("stage").unwrap() < first("alert").unwrap(), "{seen:?}");
+    // An alert is handed over without a stage that never comes.
+    let name = unique("alert_alone");
+    let mut sender = opened(&name, &scene, 0, stage(9, 0, [0; 32], &scene.motion, &show));
+    let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
+    let mut alerts = 0;
+    for sequence in 0.. {
+        assert!(Instant::now() < deadline, "no alert");
+        let header = FrameHeader { run_id: 8, sequence, handles: 224, ..FrameHeader::default() };
+        let alert = CollisionAlert { run_id: 8, tick: sequence, ..CollisionAlert::default() };
+        sender.publish(Outgoing { alerts: &[alert], ..Outgoing::new(&header, show.frame(sequence)) }).unwrap();
+        feed.poll(Duration::from_millis(20), &mut |event| alerts += u32::from(matches!(event, FeedEvent::Alert(_))))
+            .unwrap();
+        if alerts > 0 {
+            break;
+        }
+    }
 }

@@ -5,8 +5,9 @@ use crate::harness;
 
 use bench_dragon::client::shared_memory::{node, service_name};
 use bench_dragon::messages::{FrameHeader, HandlePose32, LoopStatus};
-use harness::{Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique, wait};
+use harness::{Process, can_run, program, python, python_modules, scene_file, summary, text, unique, wait};
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
+use nix::sys::signal::Signal::SIGINT;
 use serde_json::Value;
 
 /// Returns a scene whose queues hold all frames by which a subscriber falls behind.
@@ -16,7 +17,7 @@ fn scene(name: &str, publish: &str) -> std::path::PathBuf {
 
 /// Returns the output of `check` for a scene, or of `run` when it starts.
 fn said(name: &str, scene: &std::path::Path, arguments: &[&str]) -> String {
-    let output = Process::start(program(name).arg("--scene").arg(scene).args(arguments)).output_within(300);
+    let output = Process::start(program(name).arg("--scene").arg(scene).args(arguments)).output();
     text(&output.stdout) + &text(&output.stderr)
 }
 
@@ -30,13 +31,16 @@ fn every_frame_is_the_whole_one_rounded(every: usize, velocities: bool, expected
         let text = std::fs::read_to_string(&scene).unwrap();
         std::fs::write(&scene, text.replace("velocities = true", "velocities = false")).unwrap();
     }
-    let peer = Process::start(python().args(["tests/python/light_peer.py", "--name", &unique(&name)]));
+    let mut peer = Process::start(python().args(["tests/python/light_peer.py", "--name", &unique(&name)]));
+    let printed = peer.lines();
+    printed.until("ready");
     let mut run = program(&name);
     run.arg("--scene").arg(&scene).args(["run", "--json", "--rate", "50", "--start", "409", "--duration", "5"]);
-    let frames = summary(&Process::start(&mut run).output_within(300))["frames"].as_u64().unwrap();
-    let output = peer.output_within(300);
+    let frames = summary(&Process::start(&mut run).output())["frames"].as_u64().unwrap();
+    let last = printed.rest().pop().unwrap_or_default();
+    let output = peer.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let compared: Value = json_lines(&output).pop().unwrap();
+    let compared: Value = serde_json::from_str(&last).unwrap();
     assert!(compared["compared"].as_u64().unwrap() > 20, "{compared} of {frames} frames");
     assert_eq!(compared["last"], frames - 1, "the last frame arrived too");
     let handles: Vec<_> = compared["handles"].as_array().unwrap().iter().map(|it| it.as_u64().unwrap()).collect();
@@ -74,13 +78,16 @@ fn of_two_dragons_both_ends_of_each_remain() {
     std::fs::write(&file, crossing.replace("[publish]", light)).unwrap();
     let mut peer = python();
     peer.args(["tests/python/light_peer.py", "--name", &unique(name), "--teams", "21", "13"]);
-    let peer = Process::start(&mut peer);
+    let mut peer = Process::start(&mut peer);
+    let printed = peer.lines();
+    printed.until("ready");
     let mut run = program(name);
     run.arg("--scene").arg(&file).args(["run", "--json", "--rate", "50", "--start", "52", "--duration", "5"]);
-    let frames = summary(&Process::start(&mut run).output_within(300))["frames"].as_u64().unwrap();
-    let output = peer.output_within(300);
+    let frames = summary(&Process::start(&mut run).output())["frames"].as_u64().unwrap();
+    let last = printed.rest().pop().unwrap_or_default();
+    let output = peer.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let compared: Value = json_lines(&output).pop().unwrap();
+    let compared: Value = serde_json::from_str(&last).unwrap();
     assert!(compared["compared"].as_u64().unwrap() > 20, "{compared} of {frames} frames");
     assert_eq!(compared["handles"], serde_json::json!([0, 7, 14, 20, 21, 28, 33]));
 }
@@ -90,7 +97,7 @@ fn nothing_is_there_unasked() {
     let name = "light_off";
     let scene = scene(name, "precision = \"f64\"\nevery = 1");
     let mut run = program(name);
-    run.arg("--scene").arg(&scene).args(["run", "--json", "--start", "300", "--duration", "60"]);
+    run.arg("--scene").arg(&scene).args(["run", "--json", "--start", "300"]);
     let _publisher = Process::start(&mut run);
     let node = node().unwrap();
     let status = service_name(&unique(name), "status").unwrap();
@@ -119,11 +126,15 @@ fn check_and_run_name_the_service_and_the_example_reads_it() {
     let scene = scene(name, "precision = \"f32\"\nevery = 7");
     let checked = said(name, &scene, &["check"]);
     assert!(checked.contains("poses32 has one handle in 7 and the tail, in f32"), "{checked}");
-    let arguments = ["examples/python/subscribe.py", "--light", "--json", "--seconds", "20", "--name", &unique(name)];
+    let arguments = ["examples/python/subscribe.py", "--light", "--json", "--seconds", "600", "--name", &unique(name)];
     let mut example = Process::start(python().args(arguments));
-    let started = said(name, &scene, &["run", "--rate", "50", "--start", "300", "--duration", "2"]);
+    let mut run = program(name);
+    let publisher = Process::start(run.arg("--scene").arg(&scene).args(["run", "--rate", "50", "--start", "300"]));
+    let line: Value = serde_json::from_str(&example.lines().until("frame")).unwrap();
+    publisher.signal(SIGINT);
+    let started = publisher.output();
+    let started = text(&started.stdout) + &text(&started.stderr);
     assert!(started.contains("/poses32 (one handle in 7 and the tail, in f32)"), "{started}");
-    let line: Value = serde_json::from_str(&example.lines().until("frame", 300)).unwrap();
     assert_eq!((&line["type"], &line["handles"]), (&"frame".into(), &33.into()), "{line}");
     assert!(line["head"][0].as_f64().unwrap().abs() < 9.0, "{line}");
 }

@@ -107,7 +107,7 @@ fn a_conducted_show_is_proved_with_every_command_at_its_tick() {
     let seconds = of_type(&lines(&log), "second").len();
     wait_for_seconds(&log, seconds + 1);
     publisher.signal(Signal::SIGINT);
-    let summary = summary(&publisher.output_within(20));
+    let summary = summary(&publisher.output());
     let lines = lines(&log);
     // A step is answered when it is complete.
     let logged = lines.iter().filter(|line| !line["code"].is_null());
@@ -158,7 +158,7 @@ fn a_turnaround_and_a_looping_show_with_skipped_periods_are_proved() {
     let (before, after) = (std::fs::read_to_string(&scene_file).unwrap(), "[publish]");
     let (before, rest) = before.split_once("[alerts]").unwrap();
     std::fs::write(&scene_file, format!("{before}{after}{}", rest.split_once(after).unwrap().1)).unwrap();
-    let turned = summary(&run("log_turn", &scene_file, &log, &arguments).output_within(60));
+    let turned = summary(&run("log_turn", &scene_file, &log, &arguments).output());
     proved_whole(&log, &turned);
 
     // A third of a second of show, repeated; stopped for a while as by a debugger.
@@ -172,7 +172,7 @@ fn a_turnaround_and_a_looping_show_with_skipped_periods_are_proved() {
     let seconds = of_type(&lines(&log), "second").len();
     wait_for_seconds(&log, seconds + 2);
     publisher.signal(Signal::SIGTERM);
-    let summary = summary(&publisher.output_within(20));
+    let summary = summary(&publisher.output());
     proved_whole(&log, &summary);
     let lines = lines(&log);
     let longest = of_type(&lines, "skipped")
@@ -189,7 +189,7 @@ fn a_publisher_that_is_killed_leaves_every_complete_second() {
     let publisher = run("log_killed", &scene(folder.path(), "school"), &log, &["--rate", "300"]);
     wait_for_seconds(&log, 2);
     publisher.signal(Signal::SIGKILL);
-    publisher.output_within(20);
+    publisher.output();
     let line = proved(&log);
     assert_eq!((&line["complete"], &line["cut"]), (&false.into(), &false.into()));
     assert!(line["seconds"].as_u64().unwrap() >= 2, "{line}");
@@ -213,8 +213,7 @@ fn a_file_that_takes_no_more_ends_the_log_and_not_the_stream() {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path(), "school");
     // No byte can be written.
-    let output =
-        run("log_full", &scene, Path::new("/dev/full"), &["--rate", "100", "--duration", "1"]).output_within(60);
+    let output = run("log_full", &scene, Path::new("/dev/full"), &["--rate", "100", "--duration", "1"]).output();
     let counts = json_lines(&output).pop().unwrap();
     assert_eq!(counts["frames"].as_u64().unwrap() + counts["skipped"].as_u64().unwrap(), 100, "{counts}");
     let sentence = text(&output.stderr);
@@ -233,13 +232,12 @@ fn a_file_that_takes_no_more_ends_the_log_and_not_the_stream() {
     reader.read_line(&mut first).unwrap();
     assert!(first.starts_with("{\"type\":\"show\""), "{first}");
     drop(reader);
-    let output = publisher.output_within(60);
+    let output = publisher.output();
     assert_eq!((output.status.code(), &json_lines(&output).pop().unwrap()["end"]), (Some(1), &"duration".into()));
     assert!(text(&output.stderr).contains("Broken pipe"), "{}", text(&output.stderr));
 
     // The folder does not exist: refused before anything is published.
-    let output =
-        run("log_nowhere", &scene, Path::new("/no/such/folder/x.jsonl"), &["--duration", "1"]).output_within(60);
+    let output = run("log_nowhere", &scene, Path::new("/no/such/folder/x.jsonl"), &["--duration", "1"]).output();
     assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
     assert!(text(&output.stderr).contains("--log: /no/such/folder/x.jsonl: No such file"), "{}", text(&output.stderr));
 }
@@ -277,10 +275,10 @@ fn python_computes_the_hashes_of_the_log_from_the_stream() {
     peer.args(["tests/python/log_hash.py", "--name", &unique(name), "--rate", rate, "--seconds", "3"]);
     let reader = Process::start(&mut peer);
     let publisher = run(name, &scene(folder.path(), "paper"), &log, &["--rate", rate, "--start", "405"]);
-    let output = reader.output_within(90);
+    let output = reader.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     publisher.signal(Signal::SIGINT);
-    summary(&publisher.output_within(20));
+    summary(&publisher.output());
     let (computed, logged) = (json_lines(&output), lines(&log));
     let computed = of_type(&computed, "second");
     assert!(computed.len() >= 3, "{computed:?}");

@@ -18,7 +18,6 @@ use harness::{
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-const DEADLINE: u64 = 120;
 const OPENMETRICS: &str = "application/openmetrics-text;version=1.0.0,text/plain;version=0.0.4;q=0.5,*/*;q=0.1";
 
 /// Returns Prometheus' own checker, from the Debian package `prometheus`. If it is not installed, `tests/run` unpacks
@@ -50,14 +49,14 @@ fn samples(answer: &str) -> Value {
 /// Requests the samples again until they satisfy a condition.
 fn until(url: &str, what: &str, holds: impl Fn(&Value) -> bool) -> Value {
     let mut latest = Value::Null;
-    for _ in 0..DEADLINE * 5 {
+    for _ in 0..harness::patience().as_secs() * 5 {
         latest = samples(&http_get(url, OPENMETRICS));
         if holds(&latest) {
             return latest;
         }
         wait(0.2);
     }
-    panic!("not {what} within {DEADLINE} s: {latest:#}");
+    panic!("not {what}: {latest:#}");
 }
 
 /// Returns every status that a publisher sends, until the receiver is dropped.
@@ -86,7 +85,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     }
     let name = "metrics";
     let mut metrics = Process::start(program(name).args(["metrics", "--json", "--listen", "127.0.0.1:0"]));
-    let ready: Value = serde_json::from_str(&metrics.first_line_within(DEADLINE)).unwrap();
+    let ready: Value = serde_json::from_str(&metrics.first_line()).unwrap();
     let url = ready["url"].as_str().unwrap();
     let waiting = samples(&http_get(url, OPENMETRICS));
     assert_eq!((&waiting["bench_dragon_up"], waiting.as_object().unwrap().len()), (&0.0.into(), 4), "{waiting}");
@@ -111,7 +110,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     // The values that another subscriber received for the same time.
     let frames = value("bench_dragon_frames_published_total");
     let told = loop {
-        let status = statuses.recv_timeout(Duration::from_secs(DEADLINE)).unwrap();
+        let status = statuses.recv_timeout(harness::patience()).unwrap();
         if status.sequence as f64 + 1.0 >= frames {
             break status;
         }
@@ -160,7 +159,7 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     assert_eq!(given(Command::new(promtool().unwrap()).args(["check", "metrics"]), body), "");
 
     let control = |command: &str| {
-        let output = Process::start(program(name).args(["control", command])).output_within(DEADLINE);
+        let output = Process::start(program(name).args(["control", command])).output();
         assert!(output.status.success(), "{}", text(&output.stderr));
     };
     control("pause");
@@ -171,20 +170,19 @@ fn prometheus_reads_what_is_true_of_a_publisher() {
     until(url, "silent", |samples| samples["bench_dragon_silent"] == 1.0 && samples["bench_dragon_up"] == 1.0);
     publisher.signal(Signal::SIGCONT);
     publisher.signal(Signal::SIGTERM);
-    summary(&publisher.output_within(DEADLINE));
+    summary(&publisher.output());
     let down = until(url, "down", |samples| samples["bench_dragon_up"] == 0.0);
     assert_eq!(down.as_object().unwrap().len(), 4, "a publisher that is gone has no other samples: {down}");
     assert!(down["bench_dragon_metrics_frames_received_total"].as_f64() > Some(100.0));
     metrics.signal(Signal::SIGTERM);
-    assert!(metrics.output_within(DEADLINE).status.success());
+    assert!(metrics.output().status.success());
 }
 
 #[test]
 fn an_address_in_use_is_a_sentence() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
-    let output =
-        Process::start(program("metrics_taken").args(["metrics", "--listen", &address])).output_within(DEADLINE);
+    let output = Process::start(program("metrics_taken").args(["metrics", "--listen", &address])).output();
     assert_eq!(output.status.code(), Some(1));
     let printed = text(&output.stderr);
     assert!(printed.contains(&address) && printed.contains("--listen") && printed.lines().count() == 1, "{printed}");
@@ -194,7 +192,7 @@ fn an_address_in_use_is_a_sentence() {
 #[test]
 fn a_foreign_name_for_this_machine_is_answered_nothing() {
     let mut server = Process::start(program("host").args(["metrics", "--json", "--listen", "127.0.0.1:0"]));
-    let ready: Value = serde_json::from_str(&server.first_line_within(DEADLINE)).unwrap();
+    let ready: Value = serde_json::from_str(&server.first_line()).unwrap();
     let url = ready["url"].as_str().unwrap();
     for host in ["evil.example", "evil.example:9464", "127.0.0.1.evil.example"] {
         let answer = http_get_as(url, host, "*/*");

@@ -8,8 +8,6 @@ use std::net::UdpSocket;
 use harness::{Process, can_run, http_get, program, python, python_modules, text, unique, wait};
 use serde_json::{Value, json};
 
-/// Deadline of every wait, seconds.
-const DEADLINE: u64 = 120;
 const COIL: [&str; 2] = ["--scene", "config/coil.toml"];
 /// The time at which the shows stand, s: a contact of gold and jade is near.
 const TIME: &str = "333";
@@ -25,7 +23,7 @@ fn show(name: &str) -> Process {
 /// Returns the places of all handles from `solve`.
 fn places(name: &str) -> Vec<[f64; 2]> {
     let mut solve = program(name);
-    let output = Process::start(solve.args(COIL).args(["solve", "--at", TIME, "--json"])).output_within(DEADLINE);
+    let output = Process::start(solve.args(COIL).args(["solve", "--at", TIME, "--json"])).output();
     let solved: Value = serde_json::from_str(&text(&output.stdout)).unwrap();
     let handles = solved["handles"].as_array().unwrap().iter();
     handles.map(|handle| [0, 1].map(|at| handle[at].as_f64().unwrap())).collect()
@@ -42,11 +40,11 @@ fn pypsn_hears_each_dragon_under_its_numbers_and_names() {
     assert_eq!(places.len(), 2 * HANDLES);
     let mut peer = Process::start(python().arg("tests/python/psn_dragons.py"));
     let lines = peer.lines();
-    let listening: Value = serde_json::from_str(&lines.until("port", DEADLINE)).unwrap();
+    let listening: Value = serde_json::from_str(&lines.until("port")).unwrap();
     let to = format!("127.0.0.1:{}", listening["port"]);
     let numbers = ["--first-id", "11", "--id-step", "500", "--trackers", "head,9,tail", "--axes", "x,y,up"];
     let _sender = Process::start(program(name).args(["send", "psn", "--to", &to]).args(numbers));
-    let heard: Value = serde_json::from_str(&lines.until("names", DEADLINE)).unwrap();
+    let heard: Value = serde_json::from_str(&lines.until("names")).unwrap();
     let expected = [
         (11, "gold head", 0),
         (19, "gold handle 9", 8),
@@ -75,10 +73,10 @@ fn python_osc_hears_heads_and_alerts_of_each_dragon() {
     let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
     let mut peer = Process::start(python().args(["tests/python/osc_peer.py", "--port", &port]));
     let lines = peer.lines();
-    lines.until("listening", DEADLINE);
+    lines.until("listening");
     let _sender = Process::start(program(name).args(["send", "osc", "--to", &format!("127.0.0.1:{port}")]));
     let heard = |address: &str| {
-        let line = lines.until(&format!("/{}/{address}\"", unique(name)), DEADLINE);
+        let line = lines.until(&format!("/{}/{address}\"", unique(name)));
         serde_json::from_str::<Value>(&line).unwrap()["arguments"].clone()
     };
     let alert = heard("alert");
@@ -99,7 +97,7 @@ fn figures_have_the_label_of_each_dragon() {
     let name = "figures_dragons";
     let _show = show(name);
     let mut metrics = Process::start(program(name).args(["metrics", "--json", "--listen", "127.0.0.1:0"]));
-    let ready: Value = serde_json::from_str(&metrics.first_line_within(DEADLINE)).unwrap();
+    let ready: Value = serde_json::from_str(&metrics.first_line()).unwrap();
     let own = unique(name);
     let lines = [
         format!("bench_dragon_benches{{name=\"{own}\",dragon=\"jade\"}} 60"),
@@ -108,7 +106,7 @@ fn figures_have_the_label_of_each_dragon() {
         format!("bench_dragon_alert_event_info{{name=\"{own}\",event=\"contact\",dragon=\"gold\",other=\"jade\"}} 1"),
     ];
     let mut answer = String::new();
-    for _ in 0..DEADLINE * 10 {
+    for _ in 0..harness::patience().as_secs() * 10 {
         answer = http_get(ready["url"].as_str().unwrap(), "*/*");
         if lines.iter().all(|line| answer.lines().any(|printed| printed == line)) {
             return;

@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::harness::{
     Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique,
 };
-use crate::send::{DEADLINE, NEWTON, free_port, heard};
+use crate::send::{NEWTON, free_port, heard};
 
 const ORIGIN: [f64; 2] = [12.5, -40.25];
 const TURNS: f64 = 0.3;
@@ -97,29 +97,29 @@ fn a_placed_show_is_sent_where_it_stands_and_its_log_verifies() {
     let mut psn_peer = Process::start(&mut psn_peer);
     let mut osc_peer = Process::start(python().args(["tests/python/osc_peer.py", "--port", &osc_port]));
     let (psn_lines, osc_lines) = (psn_peer.lines(), osc_peer.lines());
-    psn_lines.until("listening", DEADLINE);
-    osc_lines.until("listening", DEADLINE);
+    psn_lines.until("listening");
+    osc_lines.until("listening");
     let mut send = program(name);
     send.args(["send", "psn", "--json", "--interface", "127.0.0.1", "--to", &format!("127.0.0.1:{psn_port}")]);
     let psn = Process::start(&mut send);
     let osc = Process::start(program(name).args(["send", "osc", "--json", "--to", &format!("127.0.0.1:{osc_port}")]));
     // Heads of three seconds.
-    let lines: Vec<String> = (0..90).flat_map(|_| osc_lines.all_until("/head\"", DEADLINE)).collect();
+    let lines: Vec<String> = (0..90).flat_map(|_| osc_lines.all_until("/head\"")).collect();
     let messages: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
     for sender in [psn, osc] {
         sender.signal(Signal::SIGTERM);
-        summary(&sender.output_within(DEADLINE));
+        summary(&sender.output());
     }
     heads_are_placed(&messages, name);
-    let last = psn_lines.rest(DEADLINE).pop();
-    let output = psn_peer.output_within(DEADLINE);
+    let last = psn_lines.rest().pop();
+    let output = psn_peer.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     let heard: Value = serde_json::from_str(&last.unwrap()).unwrap();
     assert!(heard["equal"].as_u64() > Some(30), "{}", heard["publishers"]);
     trackers_are_placed(&heard["samples"]);
 
     publisher.signal(Signal::SIGTERM);
-    let run = summary(&publisher.output_within(DEADLINE));
+    let run = summary(&publisher.output());
     let verified = program("placed_verify").args(["--json", "verify"]).arg(&log).output().unwrap();
     let line = json_lines(&verified).pop().unwrap_or_else(|| panic!("{}", text(&verified.stderr)));
     assert_eq!((&line["verdict"], &line["frames"]), (&"same".into(), &run["frames"]), "{line}");

@@ -18,8 +18,8 @@ fn a_program_of_global_variables_reads_every_service() {
     let run = run.arg("--scene").arg(&file).args(["run", "--json", "--start", "400", "--duration", "300"]);
     let publisher = Process::start(run);
     let mut peer = python();
-    let output = Process::start(peer.args(["tests/python/module_peer.py", "--name", &unique("python_module")]))
-        .output_within(240);
+    let output =
+        Process::start(peer.args(["tests/python/module_peer.py", "--name", &unique("python_module")])).output();
     let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
     let number = |field: &str| found[field].as_u64().unwrap_or_else(|| panic!("no {field} in {found}"));
     assert_eq!(number("frames") + number("missed"), number("last") - number("first") + 1, "{found}");
@@ -28,7 +28,7 @@ fn a_program_of_global_variables_reads_every_service() {
     assert_eq!((&found["scene"], &found["alert_run"]), (&whole.as_str().into(), &true.into()));
     assert!(found["cue"].as_str().unwrap().starts_with("at 4"), "{found}");
     publisher.signal(SIGINT);
-    assert!(publisher.output_within(60).status.success());
+    assert!(publisher.output().status.success());
     assert!(text(&output.stderr).is_empty(), "{}", text(&output.stderr));
 }
 
@@ -66,13 +66,13 @@ fn a_route_of_4096_pieces_is_one_message() {
     let publisher = Process::start(run.arg("--scene").arg(&file).args(["run", "--json", "--duration", "300"]));
     let mut peer = python();
     peer.env("PYTHONPATH", "packaging/python").args(["-c", STAGE_OF_A_LONG_ROUTE, &unique("pieces_4096")]);
-    let output = Process::start(&mut peer).output_within(240);
+    let output = Process::start(&mut peer).output();
     let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
     assert_eq!((found["segments"].as_u64(), found["lines"].as_u64()), (Some(4096), Some(2048)), "{found}");
     assert!(found["gap"].as_f64().unwrap() < 1e-9, "{found}");
     assert_eq!(found["scene"].as_u64(), Some(scene.len() as u64));
     publisher.signal(SIGINT);
-    assert!(publisher.output_within(60).status.success());
+    assert!(publisher.output().status.success());
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn its_type_hints_are_strict() {
     }
     let mut mypy = python();
     mypy.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/packaging/python"));
-    let output = Process::start(mypy.args(["-m", "mypy", "--cache-dir", "/dev/null"])).output_within(300);
+    let output = Process::start(mypy.args(["-m", "mypy", "--cache-dir", "/dev/null"])).output();
     assert!(output.status.success(), "{}", text(&output.stdout));
 }
 
@@ -118,11 +118,11 @@ fn the_last_handle_of_each_of_two_dragons_has_the_heading_of_its_last_bench() {
     let publisher = Process::start(&mut run);
     let mut reading = python();
     reading.env("PYTHONPATH", "packaging/python").args(["-c", LAST_HEADINGS_OF_TWO, &unique("python_headings")]);
-    let output = Process::start(&mut reading).output_within(240);
+    let output = Process::start(&mut reading).output();
     let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
     let [without, with] = [0, 1].map(|reader| found["errors"][reader].as_f64().unwrap());
     assert_eq!(found["tails"], serde_json::json!([60, 121]));
     assert!(without > 0.1 && with < 1e-12, "{found}");
     publisher.signal(SIGINT);
-    assert!(publisher.output_within(60).status.success());
+    assert!(publisher.output().status.success());
 }

@@ -89,9 +89,9 @@ fn small_recording(name: &str, folder: &Path) -> PathBuf {
     let file = folder.join("small.mcap");
     let recorder = recorder(name, &file, &[]);
     let arguments = ["--rate", "40", "--start", "20", "--duration", "5"];
-    publisher(name, &scene(folder, "school", ""), &arguments).output_within(120);
+    publisher(name, &scene(folder, "school", ""), &arguments).output();
     recorder.signal(Signal::SIGHUP);
-    assert_eq!(files(&harness::summary(&recorder.output_within(60))), std::slice::from_ref(&file));
+    assert_eq!(files(&harness::summary(&recorder.output())), std::slice::from_ref(&file));
     file
 }
 
@@ -111,16 +111,16 @@ fn every_message_of_every_topic_is_what_another_subscriber_got() {
         Process::start(peer.args(more))
     };
     let mut subscriber = peer("subscribe", &[]);
-    subscriber.lines().until("ready", 60);
+    subscriber.lines().until("ready");
     let every = "handles,poses,alerts,stage,diagnostics,markers,status,path,cues,clock,tf";
     let recorder = recorder(name, &file, &["--topics", every]);
     let arguments = ["--rate", "50", "--start", "408", "--duration", "8"];
-    let summary = harness::summary(&publisher(name, &scene, &arguments).output_within(180));
-    assert!(subscriber.output_within(60).status.success());
+    let summary = harness::summary(&publisher(name, &scene, &arguments).output());
+    assert!(subscriber.output().status.success());
     let recorded = stopped(recorder);
     check_whole(&recorded, &summary, 50);
     assert_eq!(recorded["bytes"].as_u64(), Some(std::fs::metadata(&file).unwrap().len()));
-    let output = peer("compare", &["--recordings", file.to_str().unwrap()]).output_within(600);
+    let output = peer("compare", &["--recordings", file.to_str().unwrap()]).output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     let counts = json_lines(&output).pop().unwrap();
     assert_eq!(counts.as_object().unwrap().len(), 11, "{counts}");
@@ -155,7 +155,7 @@ fn a_recorder_whose_disk_takes_nothing_can_be_stopped() {
     }
     assert!(now > 60_000 && now < before + 100, "{before} kB, then {now} kB");
     recorder.signal(Signal::SIGINT);
-    let output = recorder.output_within(100);
+    let output = recorder.output();
     let sentence = text(&output.stderr);
     assert!(output.status.code() == Some(1) && sentence.contains("nothing could be written for 30 s"), "{sentence}");
 }
@@ -174,7 +174,7 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
         wait(1.0 + random.f64() * 2.0);
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos() as u64;
         recorder.signal(Signal::SIGKILL);
-        recorder.output_within(20);
+        recorder.output();
         let output = program(name).args(["--json", "record", "--recover", file.to_str().unwrap()]).output().unwrap();
         let counts = harness::summary(&output);
         let mended = folder.path().join(format!("killed{round}-recovered.mcap"));
@@ -195,7 +195,7 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
     wait_for_bytes(&file, std::fs::metadata(&file).unwrap().len() + 100_000);
     stopped(recorder);
     publisher.signal(Signal::SIGINT);
-    let summary = harness::summary(&publisher.output_within(60));
+    let summary = harness::summary(&publisher.output());
     assert_eq!(summary["end"], "signal", "{summary}");
     losses.sort_by(f64::total_cmp);
     harness::aloud(&format!(
@@ -211,7 +211,7 @@ fn a_recorder_that_is_killed_loses_a_second_and_nobody_notices() {
 
 /// Checks a recording on a disk that became full: the file is whole up to that point.
 fn check_full(recorder: Process, file: &Path) {
-    let output = recorder.output_within(120);
+    let output = recorder.output();
     let sentence = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{sentence}");
     let error = sentence.lines().find(|line| line.starts_with("error")).unwrap();
@@ -232,7 +232,7 @@ fn a_full_disk_leaves_a_whole_file() {
     limited.args(["--name", &unique(name), "--json", "record", "--output", file.to_str().unwrap()]);
     check_full(Process::start(&mut limited), &file);
     // A device that accepts nothing.
-    let output = recorder(name, Path::new("/dev/full"), &["--force"]).output_within(60);
+    let output = recorder(name, Path::new("/dev/full"), &["--force"]).output();
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("/dev/full: No space left on device"), "{}", text(&output.stderr));
     // A disk of 5 MB.
@@ -262,7 +262,7 @@ fn files_are_split_by_size_by_time_and_by_run() {
         recorder(name, &by_time, &["--split", "2s", "--topics", "handles,stage"]),
     ];
     for _ in 0..2 {
-        publisher(name, &scene, &["--rate", "50", "--start", "100", "--duration", "5"]).output_within(120);
+        publisher(name, &scene, &["--rate", "50", "--start", "100", "--duration", "5"]).output();
     }
     let [size, time] = recorders.map(stopped);
     assert_eq!(std::fs::read(folder.path().join("size-2.mcap")).unwrap(), b"kept");
@@ -303,7 +303,7 @@ fn the_shortest_recording_has_its_stage() {
     for round in 0.. {
         let file = folder.path().join(format!("{round}.mcap"));
         let seconds = (0.05 + 0.02 * f64::from(round)).to_string();
-        let output = recorder(name, &file, &["--duration", &seconds]).output_within(60);
+        let output = recorder(name, &file, &["--duration", &seconds]).output();
         if output.status.success() {
             let entries = entries(&std::fs::read(&file).unwrap());
             assert!(entries.iter().any(|entry| entry.0.ends_with("/stage")), "{seconds} s: {}", entries.len());
@@ -315,7 +315,7 @@ fn the_shortest_recording_has_its_stage() {
         assert!(round < 100, "{recorded} recorders of {round} recorded something: {}", text(&output.stderr));
     }
     publisher.signal(Signal::SIGINT);
-    publisher.output_within(60);
+    publisher.output();
 }
 
 #[test]
@@ -325,8 +325,7 @@ fn a_thousand_frames_a_second_are_recorded_without_a_gap() {
     let file = folder.path().join("fast.mcap");
     let seconds = if long() { "60" } else { "5" };
     let recorder = recorder(name, &file, &[]);
-    let published =
-        publisher(name, &scene, &["--rate", "1000", "--start", "100", "--duration", seconds]).output_within(240);
+    let published = publisher(name, &scene, &["--rate", "1000", "--start", "100", "--duration", seconds]).output();
     let (published, recorded) = (harness::summary(&published), stopped(recorder));
     check_whole(&recorded, &published, 1000);
 }

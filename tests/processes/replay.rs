@@ -60,7 +60,7 @@ fn wait_for_publisher(name: &str) {
 fn recorded_replay(name: &str, file: &Path, scene: &Path, arguments: &[&str]) -> (Value, Kept) {
     let kept = file.with_file_name(format!("{name}.mcap"));
     let recorder = recorder(name, &kept);
-    let summary = harness::summary(&Process::start(&mut replay(name, file, scene, arguments)).output_within(120));
+    let summary = harness::summary(&Process::start(&mut replay(name, file, scene, arguments)).output());
     let recorded = stopped(recorder);
     assert_eq!((&recorded["frames"], &recorded["missed"]), (&summary["frames"], &0.into()), "{recorded} {summary}");
     (summary, read(&kept))
@@ -140,7 +140,7 @@ fn subscribers_get_the_show_that_was_recorded() {
             peer.args(["tests/python/transport_peer.py", "--transport", transport, "--name", &unique(name)]);
             let mut peer = Process::start(peer.args(["--seconds", "300"]));
             let lines = peer.lines();
-            lines.until("ready", 120);
+            lines.until("ready");
             (*transport, peer, lines)
         })
         .collect();
@@ -165,7 +165,7 @@ fn subscribers_get_the_show_that_was_recorded() {
     let of = |line: &Value, fields: &[&str]| fields.iter().map(|field| line[*field].clone()).collect::<Vec<_>>();
     for (transport, peer, lines) in peers {
         peer.signal(Signal::SIGTERM);
-        let lines: Vec<Value> = lines.rest(120).iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let lines: Vec<Value> = lines.rest().iter().map(|line| serde_json::from_str(line).unwrap()).collect();
         let frames: Vec<&Value> = lines.iter().filter(|line| line["type"] == "frame").collect();
         let left_out = ["skipped", "discarded"].map(|of| summary[transport][of].as_u64().unwrap_or(0));
         // While ROS 2 nodes discover one another, some messages are not sent.
@@ -185,7 +185,7 @@ fn subscribers_get_the_show_that_was_recorded() {
         assert_eq!((&last["level"], &last["event"]), (&2.into(), &2.into()), "{transport}: {last}");
     }
     watch.signal(Signal::SIGINT);
-    let lines = json_lines(&watch.output_within(60));
+    let lines = json_lines(&watch.output());
     let alerts: Vec<_> = lines.iter().filter(|line| line["type"] == "alert").collect();
     let times: Vec<_> = alerts.iter().map(|line| line["sim_time"].as_f64().unwrap()).collect();
     assert_eq!(times, recorded.alerts.iter().map(|alert| alert.f64(24)).collect::<Vec<_>>());
@@ -208,12 +208,12 @@ fn a_replay_can_be_watched_and_not_conducted() {
         assert_eq!((code, &line["code"]), (1, &"refused".into()), "{command:?}: {line} {sentence}");
     }
     // A name has one publisher.
-    let second = Process::start(&mut replay(name, &file, &scene, &[])).output_within(60);
+    let second = Process::start(&mut replay(name, &file, &scene, &[])).output();
     assert_eq!(second.status.code(), Some(1), "{}", text(&second.stderr));
     assert!(text(&second.stderr).contains("(--name)"), "{}", text(&second.stderr));
     // The page receives the replay like a show.
     let mut view = Process::start(program(name).args(["view", "--json", "--port", "0"]));
-    let ready: Value = serde_json::from_str(&view.first_line_within(20)).unwrap();
+    let ready: Value = serde_json::from_str(&view.first_line()).unwrap();
     let address = ready["url"].as_str().unwrap().replace("http://", "ws://") + "frames";
     let (mut socket, _) = tungstenite::connect(address).unwrap();
     let (mut stages, mut frames) = (0, 0);

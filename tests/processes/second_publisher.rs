@@ -21,7 +21,7 @@ fn second(place: &Place) -> (Process, Lines) {
     command.args([script, "--name", "bench_dragon"]).current_dir(place.folder());
     let mut process = Process::start(&mut command);
     let lines = process.lines();
-    assert_eq!(object(&lines.until("ready", 300))["third_refused"], true);
+    assert_eq!(object(&lines.until("ready"))["third_refused"], true);
     (process, lines)
 }
 
@@ -32,7 +32,7 @@ fn show(place: &Place) -> Process {
 
 /// Asserts that a show cannot start here because one is running.
 fn assert_refused(place: &Place, command: &[&str]) {
-    let output = Process::start(place.program().args(command)).output_within(300);
+    let output = Process::start(place.program().args(command)).output();
     let printed = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{printed}");
     assert!(printed.contains("another publisher is running under the name \"bench_dragon\""), "{printed}");
@@ -43,7 +43,7 @@ fn assert_refused(place: &Place, command: &[&str]) {
 fn beyond(lines: &Lines, tick: u64) -> Vec<String> {
     let mut read = Vec::new();
     loop {
-        read.extend(lines.all_until("tick", 300));
+        read.extend(lines.all_until("tick"));
         // The last line is the awaited one.
         let (_, behind) = read.last().unwrap().rsplit_once("tick").unwrap();
         let from_digit = behind.trim_start_matches(|it: char| !it.is_ascii_digit());
@@ -56,7 +56,7 @@ fn beyond(lines: &Lines, tick: u64) -> Vec<String> {
 
 /// Returns a tick that the show reaches after this call.
 fn tick_to_come(place: &Place) -> u64 {
-    let output = Process::start(place.program().args(["watch", "--json", "--duration", "1"])).output_within(300);
+    let output = Process::start(place.program().args(["watch", "--json", "--duration", "1"])).output();
     let ticks = text(&output.stdout).lines().map(|line| object(line)["tick"].as_u64()).max();
     ticks.flatten().unwrap()
 }
@@ -74,57 +74,57 @@ fn a_second_publisher_is_admitted_and_nothing_of_it_is_taken_for_the_show() {
     let mut observer = Process::start(place.program().arg("soak-subscriber"));
     let observed = observer.lines();
     let first = show(&place);
-    monitored.until("is running", 300);
-    observed.until("\"status\":{", 300);
+    monitored.until("is running");
+    observed.until("\"status\":{");
     let (peer, told) = second(&place);
     // The stage is sent again while the second publisher exists, and is the same.
-    let [one, other] = [(); 2].map(|()| object(&told.until("\"stage\"", 300)));
+    let [one, other] = [(); 2].map(|()| object(&told.until("\"stage\"")));
     assert_eq!(one, other);
     // Frames and alerts of another run do not belong to the show.
     peer.signal(SIGUSR1);
-    (0..50).for_each(|_| drop(told.until("sent", 300)));
-    monitored.until("missed 0", 300);
+    (0..50).for_each(|_| drop(told.until("sent")));
+    monitored.until("missed 0");
 
     // The name remains the show's, while the show runs and while it is stopped, for every command that publishes.
     assert_refused(&place, &["run"]);
     first.stop();
     assert_refused(&place, &["run", "--duration", "1"]);
-    let soaked = Process::start(place.program().args(["soak", "--duration", "1", "--rate", "100"])).output_within(300);
+    let soaked = Process::start(place.program().args(["soak", "--duration", "1", "--rate", "100"])).output();
     assert!(!soaked.status.success(), "{}", text(&soaked.stdout));
     first.signal(SIGCONT);
 
     // The show is killed; the other publisher stays, silent, and holds no name.
     peer.signal(SIGUSR1);
-    told.until("silent", 300);
+    told.until("silent");
     // The frames that the second publisher has sent are read before: otherwise it would be selected next.
     let after = tick_to_come(&place);
     let mut printed = beyond(&json_lines, after);
     beyond(&monitored, after);
     beyond(&observed, after);
     first.signal(SIGKILL);
-    monitored.until("has ended", 300);
+    monitored.until("has ended");
     let last = show(&place);
-    monitored.until("is running", 300);
-    monitored.until("missed 0", 300);
+    monitored.until("is running");
+    monitored.until("missed 0");
     // The other readers may connect later.
-    printed.extend(json_lines.all_until("\"alert\"", 300));
-    observed.until("\"runs\":2", 300);
+    printed.extend(json_lines.all_until("\"alert\""));
+    observed.until("\"runs\":2");
     last.signal(SIGINT);
-    let published = summary(&last.output_within(300));
-    monitored.until("has ended", 300);
+    let published = summary(&last.output());
+    monitored.until("has ended");
     [&json, &monitor, &observer, &peer].iter().for_each(|process| process.signal(SIGTERM));
 
-    let seen = object(observed.rest(300).last().unwrap());
+    let seen = object(observed.rest().last().unwrap());
     let count = |key: &str| seen[key].as_u64().unwrap_or_else(|| panic!("no {key} in {seen}"));
     assert_eq!([count("runs"), count("missed"), count("disordered"), count("wrong_links")], [2, 0, 0, 0], "{seen}");
     assert_eq!(count("last_sequence") + 1, published["frames"].as_u64().unwrap(), "{seen}");
-    printed.extend(json_lines.rest(300));
+    printed.extend(json_lines.rest());
     let alerts = printed.iter().map(|line| object(line)).filter(|line| line["type"] == "alert");
     let runs: Vec<Value> = alerts.map(|alert| alert["run_id"].clone()).collect();
     // One for each run: while a second publisher exists the latest is sent repeatedly, and passed on only once.
     assert!(runs.len() == 2 && runs.iter().all(|run| run != "7"), "{runs:?}");
-    monitored.rest(300);
-    told.rest(300);
+    monitored.rest();
+    told.rest();
     place.assert_clean();
 }
 
@@ -139,24 +139,24 @@ fn the_next_show_is_seen_though_another_publisher_was_followed() {
     let mut monitor = Process::start(place.program().arg("watch"));
     let monitored = monitor.lines();
     let first = show(&place);
-    monitored.until("is running", 300);
+    monitored.until("is running");
     let (peer, told) = second(&place);
     peer.signal(SIGUSR1);
-    told.until("sent", 300);
+    told.until("sent");
     first.signal(SIGKILL);
-    monitored.until("is running (run 0000000000000007)", 300);
+    monitored.until("is running (run 0000000000000007)");
     peer.signal(SIGUSR1);
-    monitored.until("sends nothing", 300);
+    monitored.until("sends nothing");
 
     let last = show(&place);
-    monitored.until("has ended", 300);
-    let started = monitored.until("is running", 300);
+    monitored.until("has ended");
+    let started = monitored.until("is running");
     last.signal(SIGINT);
-    summary(&last.output_within(300));
+    summary(&last.output());
     assert!(!started.contains("0000000000000007"), "{started}");
-    monitored.until("has ended", 300);
+    monitored.until("has ended");
     [&monitor, &peer].iter().for_each(|process| process.signal(SIGTERM));
-    monitored.rest(300);
-    told.rest(300);
+    monitored.rest();
+    told.rest();
     place.assert_clean();
 }

@@ -4,22 +4,19 @@
 use crate::harness;
 
 use std::net::UdpSocket;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use bench_dragon::motion::Method;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::show::scene::Scene;
 use harness::{
-    Lines, Process, can_run, long, program, python, python_modules, scene_file, summary, text, unique, wait,
+    Lines, Process, can_run, long, program, python, python_modules, scene_file, summary, text, unique, wait, wait_until,
 };
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 
 /// A solver with which the publisher starts at once, even if the program is not optimised.
 pub const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
-/// Deadline of every wait, seconds.
-pub const DEADLINE: u64 = 120;
-
 fn publisher(name: &str, arguments: &[&str]) -> Process {
     let scene = scene_file(name, &[NEWTON, ("[publish]", "[publish]\nqueue = 64")]);
     Process::start(program(name).arg("--scene").arg(scene).args(["run", "--json"]).args(arguments))
@@ -31,14 +28,21 @@ pub fn free_port() -> u16 {
 
 fn listener() -> (UdpSocket, String) {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.set_read_timeout(Some(Duration::from_secs(DEADLINE))).unwrap();
+    socket.set_read_timeout(Some(harness::patience())).unwrap();
     let address = socket.local_addr().unwrap().to_string();
     (socket, address)
 }
 
 fn end(process: Process) -> Value {
+    // On a busy machine a program starts late: before it catches the signal, the signal would kill it.
+    wait_until("the program catches SIGTERM", || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).unwrap_or_default();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        caught.is_none_or(|mask| mask & (1 << (Signal::SIGTERM as u64 - 1)) != 0)
+    });
     process.signal(Signal::SIGTERM);
-    summary(&process.output_within(DEADLINE))
+    summary(&process.output())
 }
 
 /// A sender's output and its duration.
@@ -78,7 +82,7 @@ impl Sending<'_> {
         peer.args(["--first-id", &first]).args(group.map(|group| ["--group", group]).into_iter().flatten());
         let mut peer = Process::start(peer.args(npm.map(|folder| ["--npm", folder]).into_iter().flatten()));
         let lines = peer.lines();
-        lines.until("listening", DEADLINE);
+        lines.until("listening");
         let to = format!("{}:{port}", group.unwrap_or("127.0.0.1"));
         let mut send = program(name);
         send.args(["send", "psn", "--json", "--to", &to, "--interface", "127.0.0.1"]);
@@ -86,8 +90,8 @@ impl Sending<'_> {
         let sender = Process::start(&mut send);
         wait(seconds);
         let sent = end(sender);
-        let last = lines.rest(DEADLINE).pop();
-        let output = peer.output_within(DEADLINE);
+        let last = lines.rest().pop();
+        let output = peer.output();
         assert!(output.status.success(), "{}", text(&output.stderr));
         let heard: Value = serde_json::from_str(&last.unwrap()).unwrap();
         let number = |of: &Value, field: &str| of[field].as_u64().unwrap_or_else(|| panic!("no {field} in {of}"));
@@ -162,7 +166,7 @@ fn only_tracker(socket: &UdpSocket) -> (f32, [f32; 3], [f32; 3]) {
 }
 
 fn until_status(socket: &UdpSocket, status: f32) -> ([f32; 3], [f32; 3]) {
-    let deadline = Instant::now() + Duration::from_secs(DEADLINE);
+    let deadline = Instant::now() + harness::patience();
     while Instant::now() < deadline {
         let (seen, position, speed) = only_tracker(socket);
         if seen == status {
@@ -170,7 +174,7 @@ fn until_status(socket: &UdpSocket, status: f32) -> ([f32; 3], [f32; 3]) {
         }
         assert_eq!(seen, 1.0 - status);
     }
-    panic!("no status {status} within {DEADLINE} s");
+    panic!("no status {status}");
 }
 
 #[test]
@@ -218,25 +222,25 @@ fn python_osc_hears_every_alert_and_cue_once_and_in_order() {
     let port = free_port().to_string();
     let mut peer = Process::start(python().args(["tests/python/osc_peer.py", "--port", &port]));
     let lines = peer.lines();
-    lines.until("listening", DEADLINE);
+    lines.until("listening");
     // One of the receivers is gone, which must not affect the other.
     let to = [format!("127.0.0.1:{}", free_port()), format!("127.0.0.1:{port}")];
     let sender = Process::start(program(name).args(["send", "osc", "--json", "--to", &to[0], &to[1]]));
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
     let watched = watch.lines();
-    watched.until("waiting", DEADLINE);
+    watched.until("waiting");
     let mut run = program(name);
     run.arg("--scene").arg(scene).args(["run", "--json", "--start", "407", "--duration", "7"]);
-    summary(&Process::start(&mut run).output_within(300));
+    summary(&Process::start(&mut run).output());
     let parsed =
         |lines: Vec<String>| Vec::from_iter(lines.iter().map(|line| serde_json::from_str::<Value>(line).unwrap()));
-    let mut messages = parsed(lines.rest(DEADLINE));
+    let mut messages = parsed(lines.rest());
     for message in &mut messages {
         let address = message["address"].as_str().unwrap().strip_prefix(&format!("/{}/", unique(name)));
         message["address"] = json!(address.unwrap());
     }
     watch.signal(Signal::SIGTERM);
-    let watched = parsed(watched.rest(DEADLINE));
+    let watched = parsed(watched.rest());
     let sent = end(sender);
 
     let of_type = |name: &str| Vec::from_iter(watched.iter().filter(|line| line["type"] == name));
@@ -310,16 +314,16 @@ fn countdown_and_head_are_true(messages: &[Value]) {
 
 /// Waits until a separate subscriber has received `frames` more frames, and returns the number that it has missed.
 fn further_frames(watched: &Lines, frames: u64) -> u64 {
-    let deadline = Instant::now() + Duration::from_secs(DEADLINE);
+    let deadline = Instant::now() + harness::patience();
     let mut first = None;
     while Instant::now() < deadline {
-        let line: Value = serde_json::from_str(&watched.until("\"received\"", DEADLINE)).unwrap();
+        let line: Value = serde_json::from_str(&watched.until("\"received\"")).unwrap();
         let received = line["received"].as_u64().unwrap();
         if received >= *first.get_or_insert(received) + frames {
             return line["missed"].as_u64().unwrap();
         }
     }
-    panic!("no {frames} frames within {DEADLINE} s")
+    panic!("no {frames} frames")
 }
 
 /// Starts a sender of each kind, and waits until each is connected.
@@ -328,10 +332,11 @@ fn senders(name: &str) -> [Process; 3] {
     let psn_sender = Process::start(program(name).args(["send", "psn", "--to", &to_psn]));
     let osc_sender = Process::start(program(name).args(["send", "osc", "--to", &to_osc]));
     let mut metrics = Process::start(program(name).args(["metrics", "--json", "--listen", "127.0.0.1:0"]));
-    let ready: Value = serde_json::from_str(&metrics.first_line_within(DEADLINE)).unwrap();
+    let ready: Value = serde_json::from_str(&metrics.first_line()).unwrap();
     psn.recv(&mut [0; 1500]).unwrap();
     osc.recv(&mut [0; 1500]).unwrap();
-    let mut tries = (0..DEADLINE * 10).map(|_| harness::http_get(ready["url"].as_str().unwrap(), "*/*"));
+    let mut tries =
+        (0..harness::patience().as_secs() * 10).map(|_| harness::http_get(ready["url"].as_str().unwrap(), "*/*"));
     let is_connected = |answer: String| {
         // A figure that exists only after a frame.
         let connected = answer.contains("bench_dragon_simulated_time_seconds{");
@@ -340,7 +345,7 @@ fn senders(name: &str) -> [Process; 3] {
         }
         connected
     };
-    assert!(tries.any(is_connected), "no metrics within {DEADLINE} s");
+    assert!(tries.any(is_connected), "no metrics");
     [psn_sender, osc_sender, metrics]
 }
 
@@ -369,6 +374,6 @@ fn a_sender_that_is_killed_or_stopped_costs_nobody_a_frame() {
     let run = end(publisher);
     println!("{run}");
     watch.signal(Signal::SIGTERM);
-    let last = watched.rest(DEADLINE).pop();
+    let last = watched.rest().pop();
     assert!(last.is_none_or(|last| last.contains("\"missed\":0")), "the other subscriber missed frames");
 }

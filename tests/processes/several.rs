@@ -17,18 +17,18 @@ fn a_show_of_two_runs_is_recorded_and_proved() {
     let run = Process::start(&mut command);
     let mut watch = Process::start(program(name).args(["--json", "watch"]));
     let watched = watch.lines();
-    watched.until("\"alert\"", 60);
+    watched.until("\"alert\"");
     let record = Process::start(program(name).args(["record", "-o"]).arg(&recording));
     harness::wait_for_bytes(&recording, 10_000);
     assert!(program(name).args(["control", "go"]).status().unwrap().success());
-    let contact = watched.until("\"level\":\"contact\"", 60);
+    let contact = watched.until("\"level\":\"contact\"");
     let contact: Value = serde_json::from_str(&contact).unwrap();
     assert_eq!((&contact["event_bench_a"], &contact["event_bench_b"]), (&0.into(), &61.into()));
     for process in [&record, &watch, &run] {
         process.signal(nix::sys::signal::Signal::SIGINT);
     }
-    assert!(record.output_within(60).status.success());
-    let told = text(&run.output_within(60).stderr);
+    assert!(record.output().status.success());
+    let told = text(&run.output().stderr);
     assert!(told.contains("bench 1 (the head) of gold and bench 1 (the head) of jade touched at"), "{told}");
     for (file, verdict) in [(&log, "same"), (&recording, "close")] {
         let proof = program("several_verify").args(["--json", "verify"]).arg(file).output().unwrap();
@@ -51,15 +51,15 @@ fn a_cue_before_the_contact_of_two_pauses_the_show() {
     let told = run.lines();
     let mut watch = Process::start(program(name).args(["--json", "watch"]));
     let watched = watch.lines();
-    watched.until("\"alert\"", 60);
+    watched.until("\"alert\"");
     // An alert that comes before the stage waits for its names.
     let mut people = Process::start(program(name).arg("watch"));
-    let read = people.lines().all_until("of gold and bench 1 (the head) of jade at (1.873, 1.043) m", 60);
+    let read = people.lines().all_until("of gold and bench 1 (the head) of jade at (1.873, 1.043) m");
     assert!(read.iter().filter(|line| line.contains("bench ")).all(|line| line.contains("of jade")), "{read:?}");
     assert!(program(name).args(["control", "go"]).status().unwrap().success());
-    let cue: Value = serde_json::from_str(&watched.until("\"closing\"", 60)).unwrap();
+    let cue: Value = serde_json::from_str(&watched.until("\"closing\"")).unwrap();
     assert!((cue["cue_time"].as_f64().unwrap() - (335.726_813_722_605 - 3.0)).abs() < 1e-9, "{cue}");
-    let state = Process::start(program(name).args(["--json", "control", "state"])).output_within(60);
+    let state = Process::start(program(name).args(["--json", "control", "state"])).output();
     assert_eq!(json_lines(&state)[0]["playback"], "paused");
     drop((run, watch, told));
 }
@@ -79,7 +79,7 @@ fn the_trade_of_two_has_both_names() {
     let jade = dragon("jade", 5, "{ origin = [40.0, 7.0], rotation_turns = 0.3 }");
     std::fs::write(&scene, dragon("gold", 4, "{ origin = [0.0, 0.0] }") + &jade).unwrap();
     let mut command = program("several_trade");
-    let output = Process::start(command.arg("--scene").arg(&scene).args(["--json", "trade"])).output_within(500);
+    let output = Process::start(command.arg("--scene").arg(&scene).args(["--json", "trade"])).output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     let lines = json_lines(&output);
     for name in ["gold", "jade"] {
@@ -99,7 +99,6 @@ fn what_knows_one_dragon_refuses_several_with_one_sentence() {
     let file = folder.path().join("certificate");
     let file = file.to_str().unwrap();
     for arguments in [
-        vec!["check", "--prove"],
         vec!["plan", "pitch", "--reach-radius", "4.5"],
         vec!["plan", "speed", "--max-handle-speed", "2"],
         vec!["trade", "--plot", file],

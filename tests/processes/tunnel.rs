@@ -57,7 +57,7 @@ fn real_time(program: &str) -> Command {
 
 fn ended(process: &Process, lines: &Lines) -> Vec<String> {
     process.signal(SIGTERM);
-    lines.rest(60)
+    lines.rest()
 }
 
 /// Measures the loss, cost and latency of a run of `seconds`; asserts only what must never happen.
@@ -71,12 +71,12 @@ fn measure(machines: &Machines, rate: u64, seconds: u64, options: [&str; 2]) {
     observer.arg("soak-subscriber");
     let [mut near, mut far] = ["left", "right"].map(|host| machines.start(host, &observer));
     let (near_lines, far_lines) = (near.lines(), far.lines());
-    far_lines.until("\"status\":{", 60);
+    far_lines.until("\"status\":{");
     let measured = seconds.min(20);
     let before = machines.hosts.sent_bytes();
     wait(measured as f64);
     let bytes = machines.hosts.sent_bytes() - before;
-    let published = summary(&show.output_within(seconds + 60));
+    let published = summary(&show.output());
     wait(2.0);
     let [near, far] =
         [(&near, &near_lines), (&far, &far_lines)].map(|(it, lines)| object(ended(it, lines).last().unwrap()));
@@ -103,7 +103,7 @@ fn measure(machines: &Machines, rate: u64, seconds: u64, options: [&str; 2]) {
         bytes / (measured * rate)
     );
     tunnels.iter().for_each(|tunnel| tunnel.signal(SIGINT));
-    tunnels.into_iter().for_each(|tunnel| drop(tunnel.output_within(60)));
+    tunnels.into_iter().for_each(|tunnel| drop(tunnel.output()));
 }
 
 /// Returns the messages of a late subscriber on the far side within 5 s.
@@ -111,7 +111,7 @@ fn far_peer(machines: &Machines) -> Vec<Value> {
     let mut command = python();
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/transport_peer.py");
     command.args([script, "--transport", "iceoryx2", "--name", "bench_dragon", "--seconds", "5"]);
-    let output = machines.start("right", &command).output_within(60);
+    let output = machines.start("right", &command).output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     text(&output.stdout).lines().map(object).collect()
 }
@@ -123,7 +123,7 @@ fn lives_and_deaths(machines: &Machines) {
     let start = || machines.program("left", &run);
     let [mut near, mut far] = ["left", "right"].map(|host| machines.program(host, &["watch"]));
     let monitors = [near.lines(), far.lines()];
-    let all_print = |what: &str| monitors.each_ref().map(|lines| lines.until(what, 60));
+    let all_print = |what: &str| monitors.each_ref().map(|lines| lines.until(what));
     let right = machines.tunnel("right", "--poll 5");
     let mut show = start();
     let left = machines.tunnel("left", "--poll 5");
@@ -134,11 +134,11 @@ fn lives_and_deaths(machines: &Machines) {
     // A machine that joins late, and a subscriber on it: the stage and the alert arrive within a second, the state in
     // every frame.
     right.signal(SIGINT);
-    right.output_within(60);
-    monitors[1].until("has ended", 60);
+    right.output();
+    monitors[1].until("has ended");
     let right = machines.tunnel("right", "--poll 5");
     // The run is the same as before.
-    monitors[1].until("rate", 60);
+    monitors[1].until("rate");
     let got = far_peer(machines);
     let of = |kind: &str| got.iter().filter(|line| line["type"] == kind).collect::<Vec<_>>();
     println!(
@@ -152,17 +152,17 @@ fn lives_and_deaths(machines: &Machines) {
     assert_eq!(of("frame")[0]["state"], 0, "the state is in every frame");
     assert!(!of("alert").is_empty());
 
-    let json = machines.program("right", &["watch", "--json", "--duration", "3"]).output_within(60);
+    let json = machines.program("right", &["watch", "--json", "--duration", "3"]).output();
     let seconds: Vec<Value> = text(&json.stdout).lines().map(object).filter(|line| line["type"] == "second").collect();
     assert!(seconds.last().unwrap()["received"].as_u64().unwrap() > 60, "{seconds:?}");
     assert!(seconds.iter().all(|second| second["latency_ns"].is_null() && second["missed"] == 0), "{seconds:?}");
-    let refused = machines.program("right", &["control", "pause"]).output_within(60);
+    let refused = machines.program("right", &["control", "pause"]).output();
     assert_eq!(refused.status.code(), Some(1));
     assert!(text(&refused.stderr).contains("send them there"), "{}", text(&refused.stderr));
     for (host, sentence) in
         [("left", "another publisher is running"), ("right", "a tunnel brings it from another machine")]
     {
-        let second = machines.program(host, &["run", "--duration", "1"]).output_within(60);
+        let second = machines.program(host, &["run", "--duration", "1"]).output();
         assert_eq!(second.status.code(), Some(1));
         assert!(text(&second.stderr).contains(sentence), "{}", text(&second.stderr));
     }
@@ -176,11 +176,11 @@ fn lives_and_deaths(machines: &Machines) {
         all_print("rate");
     }
     show.signal(SIGINT);
-    summary(&show.output_within(60));
+    summary(&show.output());
     all_print("has ended");
     for tunnel in [left, right] {
         tunnel.signal(SIGINT);
-        tunnel.output_within(60);
+        tunnel.output();
     }
     for ((monitor, lines), place) in [&near, &far].into_iter().zip(&monitors).zip([&machines.left, &machines.right]) {
         ended(monitor, lines);

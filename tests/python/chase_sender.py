@@ -32,7 +32,8 @@ class Frames(threading.Thread):
 
     def run(self):
         iox2.set_log_level(iox2.LogLevel.Fatal)
-        node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+        builder = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled)
+        node = builder.create(iox2.ServiceType.Ipc)
         service = None
         while service is None:
             builder = node.service_builder(iox2.ServiceName.new(f"{self.name_of_show}/poses"))
@@ -114,7 +115,8 @@ def send_ltc(arguments, started, jump_at):
     encoder = ctypes.c_void_p(libltc.ltc_encoder_create(rate, fps, {24: 3, 25: 1, 30: 0}[fps], 0))
     out = sys.stdout.buffer
     # As arecord writes it into a pipe: the length is not known.
-    out.write(b"RIFF\xff\xff\xff\xffWAVEfmt " + struct.pack("<IHHIIHH", 16, 1, 1, rate, rate, 1, 8) + b"data\xff\xff\xff\xff")
+    sound = struct.pack("<IHHIIHH", 16, 1, 1, rate, rate, 1, 8)
+    out.write(b"RIFF\xff\xff\xff\xffWAVEfmt " + sound + b"data\xff\xff\xff\xff")
     buffer, sound, k, sent = ctypes.create_string_buffer(8192), b"", 0, 0
     while (now := time.monotonic()) < started + arguments.seconds:
         while len(sound) < rate // 50:

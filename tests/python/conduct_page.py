@@ -10,6 +10,7 @@ import contextlib
 import functools
 import http.server
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -19,7 +20,7 @@ import time
 from chromium import browser as chromium
 
 # No wait here may last forever; an alarm still ends everything that was started.
-WATCHDOG = 300
+WATCHDOG = 550
 CONTACT = 412.473837682115
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
@@ -63,7 +64,7 @@ def opened(browser, url):
     return page
 
 
-def until(condition, what, seconds=60):
+def until(condition, what, seconds=120):
     """Returns the value of a condition as soon as it is true."""
     deadline = time.monotonic() + seconds
     while not (value := condition()):
@@ -135,13 +136,17 @@ def time_line(page):
     for (_, at, x), true in zip(marks, [CONTACT, 150.0, 300.0]):
         assert abs(at - true) < 1e-9 and abs(x - place_on_line(page, true)[0]) < 1.5, marks
     # A drag seeks on its way, at most about ten times a second, and to its end exactly.
-    page.evaluate("(() => { const { send } = WebSocket.prototype; window.sent = []; WebSocket.prototype.send = function (text) { sent.push(text); send.call(this, text); }; })()")
+    page.evaluate("(() => { const { send } = WebSocket.prototype; window.sent = []; WebSocket.prototype.send = function (text) { sent.push(text); window.socket = this; if (!(window.swallows && text.includes('seek'))) send.call(this, text); }; new MutationObserver(() => (window.disabled = true)).observe(document.getElementById('conduct-restart'), { attributeFilter: ['disabled'] }); })()")
     page.mouse.move(*place_on_line(page, state()["sim_time"]))
     page.mouse.down()
     began = time.monotonic()
     for step in range(60):
         page.mouse.move(*place_on_line(page, 100 + 3 * step))
     until(lambda: 105 < state()["sim_time"] < 290, "seeks during the drag")
+    # A connection that breaks for a moment does not take the time line out of the hand.
+    page.evaluate("window.socket.close()")
+    until(lambda: page.evaluate("window.disabled"), "the bar knows that there is no server")
+    until(lambda: page.is_enabled("#conduct-restart"), "the bar knows that the server is back")
     page.mouse.move(*place_on_line(page, 250))
     took = time.monotonic() - began
     page.mouse.up()
@@ -149,6 +154,19 @@ def time_line(page):
     seeks = [text for text in page.evaluate("sent") if '"seek"' in text]
     assert 1 < len(seeks) <= 10 * took + 3, f"{len(seeks)} seeks in {took} s"
     until(lambda: abs(float(page.input_value("#conduct-seek")) - state()["sim_time"]) < 0.1, "the thumb is where the show is")
+    # A screen reader reads the value.
+    assert re.fullmatch(r"\d+(\.\d)?", page.input_value("#conduct-seek")), page.input_value("#conduct-seek")
+    # A connection that breaks before the answer to a seek: the bar says so, and the server's return makes no late jump.
+    before, count = state(), len(seeks)
+    page.evaluate("window.swallows = true")
+    seek(page, 120)
+    until(lambda: any('"seek"' in text and "120" in text for text in page.evaluate("sent")), "a seek on its way")
+    page.evaluate("window.socket.close(); window.swallows = false")
+    says(page, "The connection broke: no answer came.")
+    until(lambda: page.is_enabled("#conduct-restart"), "the bar knows that the server is back again")
+    until(lambda: abs(float(page.input_value("#conduct-seek")) - before["sim_time"]) < 0.1, "the thumb is where the show is, again")
+    assert state()["sim_time"] == before["sim_time"] and before["playback"] == "paused", (before, state())
+    assert sum('"seek"' in text for text in page.evaluate("sent")) == count + 1, "the seek is sent again"
 
 
 def keyboard(page):
@@ -179,7 +197,7 @@ def keyboard(page):
     seek(page, 299.9)
     # The second cue pauses: Play continues from there.
     until(lambda: (now := state())["playback"] == "paused" and now["sim_time"] == 300.0, "the cue that pauses")
-    until(lambda: "".join(page.locator("#playback-detail").all_inner_texts()).startswith("cue 2 · coil · waits 0:0"), "its name")
+    until(lambda: "".join(page.locator("#playback-detail").all_inner_texts()).startswith("cue 2 · coil · waits "), "its name")
     page.get_by_role("button", name="Play").click()
     until(lambda: state()["playback"] == "playing", "on from the cue")
 
@@ -258,7 +276,9 @@ def token_and_own_pages():
         # A client without a token, or with a wrong one, may watch.
         for fragment in ["", "#token=0123456789abcdef0123456789abcdef"]:
             page = opened(browser, here + fragment)
-            time.sleep(0.5)
+            # The server has answered to the token, if there is one, long before the tenth further frame.
+            received = page.evaluate("picture.received")
+            until(lambda: page.evaluate("picture.received") >= received + 10, "frames")
             assert not bar_is_shown(page), fragment
             page.keyboard.press("Space")
             page.close()

@@ -74,8 +74,8 @@ def clearances(scene, ground, time, benches):
 
 
 def main():
-    text = open(sys.argv[1]).read()
-    scene, ground, guess = Scene(text), Ground(tomllib.loads(text)), arb(float(sys.argv[2]))
+    file = tomllib.loads(open(sys.argv[1]).read())
+    scene, ground, guess = Scene(file), Ground(file), arb(float(sys.argv[2]))
     before, after = guess - arb(1) / 10**6, guess + arb(1) / 10**6
     gaps = clearances(scene, ground, after, scene.benches)
     bench = min(range(scene.benches), key=lambda bench: float(gaps[bench]))

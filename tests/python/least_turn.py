@@ -1,11 +1,14 @@
 """The least turn radius of a link by a search of its own: the radius below which the link locks.
 
-    least_turn.py PITCH LINK ARC_RATIO
+    least_turn.py PITCH LINK ARC_RATIO [BENCHES BODY_LINK INSET WIDTH]
 
 A link locks where its rear handle is at a place p of the path whose tangent is perpendicular to the link, the front
 handle being at the first place ahead at the distance of the link. So the least product of tangent and link over all p is
 0 with the least radius. Prints that radius, and the metres from the beginning of the S to p. No contact and no stall is
 looked for. It shares no code with the program.
+
+With the team's size it prints in another line the radius at which the boards come free, and the two benches that
+overlap last, counted from 0.
 """
 
 import math
@@ -103,8 +106,112 @@ def least_product(turn, link):
     return min(least(lambda s: turn.product(s, link), *part) for part in zip(ends, ends[1:]))
 
 
+def root(function, low, high):
+    """Returns the place where an increasing function becomes 0, by the Illinois method."""
+    below, above, last = function(low), function(high), 0
+    for _ in range(100):
+        at = high - above * (high - low) / (above - below)
+        value = function(at)
+        if value == 0 or not low < at < high:
+            break
+        if value > 0:
+            high, above, below = at, value, 0.5 * below if last > 0 else below
+        else:
+            low, below, above = at, value, 0.5 * above if last < 0 else above
+        last = value
+    return at
+
+
+class Boards:
+    """The boards of a team, links and sizes in metres."""
+
+    def __init__(self, benches, links, inset, width):
+        self.links = [links[0]] + [links[1]] * (benches - 1)
+        self.inset, self.half_width = inset, 0.5 * width
+
+    def handles(self, turn, s, count):
+        points = [turn.at(s)[0]]
+        for link in self.links[:count]:
+            x, y = points[-1]
+
+            def beyond(back):
+                u, v = turn.at(s - back)[0]
+                return math.hypot(u - x, v - y) - link
+
+            low, step = link, link / 16
+            while beyond(low + step) < 0:
+                low += step
+            s -= root(beyond, low, low + step)
+            points.append(turn.at(s)[0])
+        return points
+
+    def board(self, front, rear):
+        """Returns the corners of a board and its two directions."""
+        (x, y), (u, v) = front, rear
+        link = math.hypot(x - u, y - v)
+        c, n = ((x - u) / link, (y - v) / link), (-(y - v) / link, (x - u) / link)
+        corners = [
+            (x * p + u * (1 - p) + side * n[0] * self.half_width, y * p + v * (1 - p) + side * n[1] * self.half_width)
+            for p in (1 + self.inset / link, -self.inset / link)
+            for side in (1, -1)
+        ]
+        return corners, (c, n)
+
+    def gap(self, boards, a, b):
+        """Returns the greatest gap of two boards along a side: below 0 if and only if they overlap."""
+        greatest = -math.inf
+        for axis in (*boards[a][1], *boards[b][1]):
+            one = [axis[0] * x + axis[1] * y for x, y in boards[a][0]]
+            other = [axis[0] * x + axis[1] * y for x, y in boards[b][0]]
+            greatest = max(greatest, min(other) - max(one), min(one) - max(other))
+        return greatest
+
+    def gap_at(self, turn, s, a, b):
+        points = self.handles(turn, s, b + 1)
+        boards = {bench: self.board(points[bench], points[bench + 1]) for bench in (a, b)}
+        return self.gap(boards, a, b)
+
+    def nearest(self, turn):
+        """Returns the least gap of a coarse search, its two benches and the head's place."""
+        benches, found = len(self.links), (math.inf, 0, 0, 0.0)
+        steps = int((turn.begins[2] + sum(self.links)) / STEP)
+        for s in (STEP * step for step in range(steps)):
+            points = self.handles(turn, s, benches)
+            boards = [self.board(*pair) for pair in zip(points, points[1:])]
+            pairs = ((a, b) for a in range(benches) for b in range(a + 2, benches))
+            found = min(found, min((self.gap(boards, a, b), a, b, s) for a, b in pairs))
+        return found
+
+
+# Metres of the head, and share of the radius, of a coarse search.
+STEP, SHARE = 0.4, 4e-3
+
+
+def contact(boards, turn_of, low):
+    """Returns a radius at which the boards come free, and the two benches that overlap last."""
+    high = 2 * low
+    while high - low > SHARE * low:
+        middle = 0.5 * (low + high)
+        found = boards.nearest(turn_of(middle))
+        if found[0] < 0:
+            low, last = middle, found[1:]
+        else:
+            high = middle
+    a, b, s = last
+    # The coarse search may have missed a small overlap.
+    low, high = low * (1 - SHARE), high * (1 + SHARE)
+    for _ in range(36):
+        middle = 0.5 * (low + high)
+        turn = turn_of(middle)
+        if least(lambda at: boards.gap_at(turn, at, a, b), s - 2 * STEP, s + 2 * STEP)[0] < 0:
+            low = middle
+        else:
+            high = middle
+    return high, a, b
+
+
 def main():
-    pitch, link, ratio = map(float, sys.argv[1:])
+    pitch, link, ratio, *team = map(float, sys.argv[1:])
     low, high = 0.5 * link, 8.0 * link
     for _ in range(46):
         middle = 0.5 * (low + high)
@@ -113,6 +220,11 @@ def main():
         else:
             high = middle
     print(f"{high:.12f} {least_product(Turn(high, pitch, ratio), link)[1]:.6f}")
+    if team:
+        benches, body, inset, width = team
+        boards = Boards(int(benches), (link, body), inset, width)
+        radius, a, b = contact(boards, lambda radius: Turn(radius, pitch, ratio), 1.001 * high)
+        print(f"{radius:.12f} {a} {b}")
 
 
 main()

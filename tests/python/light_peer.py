@@ -2,7 +2,8 @@
 
     light_peer.py --name NAME [--teams HANDLES...]
 
-Prints a JSON line with the counts, and ends with an error if a frame is not its counterpart rounded.
+Prints "ready" once it looks for the publisher and, at the end, a JSON line with the counts. Ends with an error if a
+frame is not its counterpart rounded.
 """
 
 import argparse
@@ -44,6 +45,7 @@ def main():
     name, teams = (arguments := parser.parse_args()).name, arguments.teams
     iox2.set_log_level(iox2.LogLevel.Fatal)
     node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+    print("ready")
     services = [open_service(node, f"{name}/poses", HandlePose), open_service(node, f"{name}/poses32", HandlePose32)]
     ports = [service.subscriber_builder().create() for service in services]
     frames = [{}, {}]

@@ -1,4 +1,4 @@
-"""Reads OpenMetrics text from standard input with PyPI's prometheus-client and prints its samples as one JSON object."""
+"""Reads OpenMetrics text from standard input with prometheus-client of PyPI; prints its samples as one JSON object."""
 
 import json
 import sys

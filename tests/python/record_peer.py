@@ -133,7 +133,10 @@ class Comparison:
     def __init__(self, kept, name):
         self.name = name
         self.frames = [
-            (messages.FrameHeader.from_buffer_copy(header), (messages.HandlePose * (len(poses) // 40)).from_buffer_copy(poses))
+            (
+                messages.FrameHeader.from_buffer_copy(header),
+                (messages.HandlePose * (len(poses) // 40)).from_buffer_copy(poses),
+            )
             for header, poses in kept["poses"]
         ]
         self.by_stamp = {header.stamp_ns: (header, handles) for header, handles in self.frames}
@@ -259,9 +262,9 @@ def compare(name, kept, recordings):
         kind = topic.removeprefix(f"/{name}/")
         if kind in KINDS:
             assert len(seen) == len(comparison.events[kind]), (topic, len(seen), len(comparison.events[kind]))
-        elif kind == "markers":
-            # Markers begin with the stage, for which a subscriber may have to wait.
-            assert len(seen) > len(stamps) / 2 and seen == stamps[-len(seen) :], f"{len(seen)} of {len(stamps)} markers"
+        elif kind in ("markers", "/tf"):
+            # Both begin with the stage, for which a subscriber may have to wait.
+            assert len(seen) > len(stamps) / 2 and seen == stamps[-len(seen) :], f"{len(seen)} of {len(stamps)} {kind}"
         elif kind not in ("/diagnostics", "path"):
             assert seen == stamps, f"{topic}: {len(seen)} of {len(stamps)} frames"
     assert with_rosbags(recordings, sizes) == comparison.counts, "rosbags counts otherwise"
@@ -290,7 +293,7 @@ def with_rosbags(recordings, sizes):
 
 
 def check_metadata(recording):
-    """Checks what `ros2 bag info` reads besides statistics and channels: the fields of rosbag2's metadata, version 8."""
+    """Checks what `ros2 bag info` reads besides statistics and channels: rosbag2's metadata, version 8."""
     from mcap.reader import make_reader
     from ruamel.yaml import YAML
 
@@ -300,7 +303,8 @@ def check_metadata(recording):
     fields = YAML(typ="safe").load(metadata.metadata["serialized_metadata"])
     assert fields["version"] == 8 and fields["storage_identifier"] == "mcap" and fields["ros_distro"] == "jazzy", fields
     # rosbag2 reads all of these, of these types.
-    assert [type(fields[field]) for field in ("relative_file_paths", "topics_with_message_count", "files")] == [list] * 3
+    lists = ("relative_file_paths", "topics_with_message_count", "files")
+    assert [type(fields[field]) for field in lists] == [list] * 3
     assert fields["compression_format"] == fields["compression_mode"] == "" and fields["custom_data"] is None
     assert fields["duration"] == {"nanoseconds": 0} and fields["starting_time"] == {"nanoseconds_since_epoch": 0}
     assert fields["message_count"] == 0

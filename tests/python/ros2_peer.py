@@ -2,8 +2,9 @@
 
     ros2_peer.py --name NAME --seconds S [--topic handles:reliable:volatile] ...
 
-Prints a JSON line for every message of the requested topics and one line at the end. The program's own types are read
-from the .msg files, so that a difference between these and the wire is found.
+Prints a JSON line for every message of the requested topics and one line at the end. With --until-each it ends a second
+after each topic has had a message. The program's own types are read from the .msg files, so that a difference between
+these and the wire is found.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import time
 import types
 from dataclasses import dataclass
 
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsParticipant
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct, annotations, types as idl
@@ -197,20 +199,35 @@ def quality(reliability, durability, depth=100):
     )
 
 
+def offered(reader, participants):
+    """Returns the quality of service of the publishers that a reader has matched, and the lease of their participants in
+    seconds, as discovery tells them."""
+    found = [reader.get_matched_publication_data(handle) for handle in reader.get_matched_publications()]
+    leases = {each.key: each.qos[Policy.Liveliness].lease_duration / 1e9 for each in participants.read(N=1000)}
+    return {
+        "offered": sorted({f"{each.qos[Policy.Reliability]} {each.qos[Policy.Durability]}" for each in found}),
+        "leases_s": sorted({leases[each.participant_key] for each in found}),
+    }
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--name", default="bench_dragon")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--domain", type=int, default=0)
+    parser.add_argument("--depth", type=int, default=100)
     parser.add_argument("--topic", action="append", default=[], help="topic:reliability:durability")
+    parser.add_argument("--until-each", action="store_true")
     arguments = parser.parse_args()
     participant = DomainParticipant(arguments.domain)
+    participants = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
     readers = []
     for wanted in arguments.topic:
         kind, reliability, durability = (wanted.split(":") + ["reliable", "volatile"])[:3]
         name = f"rt/{kind}" if kind in ("diagnostics", "clock", "tf", "rosout") else f"rt/{arguments.name}/{kind}"
         topic = Topic(participant, name, TOPICS[kind])
-        readers.append((wanted, kind, DataReader(participant, topic, qos=quality(reliability, durability))))
+        qos = quality(reliability, durability, arguments.depth)
+        readers.append((wanted, kind, DataReader(participant, topic, qos=qos)))
     print(json.dumps({"type": "ready"}), flush=True)
     counts = {wanted: 0 for wanted, _, _ in readers}
     end = time.monotonic() + arguments.seconds
@@ -223,8 +240,12 @@ def main():
                     continue
                 idle = False
                 counts[wanted] += 1
+                if counts[wanted] == 1:
+                    print(json.dumps({"type": "offered", "by": kind, **offered(reader, participants)}), flush=True)
                 line = {"type": "message", "topic": wanted, "message": shortened(kind, sample)}
                 print(json.dumps(line), flush=True)
+                if arguments.until_each and counts[wanted] == 1 and all(counts.values()):
+                    end = min(end, time.monotonic() + 1.0)
         if idle:
             time.sleep(0.002)
     publishers = {wanted: len(reader.get_matched_publications()) for wanted, _, reader in readers}

@@ -7,8 +7,10 @@ N random times of the stretches that are said to be clear, or to move forward, a
 of the least clearance it checks all boards at N random times and at N times near the least, and the two nearest; of one of
 the greatest speed the speeds of all handles at N random times, and the fastest; of one of the least pitch N random
 pitches that are said to end with an overlap or a lock, and N places of the head with the pitch that is free. In N
-random steps of each it checks that the spans contain the handles. Path and chain are built as docs/proofs.md defines them: a
-follower is the first point backward along the path at the distance of the link, enclosed in numbers of 192 bits.
+random steps of each it checks that the spans contain the handles, and that boards are as far apart as is said. Of several
+dragons it checks each alone, and each two on the stage at times of the show. Path and chain are built as docs/proofs.md
+defines them: a follower is the first point backward along the path at the distance of the link, enclosed in numbers of
+192 bits.
 
 Prints a JSON object for each file: `refused` and `undecided`, a sentence or null, and the numbers of what was checked,
 with the random places that were undecided.
@@ -21,6 +23,7 @@ import math
 import random
 import sys
 import tomllib
+from itertools import combinations
 from pathlib import Path
 
 from flint import acb, arb, ctx
@@ -36,6 +39,11 @@ LINES = {
     ),
     "greatest_speed": ("speeds", "fast", "greatest_speed"),
     "least_pitch": ("reach", "overlap", "head_locks", "far", "step", "least_pitch"),
+}
+# The same of two of several dragons.
+LINES_OF_TWO = {
+    "events": ("both", "meeting", "result"),
+    "least_clearance": ("both", "near_both", "meeting", "least_clearance"),
 }
 # The most points of the path that are looked at for one follower.
 MOST_POINTS = 3000
@@ -179,8 +187,7 @@ class PlacedSpiral(Spiral):
 
 
 class Scene:
-    def __init__(self, text):
-        file = tomllib.loads(text)
+    def __init__(self, file):
         team, path, motion = file["team"], file["path"], file["motion"]
         number = lambda table, key: arb(float(table[key]))
         self.benches = team["benches"]
@@ -188,7 +195,8 @@ class Scene:
         head, body = number(team, "head_length") - 2 * self.inset, number(team, "body_length") - 2 * self.inset
         self.links = [head] + [body] * (self.benches - 1)
         self.speed = number(motion, "head_speed")
-        self.obstacles = obstacles(file)
+        self.delay, self.placement = arb(float(file.get("delay", 0.0))), Placement(file.get("placement", {}))
+        self.obstacles = obstacles(file.get("stage", {}), self.placement)
         # Sets the segments, the head's place at the start, and the metres from there to the path's end.
         getattr(self, path["kind"])(path, number)
 
@@ -262,11 +270,21 @@ class Scene:
             raise Undecided("metres of a spiral")
         return found
 
-    def place(self, time):
-        """Returns the place of the head at a time, seconds."""
-        if time == 0:
+    def end(self):
+        """Returns the time at which the head is at the path's end, seconds."""
+        return self.length / self.speed + self.delay
+
+    def time_at(self, place):
+        """Returns the time at which the head is at a place, seconds."""
+        return self.travelled(place) / self.speed + self.delay
+
+    def place(self, time, stands=False):
+        """Returns the place of the head at a time, seconds. If it `stands`, it does so at the path's end afterwards."""
+        left = (arb(time) - self.delay) * self.speed
+        if not left > 0:
             return self.start
-        left = arb(time) * self.speed
+        if stands and not left < self.length:
+            left = self.length
         for number, curve in enumerate(self.segments):
             begin = self.start[1] if number == 0 else curve.begin
             last = number == len(self.segments) - 1
@@ -393,6 +411,29 @@ class Scene:
         points = [self.point(place) for place in places]
         return [self.corners(points[i], points[i + 1], self.links[i]) for i in range(len(points) - 1)]
 
+    def boards_on_stage(self, places):
+        """Returns the boards on the stage, their corners counter-clockwise there."""
+        placed = [[self.placement.placed(corner) for corner in board] for board in self.boards(places)]
+        return [board[::-1] for board in placed] if self.placement.mirror < 0 else placed
+
+
+class Placement:
+    """Where the path's own coordinates are on the stage: mirrored, then turned, then moved."""
+
+    def __init__(self, table):
+        self.origin = [arb(float(c)) for c in table.get("origin", [0.0, 0.0])]
+        turn = 2 * PI * arb(float(table.get("rotation_turns", 0.0)))
+        self.sin, self.cos = turn.sin(), turn.cos()
+        self.mirror = -1 if table.get("mirror", False) else 1
+
+    def placed(self, point):
+        x, y = point[0], self.mirror * point[1]
+        return x * self.cos - y * self.sin + self.origin[0], x * self.sin + y * self.cos + self.origin[1]
+
+    def own(self, point):
+        x, y = (arb(float(point[k])) - self.origin[k] for k in (0, 1))
+        return x * self.cos + y * self.sin, (y * self.cos - x * self.sin) * self.mirror
+
 
 def gap_of_sides(a, b):
     """Returns the greatest gap between two boards along the normals of their sides, enclosed."""
@@ -456,14 +497,30 @@ def overlap(a, b):
     return is_inside(middle, a) and is_inside(middle, b)
 
 
-def pairs(boards, distance=0.0):
-    """Returns the pairs that share no handle, but for those whose circumscribed circles are further apart."""
+def circles(boards):
+    """Returns the middles and the radii of the circumscribed circles."""
     middles = [tuple(float(sum((corner[k] for corner in board), arb(0)).mid()) / 4 for k in (0, 1)) for board in boards]
     radii = [float(sum((part * part for part in sub(board[0], board[2])), arb(0)).sqrt().mid()) / 2 for board in boards]
+    return list(zip(middles, radii))
+
+
+def are_near(one, other, distance):
+    return math.dist(one[0], other[0]) <= (one[1] + other[1]) * (1 + 1e-9) + 1e-9 + distance
+
+
+def pairs(boards, distance=0.0):
+    """Returns the pairs that share no handle, but for those whose circumscribed circles are further apart."""
+    about = circles(boards)
     for i in range(len(boards)):
         for j in range(i + 2, len(boards)):
-            if math.dist(middles[i], middles[j]) <= (radii[i] + radii[j]) * (1 + 1e-9) + 1e-9 + distance:
+            if are_near(about[i], about[j], distance):
                 yield i, j
+
+
+def pairs_of_two(boards, others, distance=0.0):
+    """Returns the pairs of a board of each of two dragons, but for those whose circumscribed circles are further apart."""
+    about, of_others = circles(boards), circles(others)
+    return [(i, j) for i, one in enumerate(about) for j, other in enumerate(of_others) if are_near(one, other, distance)]
 
 
 class Obstacle:
@@ -504,18 +561,9 @@ class Obstacle:
         return is_inside(self.points[0], board)
 
 
-def obstacles(file):
-    """Returns the obstacles of a scene, the boundary last."""
-    stage, placement = file.get("stage", {}), file.get("placement", {})
-    origin = [arb(float(c)) for c in placement.get("origin", [0.0, 0.0])]
-    turn = -2 * PI * arb(float(placement.get("rotation_turns", 0.0)))
-    mirror = -1 if placement.get("mirror", False) else 1
-
-    def own(point):
-        x, y = (arb(float(point[k])) - origin[k] for k in (0, 1))
-        return x * turn.cos() - y * turn.sin(), (x * turn.sin() + y * turn.cos()) * mirror
-
-    found = []
+def obstacles(stage, placement):
+    """Returns the obstacles of a stage in the path's coordinates, the boundary last."""
+    own, found = placement.own, []
     for shape in stage.get("obstacles", []):
         keep_out = arb(float(shape.get("keep_out", 0.0)))
         if "circle" in shape:
@@ -662,7 +710,7 @@ class Judge:
         )
 
     def path_end(self, result):
-        end = self.scene.length / self.scene.speed
+        end = self.scene.end()
         is_there = end > result["time_lo"] and end < result["time_hi"] or end.overlaps(arb(result["time_lo"]))
         require(is_there, f"the path ends at {float(end.mid())} s")
 
@@ -684,7 +732,7 @@ class Judge:
     def least_clearance(self, claim, near, until, number):
         """Checks that no two boards are nearer than claimed, and that two are as near."""
         scene, lo = self.scene, claim["lo"]
-        time = float((scene.travelled(read_place(near["at"][0])) / scene.speed).mid()) if near else until
+        time = float(scene.time_at(read_place(near["at"][0])).mid()) if near else until
         around = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
         for at in around + [self.random.uniform(0, until) for _ in range(number)] if lo is not None else []:
             try:
@@ -710,14 +758,14 @@ class Judge:
     def check_is_by(self, near, claim):
         """Checks that a near place is not after the time up to which the result holds."""
         if claim["until"] == "time":
-            metres = self.scene.travelled(read_place(near["at"][0]))
-            require(not metres > arb(claim["time_until"]) * self.scene.speed, "the near place is after time_until")
+            time = self.scene.time_at(read_place(near["at"][0]))
+            require(not time > claim["time_until"], "the near place is after time_until")
 
     def obstacle_clearance(self, claim, near, until, number):
         """Checks that no board is nearer to an obstacle than claimed, and that one is as near."""
         scene, lo, hi = self.scene, claim["lo"], claim["hi"]
         shape = scene.obstacles[claim["obstacle"]]
-        time = float((scene.travelled(read_place(near["at"][0])) / scene.speed).mid()) if near else until
+        time = float(scene.time_at(read_place(near["at"][0])).mid()) if near else until
         around = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
         # A board that overlaps the shape has no distance here.
         times = around if lo is not None and shape.distance + lo > 0 else []
@@ -848,6 +896,100 @@ class Judge:
             contained = scene.not_after(lo, place) and scene.not_after(place, hi)
             require(contained, f"handle {handle} is not in its span while the head is at {head[0]}, {float(head[1])}")
         self.counts["spans"] += len(places)
+        apart = line.get("apart")
+        if apart is not None:
+            boards = scene.boards([head, *places])
+            for i, j in pairs(boards, max(apart, 0.0)):
+                if line["links"] == "all" or i < 2:
+                    self.counts["pairs"] += 1
+                    is_apart = clearance(boards[i], boards[j]) > apart
+                    require(is_apart, f"benches {i} and {j} are not {apart} m apart while the head is at {float(head[1])}")
+
+
+class PairJudge:
+    """Checks the claims about two dragons, at times of the show."""
+
+    def __init__(self, scenes, random, counts):
+        self.scenes, self.random, self.counts = scenes, random, counts
+
+    @staticmethod
+    def places(scene, time, handles):
+        """Returns the places of the first handles at a time."""
+        return scene.chain(scene.place(time, stands=True), handles)
+
+    def two(self, benches, time):
+        """Returns a board of each on the stage."""
+        require(all(b < scene.benches for b, scene in zip(benches, self.scenes)), f"there are no benches {benches}")
+        return [s.boards_on_stage(self.places(s, time, b + 2))[b] for b, s in zip(benches, self.scenes)]
+
+    def check_apart(self, time, metres=None):
+        """Checks that no boards of the two touch, or that all are some metres apart."""
+        boards, others = (s.boards_on_stage(self.places(s, time, s.benches + 1)) for s in self.scenes)
+        self.counts["places"] += 1
+        for i, j in pairs_of_two(boards, others, max(metres or 0.0, 0.0)):
+            self.counts["pairs"] += 1
+            if metres is None:
+                is_apart = gap_of_sides(boards[i], others[j]) > 0
+            else:
+                is_apart = clearance(boards[i], others[j]) >= metres
+            require(is_apart, f"benches {i} and {j} of two dragons are not {metres or 0} m apart at t = {time} s")
+
+    def at_random(self, number, until, metres=None, around=None):
+        """Checks it at random times, some of them around a time."""
+        times = [self.random.uniform(0, until) for _ in range(number)]
+        if around is not None:
+            times += [min(max(around + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+        for time in times:
+            try:
+                self.check_apart(time, metres)
+            except Undecided:
+                self.counts["undecided"] += 1
+
+    def end(self):
+        return max(float(scene.end().mid()) for scene in self.scenes)
+
+    def contact(self, result, number):
+        if result["status"] == "proved":
+            lo, hi, benches = result["time_lo"], result["time_hi"], [result["bench_a"], result["bench_b"]]
+            require(lo <= hi, "the times are not in order")
+            if lo > 0:
+                self.check_apart(lo)
+            require(overlap(*self.two(benches, hi)), f"benches {benches} of two dragons do not overlap at t = {hi} s")
+            self.counts["events"] += 1
+        until = self.end() if result["status"] == "none" and "time_lo" not in result else result.get("time_lo") or 0.0
+        if until > 0:
+            self.at_random(number, until)
+
+    def least_clearance(self, claim, near, meeting, number):
+        """Checks that no boards of the two are nearer than claimed, and that two are as near."""
+        lo, hi, benches = claim["lo"], claim["hi"], [claim["bench_a"], claim["bench_b"]]
+        until = claim["time_until"] if claim["until"] == "time" else self.end()
+        if claim["until"] == "contact":
+            until = meeting["time"]
+            require(meeting["benches"] == benches and overlap(*self.two(benches, until)), "no contact of two dragons")
+        elif hi is not None:
+            require(near is not None and near["benches"] == benches, "the benches of the near time are others")
+            require(near["time"] <= until, "the near time is after time_until")
+            nearest = clearance(*self.two(benches, near["time"]))
+            require(nearest <= min(hi, near["most"]), f"benches {benches} of two dragons are {float(nearest)} m apart")
+            require(lo is None or nearest >= lo, f"benches {benches} of two dragons are nearer than {lo} m")
+        if lo is not None:
+            self.at_random(number, until * (1 - 1e-9), lo, near and near["time"])
+        self.counts["clearances"] += 1
+
+    def span(self, line):
+        """Checks that the spans of a line `both` contain the chains at a random time, and how far boards are apart."""
+        time = self.random.uniform(line["from"], line["to"])
+        try:
+            for scene, head, spans in zip(self.scenes, line["heads"], line["spans"]):
+                places = self.places(scene, time, len(spans) + 1)
+                for handle, (place, (lo, hi)) in enumerate(zip(places, [head, *spans])):
+                    contained = scene.not_after(read_place(lo), place) and scene.not_after(place, read_place(hi))
+                    require(contained, f"handle {handle} of one of two dragons is not in its span at t = {time} s")
+                self.counts["spans"] += len(places)
+            self.check_apart(time, line.get("apart"))
+        except Undecided:
+            self.counts["undecided"] += 1
 
 
 def read_place(place):
@@ -859,40 +1001,83 @@ def judged(lines, places, seed):
     first = json.loads(lines[0])
     require(first.get("type") == "certificate" and first.get("format") == 2, "no certificate of format 2")
     about = first.get("about", "events")
-    judge = Judge(Scene(first["scene"]), seed)
+    file = tomllib.loads(first["scene"])
     lines = [json.loads(text) for text in lines[1:]]
+    if "dragons" in file:
+        return judged_several(file, about, lines, places, seed)
+    judge = Judge(Scene(file), seed)
+    judged_one(judge, about, lines, places)
+    return judge.counts
+
+
+def judged_several(file, about, lines, places, seed):
+    """Judges the section of each dragon and of each two."""
+    scenes = [Scene({"stage": file.get("stage", {}), **dragon}) for dragon in file["dragons"]]
+    require(about in LINES_OF_TWO, f"nothing is known of the {about} of several dragons")
+    sections = []
+    for line in lines:
+        if line["type"] in ("dragon", "pair"):
+            sections.append((line.get("dragons", [line.get("dragon")]), []))
+        else:
+            require(sections, f"a {line['type']} before the first section")
+            sections[-1][1].append(line)
+    alone, two = [[k] for k in range(len(scenes))], [list(of) for of in combinations(range(len(scenes)), 2)]
+    require([of for of, _ in sections] == alone + two, "the sections are not of each dragon and each two")
+    judge = Judge(scenes[0], seed)
+    for of, section in sections:
+        results = [line for line in section if line["type"] not in ("pair", "meeting") and "dragons" in line]
+        require(results and all(line["dragons"] == of for line in results), f"a result of {of} is of others")
+        if len(of) == 1:
+            judge.scene = scenes[of[0]]
+            judged_one(judge, about, section, places)
+            continue
+        require(all(line["type"] in LINES_OF_TWO[about] for line in section), f"an unknown line about {of}")
+        require(len(results) == 1 and section[-1] is results[0], f"the result of {of} is not the last line")
+        pair = PairJudge([scenes[k] for k in of], judge.random, judge.counts)
+        found = {line["type"]: line for line in section}
+        if about == "events":
+            require(results[0]["event"] == "contact", f"a {results[0]['event']} of two dragons")
+            pair.contact(results[0], places)
+        else:
+            pair.least_clearance(results[0], found.get("near_both"), found.get("meeting"), places)
+        both = [line for line in section if line["type"] == "both"]
+        for line in judge.random.sample(both, min(places, len(both))):
+            pair.span(line)
+    return judge.counts
+
+
+def judged_one(judge, about, lines, places):
     for number, line in enumerate(lines, 2):
         require(line["type"] in LINES[about], f"line {number} is a {line['type']}, of which nothing is known here")
     if about == "events":
         judged_events(judge, lines, places)
-        return judge.counts
+        return
     beside = [line for line in lines if line["type"] == "obstacle_clearance"]
     require(len(beside) == (len(judge.scene.obstacles) if about == "least_clearance" else 0), "a result is missing")
     claim = lines[-1 - len(beside)]
     require(claim["type"] == about, f"the last line is a {claim['type']}")
     if about == "least_pitch":
         judge.least_pitch(claim, lines, places)
-        return judge.counts
+        return
     found = {line["type"]: line for line in lines}
     if about == "greatest_speed":
         judge.greatest_speed(claim, found.get("fast"), places)
     else:
         scene = judge.scene
-        until = claim["time_until"] if claim["until"] == "time" else float((scene.length / scene.speed).mid())
+        until = claim["time_until"] if claim["until"] == "time" else float(scene.end().mid())
         if claim["until"] == "contact":
             until, (i, j) = found["contact"]["to"], found["contact"]["benches"]
             boards = scene.boards(scene.chain(read_place(until), j + 2))
             require((i, j) == (claim["bench_a"], claim["bench_b"]) and overlap(boards[i], boards[j]), "no contact")
-            until = float((scene.travelled(read_place(until)) / scene.speed).mid())
+            until = float(scene.time_at(read_place(until)).mid())
         judge.least_clearance(claim, found.get("near"), until * (1 - 1e-9), places)
         near = {line["obstacle"]: line for line in lines if line["type"] == "near_obstacle"}
         for result in beside:
-            until = result["time_until"] if result["until"] == "time" else float((scene.length / scene.speed).mid())
+            until = result["time_until"] if result["until"] == "time" else float(scene.end().mid())
             judge.obstacle_clearance(result, near.get(result["obstacle"]), until * (1 - 1e-9), places)
     steps = [line for line in lines if line["type"] in ("step", "speeds")]
     for line in judge.random.sample(steps, min(places, len(steps))):
         judge.span(line)
-    return judge.counts
 
 
 def judged_events(judge, lines, places):
@@ -903,7 +1088,7 @@ def judged_events(judge, lines, places):
     require(kinds == expected, f"results about {kinds}, expected {expected}")
     of = dict(zip(kinds, results))
     scene = judge.scene
-    until = float((scene.length / scene.speed).mid()) * (1 - 1e-12)
+    until = float(scene.end().mid()) * (1 - 1e-12)
     if of["lock"]["status"] == "proved":
         until = min(until, of["lock"]["time_lo"])
     ends = {}

@@ -8,11 +8,13 @@ Places are those of `solve`; distances between boards are computed here, by shap
 import csv
 import re
 import subprocess
+import tempfile
 
 import numpy
 import shapely
 
-from stage_labels import SIZES, distances, points_of, steady
+from chromium import at_rest
+from stage_labels import SIZES, distances, points_of
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, PROGRAM, WIDTH, browser, canvas_pixels, drawn, is_board, play, server, started, until, words
 from stage_show import projection, risen, shot
 from stage_transport import command
@@ -85,17 +87,64 @@ def one_page_of_two():
         assert numpy.hypot(*(dragons[1][59] - [x, y])) < 2e-3, (x, y)
         labels = set(page.evaluate("picture.labels.map((one) => one.text)"))
         assert {"HEAD of gold", "HEAD of jade", "TAIL of gold", "bench 60 of jade"} <= labels, labels
-        # The line between the nearest two boards, of two dragons, while the show stands.
+        # The line between the nearest two boards, of two dragons.
         metres, _ = nearest(dragons)
-        assert f"{metres:.3f}\u00a0m" in labels, f"{metres} is not in {labels}"
+        assert f"gold and jade: {metres:.3f}\u00a0m" in labels, f"{metres} is not in {labels}"
         assert abs(float(page.inner_text("#metres").split()[0]) - metres) < 6e-4, page.inner_text("#metres")
         approach(page)
         assert not complaints, complaints
 
 
-def boards_are_drawn(page, dragons):
+def two_are_drawn_apart():
+    """Two dragons of one path, one of them moved, turned round and mirrored: each is where its placement says, and no
+    board is drawn elsewhere."""
+    dragon = """
+[[dragons]]
+name = "{name}"
+placement = {{ origin = [{x}, {y}], rotation_turns = {turns}, mirror = {mirror} }}
+[dragons.team]
+benches = 40
+head_length = 3.41
+body_length = 2.2
+width = 0.3
+hole_inset = 0.275
+[dragons.path]
+kind = "spiral"
+pitch = 0.55
+start_turn = 10
+[dragons.motion]
+head_speed = 1.0
+"""
+    text = "[alerts]\n" + dragon.format(name="gold", x=0.0, y=0.0, turns=0.0, mirror="false") + dragon.format(name="jade", x=15.0, y=-3.0, turns=0.3, mirror="true")
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", suffix=".toml") as scene:
+        scene.write(text)
+        scene.flush()
+        printed = subprocess.run([PROGRAM, "--scene", scene.name, "solve", "--at", "20"], capture_output=True, text=True, check=True).stdout
+        rows = numpy.array([[float(row["x"]), float(row["y"])] for row in csv.DictReader(printed.splitlines())])
+        gold, jade = rows[:41], rows[41:]
+        # The placement by hand: mirrored, then turned, then moved.
+        c, s = numpy.cos(0.6 * numpy.pi), numpy.sin(0.6 * numpy.pi)
+        placed = (gold * [1, -1]) @ numpy.array([[c, s], [-s, c]]) + [15, -3]
+        assert numpy.abs(placed - jade).max() < 1e-9, numpy.abs(placed - jade).max()
+        with server() as url, started("--scene", scene.name, "run", "--quiet", "--json", "--start", "20", "--paused"), browser(viewport={"width": 1600, "height": 900}) as (page, complaints):
+            page.goto(f"{url}#nolabels")
+            both_drawn(page)
+            boards_are_drawn(page, [gold, placed], benches=40)
+            pixels, to_pixel, scale = canvas_pixels(page)
+            # Nothing that is a board lies between the two: away from all boards there are only ground and paths.
+            both = shapely.union_all([board(handles, bench) for handles in (gold, placed) for bench in range(40)]).buffer(0.3)
+            aisle = [(x, y) for x in numpy.linspace(-7, 22, 150) for y in numpy.linspace(-9, 6, 80) if not both.contains(shapely.Point(x, y))]
+            at = to_pixel(numpy.array(aisle))
+            inside = (at[:, 0] > 0) & (at[:, 1] > 0) & (at[:, 0] < pixels.shape[1]) & (at[:, 1] < pixels.shape[0])
+            strays = is_board(pixels[at[inside, 1], at[inside, 0]])
+            # The line between the nearest two boards and the scale are dark too.
+            assert strays.mean() < 0.01, f"boards are drawn at {100 * strays.mean():.1f} % of the free places"
+            assert not complaints, complaints
+
+
+def boards_are_drawn(page, dragons, benches=HANDLES - 1):
     # The camera eases to its frame; a show that stands has the same picture from then on.
-    until(page, "(now => { const same = window.before === now; window.before = now; return same; })(picture.toPixel(1, 1).join())", "a camera at rest")
+    at_rest(page)
     pixels, to_pixel, _ = canvas_pixels(page)
     for name, handles in zip(NAMES, dragons):
         middles = to_pixel((handles[:-1] + handles[1:]) / 2)
@@ -103,7 +152,7 @@ def boards_are_drawn(page, dragons):
         assert not missing, f"{name}: no board is drawn where benches {missing} (from 0) are"
     # Nothing joins the tail of gold and the head of jade, whose handles follow each other.
     between = to_pixel(numpy.array([dragons[0][-1] + share * (dragons[1][0] - dragons[0][-1]) for share in numpy.linspace(0.02, 0.98, 200)]))
-    both = shapely.union_all([board(handles, bench) for handles in dragons for bench in range(HANDLES - 1)]).buffer(0.3)
+    both = shapely.union_all([board(handles, bench) for handles in dragons for bench in range(benches)]).buffer(0.3)
     free = [place for place, share in zip(between, numpy.linspace(0.02, 0.98, 200)) if not both.contains(shapely.Point(dragons[0][-1] + share * (dragons[1][0] - dragons[0][-1])))]
     assert len(free) > 50 and not any(is_board(pixels[y, x]) for x, y in free), "a board between two dragons"
 
@@ -153,7 +202,8 @@ def labels_of_two_point_at_their_boards():
                 command("seek", moment)
                 until(page, f"Math.abs(picture.time - {moment}) < 0.01 && picture.shown && Math.abs(picture.shown.time - {moment}) < 0.01", f"the picture of {moment} s")
                 page.keyboard.press("0")
-                found = steady(page, labels_of_two)
+                at_rest(page)
+                found = labels_of_two(page)
                 assert len(found) >= 2, f"{width} x {height} at {moment} s: {found}"
                 for label, near in found:
                     own = (label["dragon"], label["bench"])
@@ -221,4 +271,4 @@ def each_has_its_light():
 
 
 if __name__ == "__main__":
-    play(one_page_of_two, labels_of_two_point_at_their_boards, each_has_its_light)
+    play(one_page_of_two, two_are_drawn_apart, labels_of_two_point_at_their_boards, each_has_its_light)

@@ -8,6 +8,7 @@ import time
 
 import numpy
 
+from chromium import at_rest
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, WIDTH, browser, drawn, play, publisher, server, until
 from stage_show import shot
 from stage_transport import command
@@ -77,7 +78,8 @@ def labels_point_at_their_boards():
                 until(page, f"Math.abs(picture.time - {moment}) < 0.01 && picture.shown && Math.abs(picture.shown.time - {moment}) < 0.01", f"the picture of {moment} s")
                 # The camera frames all boards at once, and does not ease for seconds.
                 page.keyboard.press("0")
-                found = steady(page)
+                at_rest(page)
+                found = labels_of(page)
                 assert not wrong(found), f"{width} x {height} at {moment} s: {wrong(found)}"
                 assert len(found) >= 2, f"{width} x {height} at {moment} s: {found}"
                 count += len(found)
@@ -87,16 +89,6 @@ def labels_point_at_their_boards():
         print(f"{count} labels, {bare} without a line; the ends of lines are {numpy.mean(lines):.0f} px from the words on average, at most {max(lines):.0f}")
         assert count >= 150, f"only {count} labels were measured"
         assert not complaints, complaints
-
-
-def steady(page, labels=None):
-    """Returns the labels, as `labels` finds them, once the camera and the words stand still."""
-    deadline, before = time.monotonic() + 20, None
-    while (now := page.evaluate(LABELS)) != before:
-        assert time.monotonic() < deadline, "the words do not come to rest"
-        before = now
-        time.sleep(0.3)
-    return (labels or labels_of)(page)
 
 
 def lines_are_drawn(page, found):

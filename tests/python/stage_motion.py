@@ -36,7 +36,7 @@ def motion_is_smooth_at_any_rate():
         with publisher("--start", "100", "--rate", "1000"):
             drawn(page)
             first = page.evaluate(counts)
-            time.sleep(3)
+            until(page, f"picture.sequence >= {first[2]} + 1000 && picture.drawn > {first[1]}", "a thousand frames")
             received, pictures, published = (now - then for now, then in zip(page.evaluate(counts), first))
             assert 0 < received < published / 4, f"{received} of {published} frames: a page needs fewer"
             assert pictures > 0
@@ -61,7 +61,7 @@ def between_frames_is_where_the_solver_has_it():
     with server() as url, publisher("--rate", "10"), browser() as (page, complaints):
         page.goto(url)
         drawn(page)
-        time.sleep(1)
+        until(page, "picture.received >= 5", "frames to draw between")
         samples = []
         while len(samples) < 40:
             time.sleep(random.uniform(0.02, 0.15))

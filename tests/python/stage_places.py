@@ -11,13 +11,12 @@ import pathlib
 import re
 import tempfile
 import threading
-import time
 
 import numpy
 
 import chromium
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, browser, drawn, opened, play, publisher, server, started, until, words
-from stage_show import at, luminance, projection, shot, spread
+from stage_show import at, luminance, projection, risen, shot, spread
 
 # Before the contact, at a hundredth of the speed: little changes during the test.
 APPROACH = ["--start", "410", "--time-scale", "0.01"]
@@ -35,7 +34,7 @@ CUT = """() => {
 def approaching(page, url, address=""):
     page.goto("about:blank")
     page.goto(f"{url}#{address}")
-    until(page, "picture.drawn > 0 && document.body.dataset.level === 'approaching' && document.getElementById('time').textContent", "the approach", 60)
+    until(page, "picture.drawn > 0 && document.body.dataset.level === 'approaching' && document.getElementById('time').textContent", "the approach")
 
 
 def undimmed(page):
@@ -61,7 +60,7 @@ def nothing_needed_is_cut_off():
         page.set_viewport_size({"width": 1000, "height": 600})
         page.goto(another_page(f'<iframe src="{url}#dark" width="900" height="500" style="border: 0"></iframe>'))
         inner = page.frames[1]
-        until(inner, "window.picture?.drawn > 0 && document.body.dataset.level === 'approaching'", "the picture in a frame", 60)
+        until(inner, "window.picture?.drawn > 0 && document.body.dataset.level === 'approaching'", "the picture in a frame")
         until(inner, f"!({CUT})().length", "in a frame something is cut off", 5)
         assert not complaints, complaints
 
@@ -127,7 +126,7 @@ def frozen_before_it_was_seen():
     with server() as url, publisher("--start", "412.5"), browser(viewport={"width": 1280, "height": 800}) as (page, complaints):
         until_frozen = "picture.drawn > 0 && document.body.dataset.level === 'contact' && document.getElementById('speeds').textContent === 'at rest'"
         page.goto(url)
-        until(page, until_frozen, "the contact", 60)
+        until(page, until_frozen, "the contact")
         undimmed(page)
         until(page, "document.getElementById('scale').innerText.replaceAll(/\\s+/g, ' ').trim() === 'tail body head'", "words for the colours")
         pixels, to_pixel = shot(page)[..., :3].astype(int), projection(page)
@@ -173,8 +172,7 @@ def five_thousand_boards_are_drawn():
             page.goto(f"{url}#{address}")
             undimmed(page)
             if address:
-                until(page, "picture.life === 1", "lanterns that are all lit", 60)
-                time.sleep(0.5)
+                risen(page)
             pixels, to_pixel = shot(page), projection(page)
             ground = luminance(pixels[3, -3])
             # A quarter of a link from the handles, away from the lanterns. A turn is some five pixels wide: the

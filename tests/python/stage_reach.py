@@ -58,7 +58,7 @@ def a_head_that_moves_outward_has_room():
                 page.goto("about:blank")
                 page.goto(url)
                 drawn(page)
-                until(page, f"{ahead} >= 3", f"3 m ahead of the head at {rate} times the speed", 60)
+                until(page, f"{ahead} >= 3", f"3 m ahead of the head at {rate} times the speed")
                 page.evaluate(f"(() => {{ window.rooms = []; const look = () => {{ const room = {ahead}; if (room !== null) rooms.push(room); if (rooms.length < 120) requestAnimationFrame(look); }}; look(); }})()")
                 until(page, "rooms.length === 120", "a hundred pictures", 90)
                 assert page.evaluate("Math.min(...rooms)") > 0, "the head is outside of the picture"
@@ -121,16 +121,18 @@ def everybody_is_told():
         }""")
         assert ratios == [2, 2, 2560 / 1920, 2], ratios
         # Flames rest a minute after a pause: then nothing changes, and nothing is drawn.
-        phases = page.evaluate("""async () => {
+        phases, trail = page.evaluate("""async () => {
             const { Show } = await import("/show.js"), show = new Show(false), pose = new Float64Array(10), phases = [];
             for (const now of [1000, 30000, 30500, 70000, 70500, 700000]) {
                 show.breathe(now, false);
                 show.update({ time: 5, places: pose, stands: now > 1000, jumped: false, coming: { benches: [], seconds: NaN }, happened: null });
                 phases.push(show.phase);
             }
-            return phases;
+            return [phases, show.trail.length];
         }""")
         assert phases[1] != phases[2] and phases[3] == phases[4] == phases[5], phases
+        # The light behind the tail does not pile up meanwhile.
+        assert trail == 1, trail
         assert not complaints, complaints
 
 
@@ -249,15 +251,15 @@ def the_chase_stands_in_the_header():
         sending.start()
         try:
             with started("chase", "artnet", "--listen", f"127.0.0.1:{port}", "--offset", "01:00:00:00") as chase:
-                until(page, r"/ArtTimeCode 01:00:\d\d:\d\d locked, -?\d+(\.\d)? ms/.test(document.getElementById('chase').textContent)", "a locked chase", 60)
+                until(page, r"/ArtTimeCode 01:00:\d\d:\d\d locked, -?\d+(\.\d)? ms/.test(document.getElementById('chase').textContent)", "a locked chase")
                 assert page.is_visible("#chase")
                 until(page, "heard.some((one) => one.includes('locked'))", "the lock, spoken")
                 chase.kill()
-                until(page, "document.getElementById('chase').textContent.includes('has died')", "its death", 60)
+                until(page, "document.getElementById('chase').textContent.includes('has died')", "its death")
             with started("chase", "artnet", "--listen", f"127.0.0.1:{port}", "--offset", "01:00:00:00") as chase:
-                until(page, "document.getElementById('chase').textContent.startsWith('ArtTimeCode')", "the next chase", 60)
+                until(page, "document.getElementById('chase').textContent.startsWith('ArtTimeCode')", "the next chase")
                 chase.terminate()
-                until(page, "!document.getElementById('chase').checkVisibility()", "no line after its end", 60)
+                until(page, "!document.getElementById('chase').checkVisibility()", "no line after its end")
         finally:
             stop.set()
             sending.join()

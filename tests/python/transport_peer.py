@@ -118,11 +118,13 @@ def main():
     print(json.dumps({"type": "ready"}), flush=True)
     end = time.monotonic() + arguments.seconds
     awaited = set(arguments.until)
-    over = False
-    while not over:
+    gone = taken = False
+    # A slow machine can leave more messages than one reading takes.
+    while time.monotonic() < end and (taken or not gone):
         # Tested before the remaining messages are read.
-        over = time.monotonic() >= end or (bool(told) and peer.publishers() == 0)
+        gone, taken = bool(told) and peer.publishers() == 0, False
         for kind, message, handles, count in peer.take():
+            taken = True
             line = {"type": kind} | {field: getattr(message, field) for field in FIELDS[kind]}
             if kind == "stage":
                 dragon = message.dragons[0]

@@ -20,7 +20,7 @@ import threading
 import time
 
 # No wait here may last forever; an alarm still ends everything that was started.
-WATCHDOG = 200
+WATCHDOG = 550
 LEFT, RIGHT = "\x1b[D", "\x1b[C"
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
@@ -44,7 +44,7 @@ def state():
     return json.loads(asked.stdout) if asked.returncode == 0 else None
 
 
-def until(condition, what, seconds=60):
+def until(condition, what, seconds=120):
     deadline = time.monotonic() + seconds
     while not (value := condition()):
         assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
@@ -120,7 +120,8 @@ def keys_conduct():
         watch.press(" ")
         before = until(lambda: state() if state()["playback"] == "paused" else None, "space pauses")
         watch.press(RIGHT * 3 + LEFT)
-        until(lambda: abs(state()["sim_time"] - before["sim_time"] - 10) < 1e-9, "right three times and left once are 10 s")
+        moved = lambda: abs(state()["sim_time"] - before["sim_time"] - 10) < 1e-9
+        until(moved, "right three times and left once are 10 s")
         watch.press("..")
         # Two periods of 1/50 s at a rate of 0.5.
         until(lambda: abs(state()["sim_time"] - before["sim_time"] - 10.02) < 1e-9, "two steps")
@@ -181,7 +182,8 @@ def terminal_is_restored():
         # In a pipe: the terminal stays as it is, and its keys are not read.
         master, slave = os.openpty()
         before = termios.tcgetattr(slave)
-        piped = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdin=slave, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        command = [PROGRAM, "--name", NAME, *arguments]
+        piped = subprocess.Popen(command, stdin=slave, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         os.write(master, b"q")
         assert piped.stdout.readline(), "a report"
         assert piped.poll() is None and termios.tcgetattr(slave) == before, arguments

@@ -2,6 +2,8 @@
 //! (`tests/fastdds/peer.cpp`), built at the first use.
 #![cfg(feature = "ros2")]
 
+mod streams;
+
 use crate::harness;
 
 use std::path::{Path, PathBuf};
@@ -10,7 +12,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bench_dragon::soak::resources::child_of;
-use harness::{Process, can_run, json_lines, long, program, scene_file, summary, text, unique, wait_until};
+use harness::{Process, can_run, json_lines, long, program, scene_file, stopped, text, unique, wait_until};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
@@ -40,17 +42,27 @@ fn peer(arguments: &[&str]) -> Command {
     command
 }
 
-/// Returns a subscriber of a topic of our own messages.
+/// Returns a subscriber of a topic.
 fn subscriber(name: &str, topic: &str, arguments: &[&str]) -> Command {
-    let kind = match topic {
-        "alerts" => "bench_dragon_msgs::msg::dds_::CollisionAlert_",
-        "cues" => "bench_dragon_msgs::msg::dds_::Cue_",
-        "handles" => "bench_dragon_msgs::msg::dds_::HandlePoses_",
-        "path" => "nav_msgs::msg::dds_::Path_",
-        "stage" => "bench_dragon_msgs::msg::dds_::Stage_",
+    let (package, kind) = match topic {
+        "alerts" => ("bench_dragon_msgs", "CollisionAlert"),
+        "clock" => ("rosgraph_msgs", "Clock"),
+        "cues" => ("bench_dragon_msgs", "Cue"),
+        "diagnostics" => ("diagnostic_msgs", "DiagnosticArray"),
+        "handles" => ("bench_dragon_msgs", "HandlePoses"),
+        "markers" => ("visualization_msgs", "MarkerArray"),
+        "path" => ("nav_msgs", "Path"),
+        "poses" => ("geometry_msgs", "PoseArray"),
+        "stage" => ("bench_dragon_msgs", "Stage"),
+        "status" => ("bench_dragon_msgs", "LoopStatus"),
+        "tf" => ("tf2_msgs", "TFMessage"),
         _ => panic!("no type of {topic}"),
     };
-    peer(&[&["subscribe", &format!("{}/{topic}", unique(name)), kind], arguments].concat())
+    let path = match topic {
+        "clock" | "diagnostics" | "tf" => topic.to_owned(),
+        _ => format!("{}/{topic}", unique(name)),
+    };
+    peer(&[&["subscribe", &path, &format!("{package}::msg::dds_::{kind}_")], arguments].concat())
 }
 
 /// Returns a ROS 2 domain that the tests of the services do not use. Ports of domains above 101 are those that Linux
@@ -67,11 +79,6 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
         program(name).args(["control", "state"]).output().is_ok_and(|output| output.status.success())
     });
     process
-}
-
-fn ended(publisher: Process) -> Value {
-    publisher.signal(Signal::SIGINT);
-    summary(&publisher.output_within(60))
 }
 
 /// A Fast DDS client sends its first request before RustDDS knows it, in half of all cases. Fast DDS repeats the request
@@ -99,7 +106,7 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
     while answers.len() < 100 && undiscovered < 10 {
         let side_by_side: Vec<Process> = (0..4.min(100 - answers.len())).map(|_| client()).collect();
         for process in side_by_side {
-            let output = process.output_within(200);
+            let output = process.output();
             let errors = text(&output.stderr);
             // Beside many other participants, discovery at times takes Fast DDS more than a minute, on its own or on our
             // side. Such a client has made no call; another one takes its place.
@@ -116,7 +123,7 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
     println!("{} of {} within 0.1 s, {} within 0.5 s", within(0.1), answers.len(), within(0.5));
     assert_eq!(answers.len(), 100);
     assert!(answers.iter().all(|line| line["response"] == rate_of_one), "{answers:?}");
-    ended(publisher);
+    stopped(publisher);
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -155,28 +162,31 @@ fn stage_path_and_each_cue_come_exactly_once_to_each_subscriber() {
     };
     let constant = ["stage", "path"].map(|topic| start(topic, "1"));
     let first = start("cues", "3");
-    first.1.until("made", 60);
-    constant.iter().for_each(|(_, lines)| drop(lines.until("sample", 60)));
+    first.1.until("made");
+    constant.iter().for_each(|(_, lines)| drop(lines.until("sample")));
     let late = ["stage", "path"].map(|topic| start(topic, "1"));
     for (_, lines) in constant.into_iter().chain(late) {
-        let rest = lines.until("end", 60);
+        let rest = lines.until("end");
         let end: Value = serde_json::from_str(&rest).unwrap();
         assert_eq!(end["samples"], 1, "{end}");
     }
     // The subscriber of cues is matched by now: no cue has passed.
     let go = program(name).args(["control", "go"]).output().unwrap();
     assert!(go.status.success(), "{}", text(&go.stderr));
-    let numbers = |printed: Vec<String>| -> Vec<u64> {
+    // A late frame can pass two cues, which then have the same stamp: their names tell them apart.
+    let names = |printed: Vec<String>| -> Vec<Option<usize>> {
         let samples = printed.iter().map(|line| serde_json::from_str::<Value>(line).unwrap());
-        samples.filter(|line| line["type"] == "sample").map(|sample| stamp(&sample)).collect()
+        let name = |sample: Value| {
+            let hex = sample["hex"].as_str().unwrap().to_owned();
+            (1..=3).find(|number| hex.contains(&format!("637565203{number}")))
+        };
+        samples.filter(|line| line["type"] == "sample").map(name).collect()
     };
-    let stamps = numbers(first.1.rest(120));
-    assert_eq!(stamps.len(), 3, "{stamps:?}");
-    assert!(stamps.is_sorted_by(|a, b| a < b), "{stamps:?}");
+    assert_eq!(names(first.1.rest()), [1, 2, 3].map(Some));
     // The latest cue, alone: the first subscriber has left.
     let late = start("cues", "1");
-    assert_eq!(numbers(late.1.rest(120)), stamps[2..]);
-    ended(publisher);
+    assert_eq!(names(late.1.rest()), [Some(3)]);
+    stopped(publisher);
 }
 
 /// Returns for subscribers, one after the other, the time of creation and the stamps of their alerts. Each is a process:
@@ -185,7 +195,7 @@ fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
     let arguments = [&["--samples", "1", "--linger", "0.15", "--seconds", "60"], further].concat();
     let join = |_| {
         let mut process = Process::start(&mut subscriber(name, "alerts", &arguments));
-        let lines = process.lines().rest(120);
+        let lines = process.lines().rest();
         let lines: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
         let alerts: Vec<u64> = lines.iter().filter(|line| line["type"] == "sample").map(stamp).collect();
         assert!(!alerts.is_empty(), "no alert within 60 s: {lines:?}");
@@ -210,7 +220,7 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     let mut published: Vec<u64> = Vec::new();
     let mut publish_until = |instant: u64| {
         while published.last().is_none_or(|stamp| *stamp < instant) {
-            let alert: Value = serde_json::from_str(&printed.until("\"type\":\"alert\"", 60)).unwrap();
+            let alert: Value = serde_json::from_str(&printed.until("\"type\":\"alert\"")).unwrap();
             published.push(alert["stamp_ns"].as_str().unwrap().parse().unwrap());
         }
         published.clone()
@@ -237,7 +247,7 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     // machine is too late.
     let mut stays = Process::start(&mut subscriber(name, "alerts", &["--transient-local", "--seconds", "900"]));
     let received = stays.lines();
-    (0..4).for_each(|_| drop(received.until("sample", 60)));
+    (0..4).for_each(|_| drop(received.until("sample")));
     for further in [&[][..], &kept] {
         let before = |(made, alerts): &(u64, Vec<u64>)| alerts.iter().filter(|alert| **alert < *made).count();
         let counts: Vec<usize> = joined(name, joins, further).iter().map(before).collect();
@@ -245,7 +255,7 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
         assert!(with_old <= joins as usize / 3, "alerts of before each: {counts:?}");
     }
     drop(watch);
-    ended(publisher);
+    stopped(publisher);
 }
 
 /// The publisher counts a killed subscriber for its lease, here a day, and RustDDS then refuses to write more than the
@@ -266,14 +276,14 @@ fn a_killed_subscriber_stops_no_other() {
     let scene = scene.to_str().unwrap();
     let publisher = publisher(name, &["--scene", scene, "run", "--json", "--duration", "600"]);
     let mut killed = Process::start(&mut subscriber(name, "handles", &["--seconds", "600", "--lease", "86400"]));
-    killed.lines().until("sample", 120);
+    killed.lines().until("sample");
     killed.signal(Signal::SIGKILL);
     let mut other =
         Process::start(&mut subscriber(name, "handles", &["--seconds", "180", "--linger", "0", "--samples", "500"]));
-    let printed = other.lines().rest(240);
+    let printed = other.lines().rest();
     let end: Value = serde_json::from_str(printed.last().unwrap()).unwrap();
     assert!(end["samples"].as_u64() >= Some(500), "{end}");
-    ended(publisher);
+    stopped(publisher);
 }
 
 /// Returns the resident memory of a process, in MB.
@@ -306,13 +316,13 @@ fn visit(name: &str, index: usize) -> Visit {
     let arguments = arguments.iter().copied().filter(|argument| !argument.is_empty()).collect::<Vec<_>>();
     let mut process = Process::start(&mut subscriber(name, topic, &arguments));
     let printed = process.lines();
-    let first = printed.all_until_one(|line| line.contains("sample") || line.contains("end"), "sample or end", 120);
+    let first = printed.all_until_one(|line| line.contains("sample") || line.contains("end"), "sample or end");
     let mut lines: Vec<Value> = first.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
     if index / 4 % 2 == 1 && lines.iter().any(|line| line["type"] == "sample") {
         process.signal(Signal::SIGKILL);
         return Visit::Served;
     }
-    lines.extend(printed.rest(120).iter().map(|line| serde_json::from_str::<Value>(line).unwrap()));
+    lines.extend(printed.rest().iter().map(|line| serde_json::from_str::<Value>(line).unwrap()));
     // None if it ended in another way: Fast DDS dies at times when a participant leaves.
     let end = lines.iter().find(|line| line["type"] == "end");
     if end.is_some_and(|end| end["samples"] == 0 && end["writers"] == 0) {
@@ -323,10 +333,10 @@ fn visit(name: &str, index: usize) -> Visit {
     Visit::Served
 }
 
-/// Half of the subscribers are killed, the others leave. A subscriber that spins, as one of Fast DDS does that is sent an
-/// empty change, would never end.
+/// Half of the subscribers are killed, the others leave. A subscriber that spins would never end, as one of Fast DDS does
+/// that is sent an empty change. `BENCH_DRAGON_SUBSCRIBERS` is their number, 4,000 by default; 200,000 take a night.
 #[test]
-fn subscribers_that_come_and_go_cost_no_memory_and_none_is_left_without_messages() {
+fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_messages() {
     // Beside many other processes a subscriber may discover the publisher later than within its minute.
     if !long() || !can_run(peer_program().map(drop)) {
         return;
@@ -334,7 +344,8 @@ fn subscribers_that_come_and_go_cost_no_memory_and_none_is_left_without_messages
     let name = "come_and_go";
     let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "300", "--loop", "--duration", "100000"]);
     let process = child_of(publisher.id()).unwrap();
-    let (rounds, beside) = (250, 4);
+    let subscribers = std::env::var("BENCH_DRAGON_SUBSCRIBERS").map_or(4000, |number| number.parse().unwrap());
+    let (rounds, beside) = (subscribers / 4, 4);
     let undiscovered = AtomicUsize::new(0);
     let mut memories = Vec::new();
     for round in 0..rounds {
@@ -353,11 +364,13 @@ fn subscribers_that_come_and_go_cost_no_memory_and_none_is_left_without_messages
     let undiscovered = undiscovered.into_inner();
     println!("{} subscribers, {undiscovered} discovered nothing, MB: {memories:.1?}", rounds * beside);
     assert!(undiscovered <= rounds * beside / 4, "{undiscovered} of {}", rounds * beside);
-    // Messages for killed subscribers are kept until their lease ends: a high-water mark within the first rounds.
-    let (first, last) = (memories[rounds / 3], memories[rounds - 1]);
-    assert!(last < first + 10.0, "{memories:.1?}");
+    // A killed subscriber that has acknowledged nothing keeps all messages until its lease ends. Where one follows the
+    // other, a topic reaches its 64 MB. RustDDS lists the earlier messages for each new subscriber: up to 1.3 MB, until
+    // the lease of a killed one ends, for some 25 at a time.
+    let highest = memories[..rounds / 2].iter().copied().fold(0.0, f64::max);
+    assert!(memories[rounds - 1] < highest + 32.0, "{memories:.1?}");
     // The same process still serves, and ends.
     assert_eq!(child_of(publisher.id()), Some(process));
     assert!(visit(name, 0) == Visit::Served || visit(name, 0) == Visit::Served);
-    ended(publisher);
+    stopped(publisher);
 }

@@ -30,7 +30,7 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     }
     // A running process must end before the test can read its output.
     process.signal(nix::sys::signal::Signal::SIGINT);
-    panic!("no publisher: {}", text(&process.output_within(20).stderr));
+    panic!("no publisher: {}", text(&process.output().stderr));
 }
 
 /// Returns exit code and response of `control`, over shared memory.
@@ -48,14 +48,14 @@ fn peer(name: &str, arguments: &[&str]) -> Command {
 
 /// Returns the responses to these calls, one after the other, of one Cyclone client.
 fn call(name: &str, calls: &[&str]) -> Vec<Value> {
-    let output = Process::start(&mut peer(name, calls)).output_within(120);
+    let output = Process::start(&mut peer(name, calls)).output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     json_lines(&output).into_iter().map(|line| line["response"].clone()).collect()
 }
 
 fn ended(publisher: Process) -> (Value, String) {
     publisher.signal(nix::sys::signal::Signal::SIGINT);
-    let output = publisher.output_within(60);
+    let output = publisher.output();
     (summary(&output), text(&output.stderr))
 }
 
@@ -217,7 +217,7 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     let publishers =
         [publisher(without, &["--duration", "300"]), publisher(with, &["--ros2-control", "--duration", "300"])];
     let endpoints = |name: &str, topics: &str| {
-        let output = Process::start(&mut peer(name, &["--seconds", "30", "--topics", topics])).output_within(90);
+        let output = Process::start(&mut peer(name, &["--seconds", "30", "--topics", topics])).output();
         let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
         ["read", "written"].map(|what| found[what].as_object().unwrap().clone())
     };
@@ -283,7 +283,7 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     }
     publishers.into_iter().for_each(|publisher| drop(ended(publisher)));
     // The services require ROS 2.
-    let output = Process::start(program("alone").args(["run", "--ros2-control", "--duration", "1"])).output_within(60);
+    let output = Process::start(program("alone").args(["run", "--ros2-control", "--duration", "1"])).output();
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("--ros2-control"), "{}", text(&output.stderr));
 }
@@ -302,7 +302,7 @@ fn a_flood_of_calls_is_refused_and_others_are_answered() {
         (&others[0]["rate"], &others[1]["state"]["state"], &others[3]["state"]["state"]),
         (&1.0.into(), &1.into(), &2.into())
     );
-    flooded.until("5000", 60);
+    flooded.until("5000");
     flood.signal(nix::sys::signal::Signal::SIGKILL);
     assert_eq!(call(name, &["get_simulation_state"])[0]["state"]["state"], 2);
     let (summary, printed) = ended(publisher);

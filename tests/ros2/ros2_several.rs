@@ -135,7 +135,7 @@ fn watch_to_the_contact(name: &str, topics: &[&str], go: impl FnOnce()) {
     let topic = |name: &str| wanted.iter().find(|wanted| wanted.split(':').next() == Some(name)).unwrap().as_str();
     let until = |lines: &mut Vec<Value>, what: &str, enough: &dyn Fn(&[Value]) -> bool| {
         while !enough(lines) {
-            let line = printed.all_until_one(|_| true, what, 120).pop().unwrap();
+            let line = printed.all_until_one(|_| true, what).pop().unwrap();
             lines.push(serde_json::from_str(&line).unwrap());
         }
     };

@@ -1,24 +1,26 @@
 //! Certified contacts of several dragons: the events of each alone, and then, of each two, stretches of time in which
 //! their boards are apart, up to their first contact. Lemma 12 of `docs/proofs.md`.
 
+mod clearance;
+mod side;
+
 use std::io;
 
-use super::boards::MovingBoard;
-use super::capsule::{Frame, Span, Spanned};
-use super::grid::GridPoint;
+use super::first_order::When;
 use super::interval::Interval;
-use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
-use super::path::ExactPath;
+use super::lines::{CertificateLine, CertifiedEvent, Status, WIDE};
 use super::search::{
-    AROUND, BESIDE, CertificateSearch, GROWTH, LEAST, LEAST_STEP, NEAR, SHRINK, Section, first_line, path_end,
+    AROUND, BESIDE, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, Section, first_line,
 };
-use super::step::{Chain, Claim, Listed};
 use super::{CertifyError, Given, ground};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::separation::overlap_centre;
 use bench_dragon_motion::timeline::Timeline;
+use clearance::UpperBetween;
+pub use clearance::{BetweenEnclosure, SeveralClearances, certify_several_clearances};
+use side::{Extent, Refused, Side, sentence};
 
 /// A function that receives each line of a certificate.
 type Write<'w> = &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>;
@@ -52,11 +54,14 @@ pub fn certify_several(
     }
     for pair in pairs(dragons.len()) {
         write(&CertificateLine::Pair { dragons: pair })?;
-        let ends = pair.map(|k| Side::new(&dragons[k], &sections[k].1, sections[k].0.end().event));
+        let ends = pair.map(|k| {
+            let (timeline, section) = &sections[k];
+            Side::new(&dragons[k], timeline.end().event, section.locks, Some(section))
+        });
         let to = ends.iter().map(|side| side.end).fold(0.0, f64::max);
-        let to = ends.iter().filter(|side| side.section.locks).map(|side| side.end).fold(to, f64::min);
+        let to = ends.iter().filter(|side| side.locks).map(|side| side.end).fold(to, f64::min);
         let hint = ensemble.first_contact_of(pair, to, &mut |_| ());
-        let mut search = PairSearch { sides: ends, time: 0.0, step: 0.0, steps: 0, most_steps, write: &mut *write };
+        let mut search = PairSearch::new(ends, Aim::Clear, most_steps, &mut *write);
         let status = search.run(hint, to, &mut |share| progress((done + share) / parts))?;
         let event = CertifiedEvent { event: EventKind::Contact, obstacle: None, dragons: pair.to_vec(), status };
         write(&CertificateLine::Result(event.clone()))?;
@@ -83,115 +88,44 @@ fn alone(
         head_speed: motion.head_speed(),
         events: &events,
         most_steps,
+        most_spans: MOST_SPANS,
         dragon: Some((number, *delay)),
     };
     CertificateSearch::new(given, ground::barriers(motion), write).section(progress)
 }
 
-/// One of two dragons, as a function of time.
-struct Side<'a> {
-    chain: Chain<'a>,
-    frame: Frame,
-    delay: f64,
-    head_speed: f64,
-    /// Seconds at which its motion ends.
-    end: f64,
-    section: &'a Section,
+/// What stretches of time are to show of the boards of two dragons.
+#[derive(Debug, Clone, Copy)]
+enum Aim {
+    /// That no two touch.
+    Clear,
+    /// Nothing: only that no link locks.
+    Links,
+    /// That they are more than some metres apart.
+    Apart(f64),
 }
 
-/// A dragon's handles and boards on the stage over a stretch of time.
-struct Stretch {
-    head: Span,
-    spans: Vec<Span>,
-    boards: Vec<MovingBoard>,
-}
-
-/// The reason why a stretch of time is not shown.
-enum Refused {
-    Link(usize),
-    Pair([usize; 2]),
-}
-
-impl<'a> Side<'a> {
-    fn new(Dragon { delay, motion, .. }: &'a Dragon, section: &'a Section, end: Event) -> Self {
-        let chain = Chain::new(motion.path(), ExactPath::new(motion.description()), motion.team());
-        let head_speed = motion.head_speed();
-        // A little later: beyond the path's end the dragon stands.
-        let slack = if section.locks { 0.0 } else { 1e-13 };
-        let end = (delay + end.travelled / head_speed) * (1.0 + slack) + slack;
-        Self { chain, frame: Frame::new(motion.placement()), delay: *delay, head_speed, end, section }
-    }
-
-    /// Returns the metres that the head has travelled at a time.
-    fn travelled(&self, time: f64) -> Interval {
-        let metres = (Interval::point(time) - Interval::point(self.delay)) * self.head_speed;
-        metres.max(Interval::ZERO).min(Interval::point(self.chain.path.length()))
-    }
-
-    /// Returns grid points that the head is surely between from one time to another.
-    fn ends(&self, from: f64, to: f64) -> Option<[GridPoint; 2]> {
-        let Chain { path, exact, .. } = &self.chain;
-        let least = f64::EPSILON * (1.0 + path.length());
-        let beside = |travelled: f64, side: f64, holds: &dyn Fn(Interval) -> bool| {
-            let mut points =
-                (0..40).map(|power| GridPoint::new(path, exact, travelled + side * least * 2f64.powi(power)));
-            points.find(|point| holds(exact.travelled(point.head)))
-        };
-        let (first, last) = (self.travelled(from), self.travelled(to));
-        let before = beside(first.lo, -1.0, &|at| at.hi <= first.lo)?;
-        let is_at_end = last.hi >= path.length() * (1.0 - LEAST) - LEAST;
-        let after = if is_at_end { Some(path_end(exact, path)) } else { beside(last.hi, 1.0, &|at| at.lo >= last.hi) };
-        Some([before, after?])
-    }
-
-    /// Encloses the handles from one time to another, all or those up to `handle`.
-    fn stretch(&self, from: f64, to: f64, handle: Option<usize>) -> Result<Stretch, Refused> {
-        let [mut first, mut last] = self.ends(from, to).ok_or(Refused::Link(0))?;
-        let (benches, head) = (self.chain.team.benches, Span(first.head, last.head));
-        let claim = Claim { links: Links::All, moving: false, clear: false };
-        let mut listed = Listed::new(&self.chain, head, last.travelled - first.travelled);
-        let is_enough = |listed: &Listed| match handle {
-            Some(handle) => listed.handles.len() > handle,
-            None => listed.handles.len() > benches || listed.is_on_line(listed.handles.len() - 1),
-        };
-        while listed.handles.len() < 2 || !is_enough(&listed) {
-            let link = listed.handles.len() - 1;
-            listed.extend(&mut first, &mut last, claim).map_err(|_| Refused::Link(link))?;
-        }
-        let boards: Vec<MovingBoard> = match handle {
-            Some(handle) => (0..handle).map(|bench| self.chain.board(&listed.handles, bench)).collect(),
-            None => listed.boards_on_ground(Links::All),
-        };
-        let boards = boards.iter().map(|board| board.placed(&self.chain.shape, &self.frame)).collect();
-        let spans = listed.handles[1..].iter().map(|handle: &Spanned| handle.span).collect();
-        Ok(Stretch { head, spans, boards })
-    }
-
-    /// Returns true if the motion is proved to go on up to a place of the head.
-    fn has_come(&self, Span(_, to): Span) -> bool {
-        self.section.ends_with_path || self.chain.exact.in_order(to, self.section.end)
-    }
-
-    fn is_moving(&self, time: f64) -> bool {
-        time >= self.delay && time < self.end
-    }
-
-    /// Returns the seconds in which the head travels some metres.
-    fn seconds(&self, metres: f64) -> f64 {
-        metres / self.head_speed
-    }
-}
-
-/// The search for the first contact of two dragons.
+/// The search for what two dragons do, by stretches of time.
 struct PairSearch<'a, 'w> {
     sides: [Side<'a>; 2],
-    /// Seconds up to which the boards are apart.
+    aim: Aim,
+    /// The least clearance so far, if it is sought. The aim follows it.
+    upper: Option<UpperBetween>,
+    /// The least of the metres that the stretches have shown boards to be apart.
+    shown: Option<f64>,
+    /// Seconds up to which stretches have come.
     time: f64,
     /// Seconds of the next step to try.
     step: f64,
     steps: u64,
     most_steps: u64,
     write: Write<'w>,
+}
+
+impl<'a, 'w> PairSearch<'a, 'w> {
+    fn new(sides: [Side<'a>; 2], aim: Aim, most_steps: u64, write: Write<'w>) -> Self {
+        Self { sides, aim, upper: None, shown: None, time: 0.0, step: 0.0, steps: 0, most_steps, write }
+    }
 }
 
 impl PairSearch<'_, '_> {
@@ -207,7 +141,7 @@ impl PairSearch<'_, '_> {
             // Nearer to a lock no step can be shown.
             let before_lock = self.before_lock();
             return Ok(match refused {
-                None if !self.sides.iter().any(|side| side.section.locks) => Status::None { time_lo: None },
+                None if !self.sides.iter().any(|side| side.locks) => Status::None { time_lo: None },
                 _ if before_lock.is_some() => Status::None { time_lo: before_lock },
                 None => Status::Undecided { time_lo: self.time, because: "the motion ends there".to_owned() },
                 Some(because) => Status::Undecided { time_lo: self.time, because },
@@ -227,8 +161,8 @@ impl PairSearch<'_, '_> {
     fn before_lock(&self) -> Option<f64> {
         // The checker's bound, less its rounding.
         let near = 0.999 * self.near();
-        self.sides.iter().filter(|side| side.section.locks).find_map(|side| {
-            let metres = side.chain.exact.travelled(side.section.end);
+        self.sides.iter().filter(|side| side.locks).find_map(|side| {
+            let metres = side.chain.exact.travelled(side.section?.end);
             let end = metres.over(Interval::point(side.head_speed)) + Interval::point(side.delay);
             let time = self.time.min(end.lo);
             (time >= 0.0 && end.hi - time < near).then_some(time)
@@ -261,14 +195,22 @@ impl PairSearch<'_, '_> {
             // No step goes on where a dragon begins to move: until then it may be as long as one likes.
             let starts = self.sides.iter().map(|side| side.delay).filter(|start| *start > self.time);
             let until = if longest.is_finite() { to } else { starts.fold(to, f64::min) };
+            // To the first order, a dragon that begins or ends to move would cost a factor of accuracy.
+            let is_close = matches!(self.aim, Aim::Apart(_));
+            let breaks = self.sides.iter().flat_map(Side::breaks).filter(|time| is_close && *time > self.time);
+            let until = breaks.fold(until, f64::min);
             let length = self.step.min(longest).min(until - self.time);
             let next = if length >= 0.9 * (until - self.time) { until } else { self.time + length };
-            match self.clear_until(next) {
+            match self.show_until(next) {
                 Ok(line) => {
                     (self.write)(&line)?;
+                    if let Aim::Apart(metres) = self.aim {
+                        self.shown = Some(self.shown.map_or(metres, |least| least.min(metres)));
+                    }
                     (self.time, self.step) = (next, GROWTH * length);
                     progress((next / to).clamp(0.0, 1.0));
                 }
+                Err(Refused::Pair(benches)) if self.lower(0.5 * (self.time + next), benches) => {}
                 Err(refused) if length <= least => return Ok(Some(sentence(&refused))),
                 Err(_) => self.step = SHRINK * length,
             }
@@ -280,22 +222,35 @@ impl PairSearch<'_, '_> {
         Ok(None)
     }
 
-    /// Returns the line that no boards of the two touch from here until a time.
-    fn clear_until(&self, to: f64) -> Result<CertificateLine<'static>, Refused> {
+    /// Returns the line of what the two do from here until a time.
+    fn show_until(&self, to: f64) -> Result<CertificateLine<'static>, Refused> {
+        let stretch = |side: &Side| match self.aim {
+            Aim::Apart(_) => side.first_order(self.time, to, Extent::Whole),
+            Aim::Clear | Aim::Links => side.stretch(self.time, to, Extent::Whole),
+        };
         let [one, other] = &self.sides;
-        let (one, other) = (one.stretch(self.time, to, None)?, other.stretch(self.time, to, None)?);
-        for (a, board) in one.boards.iter().enumerate() {
-            if let Some(b) = other.boards.iter().position(|other| !board.is_apart_from(other)) {
+        let (one, other) = (stretch(one)?, stretch(other)?);
+        let are_apart = |[a, b]: [usize; 2]| match self.aim {
+            Aim::Links => true,
+            Aim::Clear => one.boards[a].is_apart_from(&other.boards[b]),
+            Aim::Apart(metres) => {
+                one.boards[a].is_further_than(metres.max(0.0), &other.boards[b])
+                    || one.first_order[a].is_further_than(metres, &other.first_order[b], When::Always)
+            }
+        };
+        for a in 0..one.boards.len() {
+            if let Some(b) = (0..other.boards.len()).find(|b| !are_apart([a, *b])) {
                 return Err(Refused::Pair([a, b]));
             }
         }
         let (heads, spans) = ([one.head, other.head], [one.spans, other.spans]);
-        Ok(CertificateLine::Both { from: self.time, to, heads, spans })
+        let apart = if let Aim::Apart(metres) = self.aim { Some(metres) } else { None };
+        Ok(CertificateLine::Both { from: self.time, to, heads, spans, apart, at: [one.at, other.at] })
     }
 
     /// Returns the line that two boards have a point in common at a time.
     fn touch(&self, time: f64, benches: [usize; 2]) -> Option<CertificateLine<'static>> {
-        let [one, other] = [0, 1].map(|k| self.sides[k].stretch(time, time, Some(benches[k] + 1)).ok());
+        let [one, other] = [0, 1].map(|k| self.sides[k].stretch(time, time, Extent::UpTo(benches[k])).ok());
         let (one, other) = (one?, other?);
         let boards = [one.boards[benches[0]], other.boards[benches[1]]];
         let [a, b] = boards.map(|board| board.in_doubles());
@@ -306,8 +261,8 @@ impl PairSearch<'_, '_> {
         holds.then_some(CertificateLine::Meeting { benches, time, heads, spans: [one.spans, other.spans], point })
     }
 
-    /// Writes the line of a contact at the nearest time after `contact` at which it is found, and returns the status.
-    fn meeting(&mut self, contact: f64, benches: [usize; 2]) -> Result<Status, CertifyError> {
+    /// Returns the nearest time after `contact` at which it is found, as seconds after it, and the line.
+    fn found_meeting(&self, contact: f64, benches: [usize; 2]) -> Option<(f64, CertificateLine<'static>)> {
         let (around, most) = (self.around(), self.near().max(self.around()));
         let at_start = (contact == 0.0).then(|| self.touch(0.0, benches)).flatten().map(|line| (0.0, line));
         let mut found = at_start.or_else(|| {
@@ -324,7 +279,12 @@ impl PairSearch<'_, '_> {
                 }
             }
         }
-        let Some((far, line)) = found else {
+        found
+    }
+
+    /// Writes the line of a contact at the nearest time after `contact` at which it is found, and returns the status.
+    fn meeting(&mut self, contact: f64, benches: [usize; 2]) -> Result<Status, CertifyError> {
+        let Some((far, line)) = self.found_meeting(contact, benches) else {
             let because = "doubles cannot tell whether the boards touch that come so near".to_owned();
             return Ok(Status::Undecided { time_lo: self.time, because });
         };
@@ -334,19 +294,5 @@ impl PairSearch<'_, '_> {
             .then(|| "the boards meet so slowly that rounding hides the contact for so long".to_owned());
         let [bench_a, bench_b] = benches.map(Some);
         Ok(Status::Proved { time_lo, time_hi, bench_a, bench_b, because })
-    }
-}
-
-fn sentence(refused: &Refused) -> String {
-    match refused {
-        Refused::Link(link) => {
-            format!("the rear handle of bench {} (counting from 1) cannot be enclosed there", link + 1)
-        }
-        Refused::Pair([a, b]) => format!(
-            "bench {} of the first and bench {} of the second (counting from 1) come so near that doubles cannot tell \
-             whether they touch",
-            a + 1,
-            b + 1
-        ),
     }
 }

@@ -56,29 +56,57 @@ impl Capsule {
         (norm(minus(self.point, other.point)) + self.slack(other)).hi
     }
 
+    /// Returns an upper bound of the distance of a point of the capsule from its middle.
+    pub fn reach_of_all(&self) -> Interval {
+        Interval::point(self.half) + Interval::point(self.radius)
+    }
+
     /// Returns an upper bound of the sum of two distances: of a point of each capsule from its middle.
-    fn slack(&self, other: &Self) -> Interval {
-        Interval::point(self.half)
-            + Interval::point(other.half)
-            + Interval::point(self.radius)
-            + Interval::point(other.radius)
+    pub fn slack(&self, other: &Self) -> Interval {
+        self.reach_of_all() + other.reach_of_all()
     }
 
     /// Returns the squared distances of all places of the span from a point, by Taylor's formula.
     pub fn distance_squared(&self, x: Vector) -> Interval {
-        let Self { point, tangent, half, curvature, radius, .. } = *self;
+        let Self { point, tangent, half, radius, .. } = *self;
         let between = minus(point, x);
         let most = norm(between) + Interval::point(half) + Interval::point(radius);
-        let half = Interval::point(half);
-        let linear = dot(tangent, between).abs() * 2.0 * half;
-        let square = (Interval::ONE + most * curvature) * half.square();
-        norm_squared(between) + Interval::within((linear + square).hi)
+        norm_squared(between) + self.rest(dot(tangent, between).abs(), most)
+    }
+
+    /// Returns the squared distances of all places of the span from all of the other's, by Taylor's formula about the
+    /// middles of both.
+    pub fn distances_squared(&self, other: &Self) -> Interval {
+        let along = dot(other.tangent, minus(self.point, other.point)).abs();
+        // That of any place of this span, with the tangent at the other's middle.
+        let slope = along + dot(other.tangent, self.tangent).abs() * self.half + Interval::point(self.radius);
+        self.distance_squared(other.point) + other.rest(slope, Interval::point(self.most_apart(other)))
+    }
+
+    /// Returns how much the squared distance from a point changes from the middle to any place of the span. `slope` is
+    /// that along the tangent at the middle, `most` an upper bound of the distance.
+    fn rest(&self, slope: Interval, most: Interval) -> Interval {
+        let half = Interval::point(self.half);
+        Interval::within((slope * 2.0 * half + (Interval::ONE + most * self.curvature) * half.square()).hi)
     }
 
     /// Returns t . (u - x) for all u of this capsule and x of the other. t is the tangent at u, or at x.
     pub fn product(&self, other: &Self, at_other: bool) -> Interval {
         let at = if at_other { other } else { self };
         self.component(other, at.tangent, at.turned())
+    }
+
+    /// Returns t . (u - x) for all u of this capsule and x of the other, t being the tangent at x, by Taylor's formula of
+    /// the second order along the other's span. With a junction in the span nothing is known of it.
+    pub fn second_order_product(&self, path: &ExactPath, other: &Self, Span(first, last): Span) -> Interval {
+        let Some(rate) = path.bend_rate(first, last) else { return Interval::within(f64::INFINITY) };
+        let Self { middle, point, tangent: [x, y], half, curvature, .. } = *other;
+        let (half, bend, between) = (Interval::point(half), path.bend(middle, middle), minus(self.point, point));
+        let off = |n: Vector| dot(n, self.tangent).abs() * self.half + Interval::point(self.radius);
+        let slope = (bend * dot([-y, x], between) - Interval::ONE).abs() + bend.abs() * off([-y, x]);
+        let second = (rate.abs() + Interval::point(curvature).square()) * self.most_apart(other);
+        let within = off(other.tangent) + slope * half + second * half.square() * 0.5;
+        dot(other.tangent, between) + Interval::within(within.hi)
     }
 
     /// Returns n . (u - x) for all u of this capsule and x of the other. n is the unit normal to the left at u, or at
@@ -141,13 +169,19 @@ impl Frame {
         Self { origin, cosine, sine, mirrored: placement.is_mirrored() }
     }
 
-    fn turned(&self, [x, y]: Vector) -> Vector {
+    /// Returns a vector of the path on the stage.
+    pub fn turned(&self, [x, y]: Vector) -> Vector {
         let y = if self.mirrored { -y } else { y };
         [self.cosine * x - self.sine * y, self.sine * x + self.cosine * y]
     }
 
+    /// Returns a point of the path on the stage.
+    pub fn point(&self, point: Vector) -> Vector {
+        plus(self.turned(point), self.origin)
+    }
+
     pub fn capsule(&self, capsule: &Capsule) -> Capsule {
-        let (point, tangent) = (plus(self.turned(capsule.point), self.origin), self.turned(capsule.tangent));
+        let (point, tangent) = (self.point(capsule.point), self.turned(capsule.tangent));
         Capsule { point, tangent, ..*capsule }
     }
 }

@@ -24,6 +24,7 @@ use bench_dragon_motion::contact::LeastClearance;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::timeline::{TimedEvent, TimedObstacleClearance};
 use beside::{Beside, UpperBeside};
+pub(super) use certificate::first_line as clearance_first_line;
 
 /// Width of the enclosure in metres, with room for the rounding of both ends.
 const WIDTH: f64 = 0.9e-9;
@@ -147,6 +148,28 @@ pub fn certify_least_clearance(
     Ok(enclosures)
 }
 
+/// Encloses the least clearances of one dragon of a show of several, and writes its section of the certificate, without
+/// its first line.
+///
+/// # Errors
+/// [`CertifyError::Write`]
+pub(super) fn certify_part(
+    motion: &Motion,
+    (part, show_end): (Part, &TimedEvent),
+    hints: ClearanceHints<'_>,
+    most_steps: u64,
+    write: Write<'_>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<ClearanceEnclosures, CertifyError> {
+    let descent = Descent::new(chain_of(motion), show_end.event.travelled, most_steps, Some(write));
+    let mut descent = Descent { part, ..descent };
+    let nothing = ClearanceEnclosures { boards: None, obstacles: vec![None; motion.ground().obstacles().len()] };
+    let has_hints = hints.boards.is_some() || !hints.obstacles.is_empty();
+    let enclosures = if has_hints { descent.run(motion, show_end, hints, progress) } else { nothing };
+    descent.write_result(motion.head_speed())?;
+    Ok(enclosures)
+}
+
 /// A function that receives each line of a certificate.
 pub type Write<'w> = &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>;
 
@@ -193,6 +216,19 @@ pub(super) struct Descent<'a, 'w> {
     beside: Vec<Beside>,
     /// True if the steps have come to the end of the show.
     is_complete: bool,
+    /// The place of the motion in a show of several.
+    part: Part,
+}
+
+/// The place of a motion in a show of several.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Part {
+    /// The dragon; empty in a show of one.
+    pub dragons: Vec<usize>,
+    /// Seconds of the show during which it stands at its start.
+    pub delay: f64,
+    /// Seconds at which the show ends, if that is not by itself.
+    pub show_end: Option<f64>,
 }
 
 /// The end of the show, as a certificate states it.
@@ -239,6 +275,7 @@ impl<'a, 'w> Descent<'a, 'w> {
             floor: None,
             beside,
             is_complete: false,
+            part: Part::default(),
         };
         let before = -LEAST * (1.0 + descent.chain.path.length());
         descent.at =
@@ -265,7 +302,8 @@ impl<'a, 'w> Descent<'a, 'w> {
             // The certificate ends by a time that is rounded down. A place after it would show nothing.
             _ => {
                 let last = self.chain.exact.travelled(self.grid_point(self.end).head).lo.min(self.end);
-                last * (1.0 - BEFORE_TIME) - GRID * f64::EPSILON * (1.0 + path.length())
+                let delayed = self.part.delay * motion.head_speed();
+                last - BEFORE_TIME * (last + delayed) - GRID * f64::EPSILON * (1.0 + path.length())
             }
         };
         let is_at_start = event.travelled == 0.0;
@@ -457,11 +495,14 @@ impl<'a, 'w> Descent<'a, 'w> {
         let least = LEAST_STEP * (1.0 + self.chain.path.length());
         let longest = self.chain.team.shortest_link();
         let mut shrink = SHRINK;
-        while self.at.head != target.head {
+        while self.chain.exact.is_before(self.at.head, target.head) {
             let remaining = target.travelled - self.at.travelled;
             let length = self.step.min(remaining);
-            let mut to =
-                if self.step >= 0.9 * remaining { target.clone() } else { self.grid_point(self.at.travelled + length) };
+            let mut to = if self.step >= 0.9 * remaining {
+                target.clone()
+            } else {
+                self.at.further(self.chain.path, &self.chain.exact, length)
+            };
             self.steps += 1;
             let given_up = match self.show(&mut to) {
                 Ok(()) => {

@@ -93,12 +93,16 @@ fn alternating(s: Interval, factors: &[Interval]) -> Interval {
     })
 }
 
-/// Returns the arctangent of a number of at least 0.
-///
+/// Returns the arctangent of a number of at least 0, which grows with the number.
+pub(super) fn atan(x: Interval) -> Interval {
+    let Interval { lo, hi } = x;
+    Interval { lo: atan_of(lo).lo, hi: atan_of(hi).hi }
+}
+
 /// The identity atan x = 2 atan(x / (1 + sqrt(1 + x^2))) is applied four times. Then x < 0.0985, and the series to x^17
 /// leaves less than x 0.0985^18 / 19 < 5e-20 x.
-pub(super) fn atan(x: Interval) -> Interval {
-    let mut reduced = x;
+fn atan_of(x: f64) -> Interval {
+    let mut reduced = Interval::point(x);
     for _ in 0..4 {
         reduced = reduced.over(Interval::ONE + (Interval::ONE + reduced.square()).sqrt());
         // The quotient grows with x to 1: values outside come from rounding.

@@ -2,7 +2,7 @@
 //! boards. Lemma 6 of `docs/proofs.md`.
 
 use super::boards::Shape;
-use super::capsule::Spanned;
+use super::capsule::{Capsule, Frame, Spanned};
 use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared, plus, scaled};
 use super::path::{ExactPath, Place};
 use bench_dragon_motion::model::Point;
@@ -29,6 +29,24 @@ pub(super) struct FirstOrderHandle {
     error: f64,
     /// Upper bound of the curvature in the handle's span, 1/m.
     curvature: f64,
+}
+
+/// The motion of the head over a step. For two dragons, tau is a time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pace {
+    /// Metres of the head per unit of tau.
+    pub rate: Interval,
+    /// Upper bound of the metres of path from the head's place to the head in the middle of the step.
+    pub offset: f64,
+    /// Greatest |tau|.
+    pub half_step: f64,
+}
+
+impl Pace {
+    /// Returns the motion of a head that is `half_step` metres from its place at most, where tau is these metres.
+    pub fn in_metres(half_step: f64) -> Self {
+        Self { rate: Interval::ONE, offset: 0.0, half_step }
+    }
 }
 
 /// Number of times that the products of a link are enclosed again from the last enclosure of its rear handle.
@@ -71,9 +89,18 @@ struct Linear {
 }
 
 impl FirstOrderHandle {
-    /// Creates the enclosure of the head, at `middle` in the middle of a step of `half_step` metres to either side.
-    pub fn head(path: &ExactPath, span: &Spanned, middle: Place, half_step: f64) -> Self {
-        Self::new(path, span, middle, Interval::ONE, 0.0, half_step)
+    /// Creates the enclosure of the head, at `middle` in the middle of a step.
+    pub fn head(path: &ExactPath, span: &Spanned, middle: Place, Pace { rate, offset, half_step }: Pace) -> Self {
+        Self::new(path, span, middle, rate, offset, half_step)
+    }
+
+    /// Creates the enclosure of a handle that is in a capsule at tau = 0, with velocities in an interval.
+    pub fn moving(capsule: &Capsule, velocity: Vector, half_step: f64) -> Self {
+        let Capsule { point, tangent, half: offset, curvature, .. } = *capsule;
+        let middle = velocity.map(|part| Interval::point(part.middle()));
+        let still = capsule.reach_of_all();
+        let error = (still + norm(minus(velocity, middle)) * half_step).hi;
+        Self { point, tangent, velocity: middle, rate: norm(velocity), offset, still: still.hi, error, curvature }
     }
 
     fn new(path: &ExactPath, span: &Spanned, place: Place, rate: Interval, offset: f64, half_step: f64) -> Self {
@@ -134,6 +161,12 @@ impl FirstOrderHandle {
         Self { point: minus(self.point, scaled(self.tangent, metres)), ..*self }
     }
 
+    /// Returns the handle on the stage.
+    fn placed(self, frame: &Frame) -> Self {
+        let (tangent, velocity) = (frame.turned(self.tangent), frame.turned(self.velocity));
+        Self { point: frame.point(self.point), tangent, velocity, ..self }
+    }
+
     /// Returns the tangent of this handle times the link from `rear` to `front`. This handle is one of the two.
     fn product(&self, front: &Self, rear: &Self, link: Interval, half_step: f64) -> Interval {
         let (at, by) = (minus(front.point, rear.point), minus(front.velocity, rear.velocity));
@@ -164,6 +197,11 @@ impl FirstOrderBoard {
     pub fn new(shape: &Shape, front: FirstOrderHandle, rear: FirstOrderHandle, link: Interval, half_step: f64) -> Self {
         let half_length = link * 0.5 + shape.inset;
         Self { front, rear, link, half_length, half_width: shape.half_width, half_step }
+    }
+
+    /// Returns the board on the stage.
+    pub fn placed(self, frame: &Frame) -> Self {
+        Self { front: self.front.placed(frame), rear: self.rear.placed(frame), ..self }
     }
 
     /// Returns the board in doubles, in the middle of the step.

@@ -1,9 +1,9 @@
 //! Handles and boards over a step of the head: spans by Lemma 1, and first-order enclosures by Lemma 6 of
-//! `docs/proofs.md`. Only [`super::clearance`] uses it.
+//! `docs/proofs.md`. [`super::clearance`] and [`super::between`] use it.
 
 use super::capsule::Span;
-use super::first_order::{FirstOrderBoard, FirstOrderHandle, When};
-use super::grid::{GridPoint, place};
+use super::first_order::{FirstOrderBoard, FirstOrderHandle, Pace, When};
+use super::grid::{GridPoint, fine_place, place};
 use super::lines::Links;
 use super::path::{Curve, Place};
 use super::step::{Chain, Claim, Listed, Obstacle};
@@ -33,18 +33,31 @@ pub(super) struct FirstOrderStep<'c, 'a> {
     pub places: Vec<Place>,
     /// The place of the head in the middle of the step.
     pub at: Place,
+    /// Greatest |tau|.
     half_step: f64,
 }
 
 impl<'c, 'a> FirstOrderStep<'c, 'a> {
-    pub fn new(chain: &'c Chain<'a>, StepPoints { from, middle, to }: &StepPoints) -> Self {
+    pub fn new(chain: &'c Chain<'a>, points: &StepPoints) -> Self {
+        let exact = &chain.exact;
+        let pace = |at| Pace::in_metres(exact.length(points.from.head, at).max(exact.length(at, points.to.head)));
+        Self::with_pace(chain, points, pace)
+    }
+
+    /// Lists the head, whose motion follows from its place in the middle of the step.
+    pub fn with_pace(
+        chain: &'c Chain<'a>,
+        StepPoints { from, middle, to }: &StepPoints,
+        pace: impl FnOnce(Place) -> Pace,
+    ) -> Self {
         let exact = &chain.exact;
         let listed = Listed::new(chain, Span(from.head, to.head), to.travelled - from.travelled);
         // Rounding may put the middle outside; every place between the two is valid.
         let inside = exact.in_order(from.head, middle.head) && exact.in_order(middle.head, to.head);
         let at = if inside { middle.head } else { from.head };
-        let half_step = exact.length(from.head, at).max(exact.length(at, to.head));
-        let handles = vec![FirstOrderHandle::head(exact, &listed.handles[0], at, half_step)];
+        let pace = pace(at);
+        let half_step = pace.half_step;
+        let handles = vec![FirstOrderHandle::head(exact, &listed.handles[0], at, pace)];
         Self { chain, listed, handles, places: vec![at], at, half_step }
     }
 
@@ -54,8 +67,13 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         let link = self.listed.handles.len() - 1;
         self.listed.extend(from, to, Claim { links, moving: false, clear: false })?;
         middle.extend_to(link + 1, path, team).map_err(|_| Obstacle::Link(link))?;
-        let at = place(middle.handles[link + 1].param);
+        let solved = middle.handles[link + 1].param;
         let spans = (&self.listed.handles[link], &self.listed.handles[link + 1]);
+        let Span(first, last) = spans.1.span;
+        let is_inside = |at: Place| exact.in_order(first, at) && exact.in_order(at, last);
+        // A span may be narrower than a unit in the last place.
+        let solved = [place(solved), fine_place(solved)].into_iter().find(|at| is_inside(*at));
+        let at = solved.unwrap_or(spans.1.capsule.middle);
         let length = self.chain.link(link);
         let follower = self.handles[link].follower(exact, spans, at, length, self.half_step);
         self.handles.push(follower.ok_or(Obstacle::Link(link))?);

@@ -40,6 +40,17 @@ impl GridPoint {
         Self { travelled, head, handles: vec![handle] }
     }
 
+    /// Returns the grid point some metres further on. If they are less than the distance of two doubles, it is at the
+    /// next one: a step leads on.
+    pub fn further(&self, path: &Path, exact: &ExactPath, metres: f64) -> Self {
+        let to = Self::new(path, exact, self.travelled + metres);
+        if exact.is_before(self.head, to.head) {
+            return to;
+        }
+        let head = exact.moved(self.head, metres, false);
+        Self::at(head, exact.travelled(head).middle().max(to.travelled))
+    }
+
     /// Solves handles up to `handle`.
     pub fn extend_to(&mut self, handle: usize, path: &Path, team: &Team) -> Result<(), NoFollower> {
         while self.handles.len() <= handle {

@@ -29,7 +29,7 @@ mod turn;
 
 use std::io;
 
-pub use between::certify_several;
+pub use between::{BetweenEnclosure, SeveralClearances, certify_several, certify_several_clearances};
 pub use capsule::Span;
 pub use clearance::{
     ClearanceEnclosure, ClearanceEnclosures, ClearanceHints, MOST_CLEARANCE_STEPS, ObstacleEnclosure, Write,
@@ -69,6 +69,7 @@ pub(crate) struct Given<'a> {
     head_speed: f64,
     events: &'a [Event],
     most_steps: u64,
+    most_spans: usize,
     /// The number of the dragon and its delay in seconds, in a show of several.
     dragon: Option<(usize, f64)>,
 }
@@ -95,6 +96,7 @@ pub fn certify(
         head_speed: motion.head_speed(),
         events: &events,
         most_steps,
+        most_spans: search::MOST_SPANS,
         dragon: None,
     };
     search::CertificateSearch::new(given, ground::barriers(motion), write).run(progress)

@@ -142,7 +142,8 @@ pub enum CertificateLine<'a> {
         /// The two, counted from 0.
         dragons: [usize; 2],
     },
-    /// No boards of the two dragons touch from one time to another.
+    /// No boards of the two dragons touch from one time to another; in a certificate of the least clearance, no link
+    /// locks.
     Both {
         /// Seconds of the show.
         from: f64,
@@ -152,6 +153,27 @@ pub enum CertificateLine<'a> {
         heads: [Span; 2],
         /// The spans of the handles from 1 on of each.
         spans: [Vec<Span>; 2],
+        /// Metres that boards of the two are further apart, in a certificate of the least clearance.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        apart: Option<f64>,
+        /// A place of each span of each dragon, the heads' first, for `apart`.
+        #[serde(skip_serializing_if = "no_places")]
+        at: [Vec<Place>; 2],
+    },
+    /// Two boards of the two dragons are no further apart than a number of metres at a time.
+    NearBoth {
+        /// A bench of each, counted from 0.
+        benches: [usize; 2],
+        /// Seconds of the show.
+        time: f64,
+        /// The spans of both heads at that time.
+        heads: [Span; 2],
+        /// The spans of the handles from 1 on of each.
+        spans: [Vec<Span>; 2],
+        /// A place of each span of each dragon, the heads' first.
+        at: [Vec<Place>; 2],
+        /// Metres.
+        most: f64,
     },
     /// Two boards of the two dragons have a point in common at a time.
     Meeting {
@@ -302,10 +324,14 @@ pub struct CertifiedClearance {
     /// Simulated seconds of that end, for [`Until::Time`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_until: Option<f64>,
-    /// The bench of the two that is nearer the head, counted from 0.
+    /// The bench of the two that is nearer the head, or that of the first of two dragons, counted from 0.
     pub bench_a: Option<usize>,
     /// The other bench.
     pub bench_b: Option<usize>,
+    /// In a show of several dragons, the dragon that the result is about, or the two, counted from 0. Benches are
+    /// counted within each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dragons: Vec<usize>,
 }
 
 /// The certified least clearance of an obstacle, from the scene's start on.
@@ -324,6 +350,9 @@ pub struct CertifiedObstacleClearance {
     pub time_until: Option<f64>,
     /// The bench, counted from 0.
     pub bench: Option<usize>,
+    /// In a show of several dragons, the dragon that the result is about, counted from 0.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dragons: Vec<usize>,
 }
 
 /// A step of the head, and the statements that hold throughout it.
@@ -405,6 +434,10 @@ pub enum Status {
         /// The reason, in words.
         because: String,
     },
+}
+
+fn no_places(at: &[Vec<Place>; 2]) -> bool {
+    at.iter().all(Vec::is_empty)
 }
 
 fn name<S: serde::Serializer>(kind: &EventKind, serializer: S) -> Result<S::Ok, S::Error> {

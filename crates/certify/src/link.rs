@@ -3,11 +3,14 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::capsule::{Capsule, Span, Spanned};
-use super::interval::{Interval, minus, norm_squared};
+use super::interval::{Interval, dot, minus, norm_squared};
 use super::path::ExactPath;
 
 /// Limit of halvings of a stretch whose places must be nearer than the link.
-const MOST_HALVINGS: u32 = 24;
+const MOST_HALVINGS: u32 = 44;
+
+/// Limit of the stretches into which the span of a handle is cut. Next to a lock or a stall, some twenty are enough.
+const MOST_STRETCHES: u32 = 300;
 
 /// A number below pi / 2.
 const QUARTER: f64 = FRAC_PI_2 - 1e-12;
@@ -35,23 +38,45 @@ pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned,
 /// be at the link's distance. That place is the follower unless a nearer place is at the distance.
 pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let (u, x) = (&front.capsule, &rear.capsule);
-    if !path.in_order(rear.span.1, front.span.0) || !u.product(x, true).is_positive() {
+    let behind = path.in_order(rear.span.1, front.span.0);
+    if !behind || !u.product(x, true).is_positive() && !has_sign(path, u, rear.span, 1.0) {
         return None;
     }
     let product = u.product(x, false);
+    let backward = product.is_negative();
+    // The way from the front to the rear, along the tangent at the front.
+    let forward = product.is_positive() || !backward && has_sign(path, x, front.span, -1.0);
     let square = link.square();
     let beyond = |distance: Interval| square.is_below(distance);
     let within = |distance: Interval| distance.is_below(square);
     let apart = |one, other| norm_squared(minus(one, other));
-    let (sign, holds) = if product.is_positive() {
+    let (sign, holds) = if forward {
         (Front::Forward, beyond(apart(front.first, rear.first)) && within(apart(front.last, rear.last)))
-    } else if product.is_negative() {
+    } else if backward {
         (Front::Backward, beyond(apart(front.last, rear.first)) && within(apart(front.first, rear.last)))
     } else {
         let first = beyond(front.capsule.distance_squared(rear.first));
         (Front::Unknown, first && within(front.capsule.distance_squared(rear.last)))
     };
     holds.then_some(sign)
+}
+
+/// Returns true if the product of the tangent at a place of a span and the way from there to a place of `other` is proved
+/// to have a sign, that of `sign`, for all such places. The span is cut into stretches.
+fn has_sign(path: &ExactPath, other: &Capsule, span: Span, sign: f64) -> bool {
+    let mut waiting = vec![span];
+    for _ in 0..MOST_STRETCHES {
+        let Some(stretch) = waiting.pop() else { return true };
+        let capsule = Capsule::new(path, stretch);
+        let is_right = |product: Interval| (product * sign).is_positive();
+        if is_right(other.product(&capsule, true)) || is_right(other.second_order_product(path, &capsule, stretch)) {
+            continue;
+        }
+        let at_middle = dot(capsule.tangent, minus(other.point, capsule.point));
+        let Some(middle) = path.between(stretch.0, stretch.1).filter(|_| is_right(at_middle)) else { return false };
+        waiting.extend([Span(middle, stretch.1), Span(stretch.0, middle)]);
+    }
+    false
 }
 
 /// Returns true if every place of a stretch is proved to be of kind (a) or (b).
@@ -61,8 +86,12 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         return true;
     }
     let y = Capsule::new(path, stretch);
-    let growing = path.in_order(last, front.span.0) && front.capsule.product(&y, true).is_positive();
-    if growing || is_nearer(&y, front, link) {
+    let is_behind = path.in_order(last, front.span.0);
+    let growing = is_behind && front.capsule.product(&y, true).is_positive();
+    if growing || front.capsule.distances_squared(&y).is_below(link.square()) {
+        return true;
+    }
+    if is_behind && front.capsule.second_order_product(path, &y, stretch).is_positive() {
         return true;
     }
     let Some(middle) = path.between(first, last).filter(|_| halvings > 0) else { return false };
@@ -70,17 +99,9 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         && nearer(path, front, Span(middle, last), link, halvings - 1)
 }
 
-/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`. Taylor's formula is
-/// applied to the whole stretch.
-fn is_nearer(stretch: &Capsule, front: &Spanned, link: Interval) -> bool {
-    let Capsule { point, half, radius, .. } = front.capsule;
-    let spread = Interval::within((Interval::point(half) + Interval::point(radius)).hi);
-    stretch.distance_squared(point.map(|part| part + spread)).is_below(link.square())
-}
-
 /// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`.
 pub(super) fn all_nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
-    if is_nearer(&Capsule::new(path, stretch), front, link) {
+    if front.capsule.distances_squared(&Capsule::new(path, stretch)).is_below(link.square()) {
         return true;
     }
     let Some(middle) = path.between(stretch.0, stretch.1).filter(|_| halvings > 0) else { return false };

@@ -3,6 +3,7 @@
 
 use serde::{Serialize, Serializer};
 
+use super::capsule::Span;
 use super::elementary::{atan, ln, pi, sin_cos};
 use super::interval::{Interval, Vector, cross, minus, plus, scaled};
 use bench_dragon_motion::model::curve::Side;
@@ -68,11 +69,12 @@ impl Serialize for Place {
     }
 }
 
-/// A curve of the path.
+/// A curve of the path. The coordinate of a spiral is the polar angle, and `shift` is the distance from the centre in
+/// units of a less that: 0 but for turnarounds that are turned, see [`ExactPath::turnaround`].
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Curve {
-    Inward { a: Interval, frame: Option<Frame> },
-    Outward { a: Interval, frame: Option<Frame> },
+    Inward { a: Interval, shift: Interval, frame: Option<Frame> },
+    Outward { a: Interval, shift: Interval, frame: Option<Frame> },
     Line { origin: Vector, direction: Vector },
     Arc { origin: Vector, direction: Vector, inward: Vector, radius: Interval },
 }
@@ -117,6 +119,10 @@ pub(super) struct ExactPath {
 
 const FAR: f64 = f64::INFINITY;
 
+/// Room for the rounding of the ends of a span: a factor, and units of the coordinate.
+const WIDER: f64 = 1.0001;
+const LEAST: f64 = 1e-28;
+
 impl Curve {
     /// Returns true if the coordinate grows with travel.
     fn grows(&self) -> bool {
@@ -134,8 +140,8 @@ impl Curve {
             if low == Interval::ZERO { factor * high } else { factor * high + factor * low }
         };
         match *self {
-            Self::Inward { a, frame } => placed(frame, scaled([cosine, sine], times(a))),
-            Self::Outward { a, frame } => placed(frame, scaled([cosine, sine], -times(a))),
+            Self::Inward { a, shift, frame } => placed(frame, scaled([cosine, sine], shifted(times(a), a, shift))),
+            Self::Outward { a, shift, frame } => placed(frame, scaled([cosine, sine], -shifted(times(a), a, shift))),
             Self::Line { origin, direction } => plus(origin, direction.map(times)),
             Self::Arc { origin, direction, inward, radius } => {
                 let versine = Interval::ONE - cosine;
@@ -153,7 +159,8 @@ impl Curve {
 
     fn tangent_of(&self, at: Interval, (sine, cosine): (Interval, Interval)) -> Vector {
         match *self {
-            Self::Inward { frame, .. } | Self::Outward { frame, .. } => {
+            Self::Inward { shift, frame, .. } | Self::Outward { shift, frame, .. } => {
+                let at = shifted(at, Interval::ONE, shift);
                 let per_metre = -Interval::ONE.over((Interval::ONE + at.square()).sqrt());
                 let tangent = scaled([cosine - at * sine, sine + at * cosine], per_metre);
                 frame.map_or(tangent, |frame| frame.vector(tangent))
@@ -165,17 +172,17 @@ impl Curve {
 
     /// Returns the curvatures between two coordinates, 1/m, positive to the left.
     fn bend(&self, least: f64, greatest: f64) -> Interval {
-        let of_spiral = |a: Interval| {
+        let of_spiral = |a: Interval, shift: Interval| {
             let at = |theta: f64| {
-                let square = Interval::point(theta).square();
+                let square = shifted(Interval::point(theta), Interval::ONE, shift).square();
                 let w = (Interval::ONE + square).sqrt();
                 (square + Interval::point(2.0)).over(a * w * w.square())
             };
             Interval { lo: at(greatest).lo.max(0.0), hi: at(least).hi }
         };
         match *self {
-            Self::Inward { a, frame } => bend_in(frame, -of_spiral(a)),
-            Self::Outward { a, frame } => bend_in(frame, of_spiral(a)),
+            Self::Inward { a, shift, frame } => bend_in(frame, -of_spiral(a, shift)),
+            Self::Outward { a, shift, frame } => bend_in(frame, of_spiral(a, shift)),
             Self::Line { .. } => Interval::ZERO,
             Self::Arc { direction, inward, radius, .. } => {
                 let bend = Interval::ONE.over(radius);
@@ -188,8 +195,9 @@ impl Curve {
     /// w^6).
     fn bend_rate(&self, one: Interval, other: Interval) -> Interval {
         match *self {
-            Self::Inward { a, frame } | Self::Outward { a, frame } => {
+            Self::Inward { a, shift, frame } | Self::Outward { a, shift, frame } => {
                 let theta = Interval { lo: one.min(other).lo, hi: one.max(other).hi };
+                let theta = shifted(theta, Interval::ONE, shift);
                 let (square, w_square) = (theta.square(), Interval::ONE + theta.square());
                 let rate = -(theta * (square + Interval::point(4.0))).over((a * w_square).square() * w_square);
                 bend_in(frame, rate)
@@ -198,28 +206,34 @@ impl Curve {
         }
     }
 
-    /// Returns an upper bound of the metres between two coordinates that are `between` apart.
-    fn length(&self, between: Interval, one: Interval, other: Interval) -> f64 {
+    /// Returns the metres per unit of the coordinate, between two coordinates.
+    fn metres_per_unit(&self, one: Interval, other: Interval) -> Interval {
         match *self {
-            Self::Inward { a, .. } | Self::Outward { a, .. } => {
-                (between * a * (Interval::ONE + one.max(other).square()).sqrt()).hi
+            Self::Inward { a, shift, .. } | Self::Outward { a, shift, .. } => {
+                let theta = Interval { lo: one.min(other).lo, hi: one.max(other).hi };
+                a * (Interval::ONE + shifted(theta, Interval::ONE, shift).square()).sqrt()
             }
-            Self::Line { .. } => between.hi,
-            Self::Arc { radius, .. } => (between * radius).hi,
+            Self::Line { .. } => Interval::ONE,
+            Self::Arc { radius, .. } => radius,
         }
     }
 
     /// Returns an upper bound of the radians by which the path turns between two coordinates that are `between` apart.
     fn turning(&self, between: Interval, one: Interval, other: Interval) -> f64 {
         match *self {
-            Self::Inward { .. } | Self::Outward { .. } => {
-                let square = one.min(other).max(Interval::ZERO).square();
+            Self::Inward { shift, .. } | Self::Outward { shift, .. } => {
+                let square = shifted(one.min(other), Interval::ONE, shift).max(Interval::ZERO).square();
                 (between * (square + Interval::point(2.0)).over(square + Interval::ONE)).hi
             }
             Self::Line { .. } => 0.0,
             Self::Arc { .. } => between.hi,
         }
     }
+}
+
+/// Returns a number of a spiral, the multiple `unit` of the coordinate, with the coordinate moved by `shift`.
+fn shifted(number: Interval, unit: Interval, shift: Interval) -> Interval {
+    if shift == Interval::ZERO { number } else { number + unit * shift }
 }
 
 /// Returns the metres of a spiral from its centre to theta: a/2 (theta w + asinh theta), asinh theta = ln(theta + w).
@@ -238,42 +252,49 @@ impl ExactPath {
                 Self::inward(a, length)
             }
             PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out: _ } => {
-                Self::turnaround(*pitch, Interval::point(*turn_radius), *arc_ratio, *lead_in)
+                Self::turnaround(*pitch, Interval::point(*turn_radius), *arc_ratio, None, *lead_in)
             }
             PathDescription::Route { heading_turns, steps } => route(*heading_turns, steps),
         }
     }
 
-    /// Creates all turnarounds whose turn radius is in an interval. The inward and the outward spiral do not depend on the
-    /// radius; the arcs do.
-    pub fn turnaround(pitch: f64, turn_radius: Interval, arc_ratio: f64, lead_in: f64) -> Self {
+    /// Creates all turnarounds whose turn radius is in an interval. With `turned`, each is turned about the centre so that
+    /// A has this polar angle: then the spirals too depend on the radius, but all places move little with it.
+    pub fn turnaround(pitch: f64, turn_radius: Interval, arc_ratio: f64, turned: Option<f64>, lead_in: f64) -> Self {
         let a = Interval::point(pitch).over(pi() * 2.0);
         let theta = turn_radius.over(a);
+        let at_turn = turned.map_or(theta, Interval::point);
+        let shift = turned.map_or(Interval::ZERO, |turned| theta - Interval::point(turned));
         let both = (turn_radius.square() + a.square()).sqrt();
-        let second_radius = both.over(Interval::ONE + Interval::point(arc_ratio));
+        let ratio = Interval::point(arc_ratio);
+        let second_radius = both.over(Interval::ONE + ratio);
         let first_radius = second_radius * arc_ratio;
         let angle = atan(theta) * 2.0;
-        let turn = sin_cos_of(theta);
-        let inward = Curve::Inward { a, frame: None };
-        let (start, tangent) = (inward.point_of(exactly(theta), turn), inward.tangent_of(theta, turn));
+        let inward = Curve::Inward { a, shift, frame: None };
+        let (sine, cosine) = sin_cos_of(at_turn);
+        let start = scaled([cosine, sine], turn_radius);
+        // The tangent of the spiral, with 1 / w and theta / w as functions of theta that occurs once.
+        let radial = Interval::ONE.over((Interval::ONE + theta.square()).sqrt());
+        let around = Interval::ONE.over((Interval::ONE + Interval::ONE.over(theta.square())).sqrt());
+        let tangent = [around * sine - radial * cosine, -(around * cosine + radial * sine)];
         let right: Vector = [tangent[1], -tangent[0]];
         let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
-        // The end of arc 2 and its tangent are known. Its begin is `angle` radians back.
-        let (sine, cosine) = sin_cos_of(angle);
-        let middle = first.point_of(exactly(angle), (sine, cosine));
-        let direction = first.tangent_of(angle, (sine, cosine));
+        // Both arcs turn by the same angle, so that their chords have one direction: the junction is on the line from A
+        // to -A, which it divides as the radii.
+        let middle = scaled(start, (Interval::ONE - ratio).over(Interval::ONE + ratio));
+        let direction = first.tangent_of(angle, sin_cos_of(angle));
         let left: Vector = [-direction[1], direction[0]];
         let second = Curve::Arc { origin: middle, direction, inward: left, radius: second_radius };
         let lead_in = Interval::point(lead_in);
         let arc_end = lead_in + first_radius * angle;
         let (zero, far) = (Interval::ZERO, Interval::point(FAR));
         let segments = vec![
-            Segment { curve: inward, begin: far, end: theta, travelled: lead_in },
+            Segment { curve: inward, begin: far, end: at_turn, travelled: lead_in },
             Segment { curve: first, begin: zero, end: angle, travelled: lead_in },
             Segment { curve: second, begin: zero, end: angle, travelled: arc_end },
             Segment {
-                curve: Curve::Outward { a, frame: None },
-                begin: theta,
+                curve: Curve::Outward { a, shift, frame: None },
+                begin: at_turn,
                 end: far,
                 travelled: arc_end + second_radius * angle,
             },
@@ -284,7 +305,7 @@ impl ExactPath {
     /// Creates an inward spiral alone, of `a` metres per radian. The head reaches its end at the centre after
     /// `travelled` metres.
     pub fn inward(a: Interval, travelled: Interval) -> Self {
-        let (curve, begin) = (Curve::Inward { a, frame: None }, Interval::point(FAR));
+        let (curve, begin) = (Curve::Inward { a, shift: Interval::ZERO, frame: None }, Interval::point(FAR));
         Self { segments: vec![Segment { curve, begin, end: Interval::ZERO, travelled }] }
     }
 
@@ -342,7 +363,7 @@ impl ExactPath {
         let Place(segment, at, _) = place;
         let Segment { curve, begin, end, .. } = &self.segments[segment];
         let rate = match curve {
-            Curve::Inward { a, .. } | Curve::Outward { a, .. } => a.lo * 1f64.hypot(at),
+            Curve::Inward { a, shift, .. } | Curve::Outward { a, shift, .. } => a.lo * 1f64.hypot(at + shift.lo),
             Curve::Line { .. } => 1.0,
             Curve::Arc { radius, .. } => radius.lo,
         };
@@ -365,7 +386,10 @@ impl ExactPath {
         }
         let beyond = if metres >= 0.0 { self.after(segment) } else { self.before(segment) };
         // The first segment has no beginning to fall off.
-        beyond.unwrap_or(Place(segment, begin.middle(), 0.0))
+        let Some(beyond) = beyond else { return Place(segment, begin.middle(), 0.0) };
+        let (first, last) = if metres >= 0.0 { (place, beyond) } else { (beyond, place) };
+        let rest = metres.abs() - self.length(first, last);
+        if rest > 0.0 { self.moved(beyond, rest.copysign(metres), fine) } else { beyond }
     }
 
     /// Returns the first place that is surely on the segment after this one.
@@ -415,7 +439,23 @@ impl ExactPath {
 
     /// Returns an upper bound of the metres between two places.
     pub fn length(&self, x: Place, y: Place) -> f64 {
-        self.sum(x, y, Curve::length)
+        self.sum(x, y, |curve, between, from, to| (between * curve.metres_per_unit(from, to)).hi)
+    }
+
+    /// Returns the metres of travel per unit of the coordinate, between two places of one segment.
+    pub fn travel_per_unit(&self, x: Place, y: Place) -> Interval {
+        let curve = self.curve(x);
+        let metres = curve.metres_per_unit(x.coordinate(), y.coordinate());
+        if curve.grows() { metres } else { -metres }
+    }
+
+    /// Returns a span with all places whose coordinates are within `by` of that of a place, if they are strictly inside
+    /// its segment.
+    pub fn around(&self, place: Place, by: f64) -> Option<Span> {
+        let by = if by == 0.0 { 0.0 } else { WIDER * by + LEAST };
+        let ends = [place.plus(-by, true), place.plus(by, true)];
+        let [first, last] = if self.curve(place).grows() { ends } else { [ends[1], ends[0]] };
+        (self.is_inside(first) && self.is_inside(last)).then_some(Span(first, last))
     }
 
     /// Returns an upper bound of the radians by which the path turns between two places.
@@ -451,9 +491,13 @@ impl ExactPath {
         let Segment { curve, begin, end, travelled } = &self.segments[place.0];
         let at = place.coordinate();
         let reference = if begin.lo.is_infinite() { *end } else { *begin };
+        let between = |a: Interval, shift: Interval| {
+            let [at, reference] = [at, reference].map(|at| shifted(at, Interval::ONE, shift));
+            spiral_length(a, at) - spiral_length(a, reference)
+        };
         match *curve {
-            Curve::Inward { a, .. } => *travelled - (spiral_length(a, at) - spiral_length(a, reference)),
-            Curve::Outward { a, .. } => *travelled + (spiral_length(a, at) - spiral_length(a, reference)),
+            Curve::Inward { a, shift, .. } => *travelled - between(a, shift),
+            Curve::Outward { a, shift, .. } => *travelled + between(a, shift),
             Curve::Line { .. } => *travelled + (at - reference),
             Curve::Arc { radius, .. } => *travelled + radius * (at - reference),
         }
@@ -478,17 +522,18 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
                 let [x, y] = direction;
                 let inward = if side == Side::Left { [-y, x] } else { [y, -x] };
                 let radius = Interval::point(radius);
-                let angle = pi() * 2.0 * by;
-                turns = if side == Side::Left { turns + Interval::point(by) } else { turns - Interval::point(by) };
+                let around = of_sum(by);
+                let angle = pi() * 2.0 * around;
+                turns = if side == Side::Left { turns + around } else { turns - around };
                 let curve = Curve::Arc { origin, direction, inward, radius };
                 (curve, [zero, angle], radius * angle, (exactly(angle), sin_cos_of(angle)))
             }
             RouteStep::Spiral { side, direction: way, pitch, radius, turns: by } => {
                 let a = Interval::point(pitch).over(pi() * 2.0);
                 let [first, last] = spiral_ends(way, pitch, radius, by);
-                let ends = [first, last].map(|DoubleDouble { high, low }| Interval::point(high) + Interval::point(low));
+                let ends = [first, last].map(of_sum);
                 let [inner, outer] = if way == Direction::Inward { [ends[1], ends[0]] } else { ends };
-                let turned = Interval::point(by) + (atan(outer) - atan(inner)).over(pi() * 2.0);
+                let turned = of_sum(by) + (atan(outer) - atan(inner)).over(pi() * 2.0);
                 turns = if side == Side::Left { turns + turned } else { turns - turned };
                 let [first, last] = [first, last].map(|end| nearly(end, outer.hi));
                 let curve = spiral_from(a, way, side, (origin, direction), first);
@@ -507,12 +552,17 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
 const OF_SUMS: f64 = 1e-28;
 
 /// Returns the polar angles at the ends of a route's spiral, within a part [`OF_SUMS`] of the greater one.
-fn spiral_ends(way: Direction, pitch: f64, radius: f64, turns: f64) -> [DoubleDouble; 2] {
+fn spiral_ends(way: Direction, pitch: f64, radius: f64, turns: DoubleDouble) -> [DoubleDouble; 2] {
     let DoubleDouble { high, low } = DoubleDouble::quotient(radius, pitch);
     let first = DoubleDouble::from_turns(high).plus(std::f64::consts::TAU * low);
     let sign = if way == Direction::Inward { -1.0 } else { 1.0 };
     let around = DoubleDouble::from_turns(turns);
     [first, first.plus(sign * around.high).plus(sign * around.low)]
+}
+
+/// Returns an enclosure of a sum of two doubles.
+fn of_sum(DoubleDouble { high, low }: DoubleDouble) -> Interval {
+    if low == 0.0 { Interval::point(high) } else { Interval::point(high) + Interval::point(low) }
 }
 
 /// Returns a polar angle with the error of [`spiral_ends`] as a sum of two numbers, and its sine and cosine.
@@ -531,8 +581,8 @@ fn spiral_from(
     (first, sin_cos): ([Interval; 2], (Interval, Interval)),
 ) -> Curve {
     let of = |frame| match way {
-        Direction::Inward => Curve::Inward { a, frame },
-        Direction::Outward => Curve::Outward { a, frame },
+        Direction::Inward => Curve::Inward { a, shift: Interval::ZERO, frame },
+        Direction::Outward => Curve::Outward { a, shift: Interval::ZERO, frame },
     };
     let is_mirrored = (way == Direction::Outward) != (side == Side::Left);
     let about_origin = of(None);

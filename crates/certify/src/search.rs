@@ -19,7 +19,10 @@ use bench_dragon_motion::model::path::Path;
 pub(super) const AROUND: f64 = 1e-10;
 
 /// Distance that doubles can resolve, as a share of the path length in metres.
-pub(super) const LEAST: f64 = 1e-13;
+pub(super) const LEAST: f64 = 1e-14;
+
+/// Rounding of a time, as a share of one second and the time.
+const OF_TIMES: f64 = 1e-14;
 
 /// The shortest step, as a share of the path length in metres.
 pub(super) const LEAST_STEP: f64 = 2e-15;
@@ -30,6 +33,9 @@ pub(super) const BESIDE: f64 = 0.1;
 /// Factors of the step length after a step that is shown, and after a step that is not.
 pub(super) const GROWTH: f64 = 1.3;
 pub(super) const SHRINK: f64 = 0.5;
+
+/// Limit of the spans in the steps about one dragon: some 400 MB.
+pub(super) const MOST_SPANS: usize = 10_000_000;
 
 /// Distance from an event, in links, within which a failed step is explained by the event.
 pub(super) const NEAR: f64 = 1e-3;
@@ -57,6 +63,8 @@ pub(super) struct CertificateSearch<'a, 'w> {
     /// Length of the next step to try, metres.
     step: f64,
     steps: u64,
+    /// Spans that were written.
+    written: usize,
 }
 
 /// What the lines about one dragon prove.
@@ -123,7 +131,16 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             of_obstacles,
             step,
             steps: 0,
+            written: 0,
         }
+    }
+
+    /// Leaves boards out: nothing is claimed of a contact.
+    pub fn without_boards(mut self) -> Self {
+        self.clear = false;
+        let because = "boards are left out".to_owned();
+        self.proofs[EventKind::Contact as usize] = Some(Status::Undecided { time_lo: 0.0, because });
+        self
     }
 
     /// Writes the certificate and returns what it proves.
@@ -167,8 +184,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     /// Proves the whole motion, event by event.
     fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
         let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
-        // A search of a long path may end with its most steps long before the path does.
-        let mut progress = |at: f64, steps: f64| progress((at / end).max(steps).clamp(0.0, 1.0));
+        // A search of a long path, or of a long team, may end with its limits long before the path does.
+        let mut progress = |at: f64, used: f64| progress((at / end).max(used).clamp(0.0, 1.0));
         for event in self.given.events {
             match event.kind {
                 EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
@@ -204,7 +221,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     fn time(&self, place: Place) -> Interval {
         let time = self.chain.exact.travelled(place).over(Interval::point(self.given.head_speed));
         // Covers the rounding of a `lead_in` that the scene gives in other digits.
-        let slack = 1e-14 * (1.0 + time.magnitude());
+        let slack = OF_TIMES * (1.0 + time.magnitude());
         let (lo, hi) = (time.lo - slack, time.hi + slack);
         match self.given.dragon {
             // At its start it is from 0 on.
@@ -279,7 +296,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     }
 
     /// Goes in steps to a grid point, or so near to an event that the event prevents a step. A claim that cannot be
-    /// shown with any step length is given up. `progress` receives the travel and the share of the most steps.
+    /// shown with any step length is given up. `progress` receives the travel and the share of the limits.
     fn go_to_point(
         &mut self,
         target: &GridPoint,
@@ -288,19 +305,23 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     ) -> Result<(), Halt> {
         let least = LEAST_STEP * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
-        while self.at.head != target.head {
+        while self.chain.exact.is_before(self.at.head, target.head) {
             let remaining = target.travelled - self.at.travelled;
+            if let Some(lock) = event.filter(|event| event.kind == EventKind::Lock) {
+                // The window of the lock must be around the spans of the last step.
+                self.step = self.step.min((0.5 * (lock.travelled - self.at.travelled)).max(least));
+            }
             let mut to = if self.step >= 0.9 * remaining {
                 target.clone()
             } else {
-                self.grid_point(self.at.travelled + self.step)
+                self.at.further(self.chain.path, &self.chain.exact, self.step)
             };
             let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
             match self.chain.show(&mut self.at, &mut to, claim, &self.free) {
                 Ok(shown) => {
                     self.accept(to, shown)?;
                     self.step = (self.step * GROWTH).min(longest);
-                    progress(self.at.travelled, self.steps as f64 / self.given.most_steps as f64);
+                    progress(self.at.travelled, self.used());
                 }
                 Err(obstacle) if self.step.min(remaining) > least => {
                     self.step = SHRINK * self.step.min(remaining);
@@ -321,6 +342,12 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
+    /// Returns the share of its limits that the search has used.
+    fn used(&self) -> f64 {
+        let of_steps = self.steps as f64 / self.given.most_steps as f64;
+        of_steps.max(self.written as f64 / self.given.most_spans as f64)
+    }
+
     fn accept(&mut self, to: GridPoint, shown: Shown) -> Result<(), Halt> {
         let Shown { step, body_forward } = shown;
         let exact = &self.chain.exact;
@@ -338,12 +365,21 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let line = CertificateLine::Step(step);
         (self.write)(&line)?;
         if let CertificateLine::Step(step) = line {
+            self.written += step.spans.len();
             self.spans = step.spans;
         }
         self.at = to;
         self.steps += 1;
         if self.steps > self.given.most_steps {
             return Err(Halt::Stuck(format!("the search was given up after {} steps", self.steps)));
+        }
+        if self.written > self.given.most_spans {
+            let because = format!(
+                "the search was given up after {} steps: its certificate has more than {:e} places of handles",
+                self.steps,
+                2 * self.given.most_spans
+            );
+            return Err(Halt::Stuck(because));
         }
         Ok(())
     }
@@ -397,7 +433,9 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let [bench_a, bench_b] = benches.map(|bench| bench.map(|bench| bench as usize));
         let (time_lo, time_hi) = (self.time(from).lo, self.time(to).hi);
         let because = (time_hi - time_lo > WIDE).then(|| {
-            let resolved = 3.0 * LEAST * (1.0 + self.given.path.length()) / self.given.head_speed;
+            let around = LEAST * (1.0 + self.given.path.length()) / self.given.head_speed;
+            // Handles and boards have the rounding of several operations on each side of an event.
+            let resolved = 10.0 * around + 2.0 * OF_TIMES * (1.0 + time_hi);
             match event {
                 _ if time_hi - time_lo <= resolved => {
                     let metres = self.given.path.length();

@@ -216,7 +216,7 @@ impl<'c, 'a> Listed<'c, 'a> {
     fn ring(&self, handle: usize) -> f64 {
         let Place(segment, theta, _) = self.handles[handle].span.1;
         match self.chain.exact.segments[0].curve {
-            Curve::Inward { a, .. } if segment == 0 => (a * theta).lo,
+            Curve::Inward { a, shift, .. } if segment == 0 => (a * theta + a * shift).lo,
             _ => f64::NEG_INFINITY,
         }
     }

@@ -1,9 +1,13 @@
-//! Intervals against numbers of 192 bits, and elementary functions against another library.
+//! Intervals against numbers of 192 bits, and elementary functions against another library; the limit of places.
 
 use astro_float::{BigFloat, Consts, RoundingMode};
 
 use super::elementary::{atan, ln, pi, sin_cos};
 use super::interval::Interval;
+use super::search::{CertificateSearch, MOST_SPANS};
+use super::{CertificateLine, Given, MOST_STEPS, Status};
+use bench_dragon_motion::event::Event;
+use bench_dragon_show::scene::Scene;
 
 const BITS: usize = 192;
 const ROUNDING: RoundingMode = RoundingMode::ToEven;
@@ -108,4 +112,45 @@ fn elementary_functions_hold_what_192_bits_find() {
         let (atan, ln) = (atan(x), ln(x));
         assert!(atan.hi - atan.lo < 4e-14 && ln.hi - ln.lo < 2e-13, "{positive}: {atan:?} {ln:?}");
     }
+}
+
+/// The limit of places ends a search: each result says up to when it holds, and why not further.
+#[test]
+fn a_certificate_with_too_many_places_says_so() {
+    let scene = Scene::paper();
+    let motion = &scene.motion;
+    let timeline = motion.timeline(&mut |_| ());
+    let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
+    let certified = |most_spans: usize| {
+        let given = Given {
+            scene: "",
+            description: motion.description(),
+            path: motion.path(),
+            team: motion.team(),
+            head_speed: motion.head_speed(),
+            events: &events,
+            most_steps: MOST_STEPS,
+            most_spans,
+            dragon: None,
+        };
+        let mut spans = 0;
+        let mut count = |line: &CertificateLine| {
+            if let CertificateLine::Step(step) = line {
+                spans += step.spans.len();
+            }
+            Ok(())
+        };
+        let events = CertificateSearch::new(given, Vec::new(), &mut count).run(&mut |_| ()).unwrap();
+        (events, spans)
+    };
+    let (events, spans) = certified(5000);
+    // No step has more spans than the team has benches.
+    assert!(spans > 5000 && spans <= 5000 + motion.team().benches, "{spans}");
+    assert_eq!(events.len(), 4);
+    for event in &events {
+        let Status::Undecided { time_lo, because } = &event.status else { panic!("{event:?}") };
+        assert!(*time_lo > 1.0 && because.contains("its certificate has more than 1e4 places of handles"), "{event:?}");
+    }
+    let (events, spans) = certified(MOST_SPANS);
+    assert!(spans > 10_000 && !events.iter().any(|event| matches!(event.status, Status::Undecided { .. })), "{spans}");
 }

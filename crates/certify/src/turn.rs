@@ -4,13 +4,17 @@
 use std::cell::Cell;
 
 use super::Given;
-use super::capsule::{Capsule, Span};
+use super::boards::Shape;
+use super::capsule::{Capsule, Span, Spanned};
+use super::clearance::Descent;
+use super::elementary::pi;
+use super::first_order::{FirstOrderBoard, FirstOrderHandle, When};
 use super::grid::GridPoint;
-use super::interval::{Interval, Vector, dot, minus, norm, norm_squared};
-use super::lines::{CertifiedEvent, Links, Status};
-use super::path::{ExactPath, Place};
+use super::interval::{Interval, Vector, dot, minus, norm, norm_squared, plus, scaled};
+use super::lines::{CertificateLine, CertifiedEvent, Links, Status};
+use super::path::{Curve, ExactPath, Place};
 use super::pitch::clear_beyond;
-use super::search::CertificateSearch;
+use super::search::{CertificateSearch, MOST_SPANS, path_end};
 use super::step::{Chain, Claim, Listed, links_of};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Event;
@@ -23,19 +27,34 @@ use bench_dragon_motion::model::team::Team;
 const MOST_STRETCHES: u32 = 2_000;
 const MOST_HALVINGS: u32 = 48;
 
+/// The metres by which places are uncertain as a multiple of those of the points, with room for terms of the second
+/// order. Two points count, each with half of its width.
+const BLUR: f64 = 1.1;
+
 /// All turnarounds of a team whose turn radius is in an interval.
 pub(crate) struct Turns<'a> {
     team: &'a Team,
+    /// a = pitch / 2 pi, metres per radian.
+    a: Interval,
+    radius: Interval,
     exact: ExactPath,
-    /// The turnarounds with the least and the greatest radius. They only give the starting guess of the handles.
-    ends: [Path; 2],
+    /// The turnaround with the middle radius.
+    middle: ExactPath,
+    /// The same in doubles. It only gives the starting guess of the handles.
+    path: Path,
 }
 
 impl<'a> Turns<'a> {
-    /// Creates the turnarounds between two paths, of this pitch and arc ratio and with these turn radii.
-    pub fn new(team: &'a Team, (pitch, arc_ratio): (f64, f64), radii: [f64; 2], ends: [Path; 2]) -> Self {
-        let exact = ExactPath::turnaround(pitch, Interval { lo: radii[0], hi: radii[1] }, arc_ratio, 0.0);
-        Self { team, exact, ends }
+    /// Creates the turnarounds of this pitch and arc ratio with turn radii between two. `path` is that with the middle
+    /// radius. Places of an arc are those of `path`. A place of a spiral is that of `path` at the same polar angle behind A
+    /// or beyond -A.
+    pub fn new(team: &'a Team, (pitch, arc_ratio): (f64, f64), radii: [f64; 2], path: Path) -> Self {
+        let radius = Interval { lo: radii[0], hi: radii[1] };
+        let a = Interval::point(pitch).over(pi() * 2.0);
+        let middle = Interval::point(radius.middle());
+        let turned = middle.over(a).middle();
+        let turnarounds = |radius: Interval| ExactPath::turnaround(pitch, radius, arc_ratio, Some(turned), 0.0);
+        Self { team, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
     }
 
     /// Returns true if, with every radius, a link surely stalls or locks that passes over `pivot` with one handle, the
@@ -59,36 +78,109 @@ impl<'a> Turns<'a> {
     }
 
     /// Returns true if, with every radius, two boards are proved to have a point in common while the head is at a
-    /// place, if it comes there without a lock.
-    pub fn overlap(&self, head: Place, benches: [usize; 2]) -> bool {
-        let handle = benches[1] + 1;
-        if benches[0] + 2 > benches[1] || benches[1] >= self.team.benches || !self.exact.is_inside(head) {
+    /// place, if it comes there without a lock. That is `head` with the middle radius, and its coordinate grows by `rate`
+    /// per metre of the radius.
+    pub fn overlap(&self, (head, rate): (Place, f64), [a, b]: [usize; 2]) -> bool {
+        if a + 2 > b || b >= self.team.benches {
             return false;
         }
-        let [mut first, mut last] = [GridPoint::at(head, 0.0), GridPoint::at(head, 0.0)];
-        let solved = first.extend_to(handle, &self.ends[0], self.team);
-        if solved.and_then(|()| last.extend_to(handle, &self.ends[1], self.team)).is_err() {
-            return false;
-        }
-        let chain = Chain::new(&self.ends[0], self.exact.clone(), self.team);
-        let claim = Claim { links: Links::All, moving: false, clear: false };
-        let mut listed = Listed::new(&chain, Span(head, head), f64::INFINITY).with_slack(self.blur());
-        while listed.handles.len() <= handle {
-            if listed.extend(&mut first, &mut last, claim).is_err() {
-                return false;
+        let half = self.half_width();
+        let Some(heads) = self.exact.around(head, (Interval::point(rate.abs()) * half).hi) else { return false };
+        // A step of no metres has the narrowest spans.
+        let handles = |exact: &ExactPath, Span(first, last): Span, (metres, slack): (f64, f64)| {
+            let chain = Chain::new(&self.path, exact.clone(), self.team);
+            let claim = Claim { links: Links::All, moving: false, clear: false };
+            let mut listed = Listed::new(&chain, Span(first, last), metres).with_slack(slack);
+            let [mut first, mut last] = [first, last].map(|head| GridPoint::at(head, 0.0));
+            while listed.handles.len() <= b + 1 {
+                listed.extend(&mut first, &mut last, claim).ok()?;
             }
-        }
-        chain.common_point(&listed.handles, benches).is_some()
+            Some(listed.handles)
+        };
+        let still = handles(&self.middle, Span(head, head), (0.0, 0.0));
+        let all = handles(&self.exact, heads, (f64::INFINITY, self.blur()));
+        let (Some(still), Some(all)) = (still, all) else { return false };
+        let Some(velocities) = self.velocities(&all, rate) else { return false };
+        let handle = |number: usize| FirstOrderHandle::moving(&still[number].capsule, velocities[number], half);
+        let shape = Shape::new(self.team);
+        let board = |bench: usize| {
+            let link = links_of(self.team)[bench.min(1)];
+            FirstOrderBoard::new(&shape, handle(bench), handle(bench + 1), link, half)
+        };
+        board(a).at_most(&board(b), When::Always) < 0.0
     }
 
-    /// Returns the metres by which a point of an arc is uncertain, as the radius is.
+    /// Returns the velocities of handles in metres per metre of the radius: "Velocities" in Lemma 10. `handles` are
+    /// spans for all radii. The coordinate of the head grows by `rate` per metre of the radius.
+    fn velocities(&self, handles: &[Spanned], rate: f64) -> Option<Vec<Vector>> {
+        let moved = |handle: &Spanned, along: Interval| {
+            let turned = Interval::within(handle.capsule.turned().hi);
+            Some(plus(self.drift(handle)?, scaled(handle.capsule.tangent.map(|part| part + turned), along)))
+        };
+        let Span(first, last) = handles[0].span;
+        let mut velocities = vec![moved(&handles[0], self.exact.travel_per_unit(first, last) * rate)?];
+        for pair in handles.windows(2) {
+            let [front, rear] = [&pair[0].capsule, &pair[1].capsule];
+            let slack = Interval::within(front.slack(rear).hi);
+            let link = minus(front.point, rear.point).map(|part| part + slack);
+            let along = dot(link, minus(*velocities.last()?, self.drift(&pair[1])?)).over(front.product(rear, true));
+            velocities.push(moved(&pair[1], along)?);
+        }
+        velocities.iter().flatten().all(|part| part.magnitude().is_finite()).then_some(velocities)
+    }
+
+    /// Returns the velocities of the places of a span, each with its coordinate, in metres per metre of the radius:
+    /// "Velocities" in Lemma 10.
+    fn drift(&self, handle: &Spanned) -> Option<Vector> {
+        let Span(first, last) = handle.span;
+        let around = |place: Place, reach: f64| {
+            let point = self.exact.point(place);
+            let (velocity, rate) = match *self.exact.curve(place) {
+                Curve::Arc { origin, .. } => {
+                    let square = self.radius.square() + self.a.square();
+                    let a = if place.0 == 1 { self.a } else { -self.a };
+                    let [x, y] = minus(point, origin);
+                    let turned = [self.radius * x - a * y, self.radius * y + a * x].map(|part| part.over(square));
+                    let own = origin.map(|part| part.over(self.radius));
+                    (plus(own, turned), Interval::ONE.over(square.sqrt()))
+                }
+                _ => {
+                    let distance = norm(point);
+                    let nearest = distance - Interval::point(reach);
+                    if !nearest.is_positive() {
+                        return None;
+                    }
+                    (point.map(|part| part.over(distance)), Interval::ONE.over(nearest))
+                }
+            };
+            let off = Interval::within((rate * reach).hi);
+            Some(velocity.map(|part| part + off))
+        };
+        let half = handle.capsule.half;
+        if first.0 == last.0 {
+            return around(handle.capsule.middle, half);
+        }
+        let [one, other] = [around(first, 2.0 * half)?, around(last, 2.0 * half)?];
+        let hull =
+            |axis: usize| Interval { lo: one[axis].lo.min(other[axis].lo), hi: one[axis].hi.max(other[axis].hi) };
+        (first.0 + 1 == last.0).then(|| [hull(0), hull(1)])
+    }
+
+    /// Returns an upper bound of the distance of a radius from the middle one, metres.
+    fn half_width(&self) -> f64 {
+        (self.radius - Interval::point(self.radius.middle())).magnitude()
+    }
+
+    /// Returns the metres by which a point of the path is uncertain, as the radius is.
     fn blur(&self) -> f64 {
-        let ends = self.exact.segments.iter().map(|segment| segment.end.lo);
-        let widths = ends.enumerate().skip(1).take(2).map(|(segment, angle)| {
-            let [x, y] = self.exact.point(Place(segment, 0.5 * angle, 0.0));
+        let segments = &self.exact.segments;
+        let ends = [1, 2].map(|segment| Place(segment, segments[segment].end.lo, 0.0));
+        let places = [ends[0], ends[1], Place(3, segments[3].begin.hi, 0.0)];
+        let widths = places.map(|place| {
+            let [x, y] = self.exact.point(place);
             (x.hi - x.lo).hypot(y.hi - y.lo)
         });
-        2.0 * widths.fold(0.0, f64::max)
+        BLUR * widths.into_iter().fold(0.0, f64::max)
     }
 }
 
@@ -167,8 +259,9 @@ impl Passage {
         }
     }
 
-    /// Returns true if the passage is proved to be free of contact, stall and lock.
-    pub fn is_free(&self, team: &Team, progress: &mut dyn FnMut(f64)) -> bool {
+    /// Returns true if the passage is proved to be free of contact, stall and lock, and the last bench to have turned
+    /// at its end. Boards are bounded to the first order if `closely` is true, which passes boards that all but touch.
+    pub fn is_free(&self, team: &Team, closely: bool, progress: &mut dyn FnMut(f64)) -> bool {
         let travelled = self.path.length();
         let end = Event { kind: EventKind::PathEnd, travelled, bench_a: None, bench_b: None, place: None };
         let given = Given {
@@ -179,12 +272,39 @@ impl Passage {
             head_speed: 1.0,
             events: &[end],
             most_steps: MOST_STEPS,
+            most_spans: MOST_SPANS,
             dragon: None,
         };
-        let is_none = |event: &CertifiedEvent| {
-            event.event == EventKind::PathEnd || matches!(event.status, Status::None { time_lo: None })
+        let is_none = |event: &CertifiedEvent| match event.event {
+            EventKind::PathEnd => true,
+            EventKind::Contact if closely => true,
+            _ => matches!(event.status, Status::None { time_lo: None }),
         };
-        let found = CertificateSearch::new(given, Vec::new(), &mut |_| Ok(())).run(progress);
-        found.is_ok_and(|events| events.iter().all(is_none))
+        let mut last = None;
+        let mut keep = |line: &CertificateLine| {
+            if let CertificateLine::Step(step) = line {
+                last = Some(step.to);
+            }
+            Ok(())
+        };
+        let search = CertificateSearch::new(given, Vec::new(), &mut keep);
+        let search = if closely { search.without_boards() } else { search };
+        let found = search.run(progress);
+        if !found.is_ok_and(|events| events.iter().all(is_none)) {
+            return false;
+        }
+        let Some(mut at) = last.map(|head| GridPoint::at(head, travelled)) else { return false };
+        let exact = ExactPath::new(&self.description);
+        let chain = || Chain::new(&self.path, exact.clone(), team);
+        let descent = || Descent::new(chain(), travelled, MOST_STEPS, None);
+        if closely && !descent().stays_clear_to(&path_end(&exact, &self.path), progress) {
+            return false;
+        }
+        let chain = chain();
+        let handles = chain.spans(&mut at.clone(), &mut at, team.benches);
+        handles.is_some_and(|handles| handles.last().is_some_and(|last| last.span.0.0 + 1 == self.path.segments()))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -25,6 +25,8 @@ const OPEN_INTERVAL: Duration = Duration::from_millis(100);
 /// How long a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come once a
 /// second.
 const QUIET: Duration = Duration::from_millis(1500);
+/// How long an alert waits for the stage of its run, which names its benches: over a tunnel, stages come once a second.
+const STAGE_PATIENCE: Duration = Duration::from_millis(1500);
 
 /// The frames since the last poll that are handed over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +78,7 @@ pub enum FeedEvent<'a> {
         /// The text, TOML; empty if it is not known.
         text: &'a str,
     },
-    /// An alert.
+    /// An alert, after the stage of its run if the stage comes within 1.5 s.
     Alert(&'a CollisionAlert),
     /// A cue that the show has reached. A feed that connects later gets the latest one.
     Cue(&'a Cue),
@@ -162,6 +164,9 @@ struct Connected {
     scene: Option<u64>,
     alert: Option<(u64, u64, u32)>,
     cue: Option<(u64, u64, u32)>,
+    /// Alerts that wait for the stage of their run, and the moment since which they wait.
+    early: Vec<CollisionAlert>,
+    early_since: Instant,
 }
 
 impl Feed {
@@ -262,6 +267,8 @@ impl Feed {
             scene: None,
             alert: None,
             cue: None,
+            early: Vec::new(),
+            early_since: now,
         });
         Ok(())
     }
@@ -286,6 +293,8 @@ impl Connected {
             scene: latest_scene,
             alert: latest_alert,
             cue: latest_cue,
+            early,
+            early_since,
             ..
         } = self;
         if connection.hold_statuses() {
@@ -295,6 +304,13 @@ impl Connected {
             *received = true;
             handle(event);
         };
+        if early.is_empty() {
+            *early_since = Instant::now();
+        }
+        // Taken out before the stage and the frames, since the publisher sends alerts after these.
+        while let Some(alert) = connection.alert() {
+            early.push(alert);
+        }
         while let Some(sample) = connection.stage() {
             let (stage, segments) = (sample.user_header(), sample.payload());
             connection.expect_cues(stage.cues > 0);
@@ -324,10 +340,15 @@ impl Connected {
         if any {
             liveness.frame_at(Instant::now());
         }
-        while let Some(alert) = connection.alert() {
-            let of = Some((alert.run_id, alert.tick, alert.level));
-            if std::mem::replace(latest_alert, of) != of {
-                handle(FeedEvent::Alert(&alert));
+        let is_early = |alert: &CollisionAlert| {
+            sequence.run() == Some(alert.run_id) && latest_stage.is_none_or(|(run_id, _)| run_id != alert.run_id)
+        };
+        if early_since.elapsed() >= STAGE_PATIENCE || !early.iter().any(is_early) {
+            for alert in early.drain(..) {
+                let of = Some((alert.run_id, alert.tick, alert.level));
+                if std::mem::replace(latest_alert, of) != of {
+                    handle(FeedEvent::Alert(&alert));
+                }
             }
         }
         while let Some(cue) = connection.cue() {

@@ -2,7 +2,8 @@
 
 use super::benches;
 use super::camera::StageBox;
-use super::palette::colours_of;
+use super::light::Light;
+use super::palette::{colours_of, lights_of};
 use bench_dragon_messages::Roster;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble};
@@ -12,8 +13,10 @@ use bench_dragon_motion::solve::Chain;
 /// The dragons of a picture, in the order of their handles.
 pub struct Dragons<'a> {
     drawn: Vec<Drawn<'a>>,
-    /// The colour of each dragon, if there are several.
+    /// The colour of each dragon by day, if there are several.
     colours: Vec<&'static str>,
+    /// The light of the lanterns of each dragon by night.
+    lights: Vec<Light>,
     /// The names of benches.
     pub roster: Roster,
 }
@@ -31,7 +34,8 @@ pub struct Drawn<'a> {
 impl<'a> Dragons<'a> {
     /// Creates the only dragon of a picture.
     pub fn one(motion: &'a Motion) -> Self {
-        Self { drawn: vec![Drawn { name: "", first: 0, motion }], colours: Vec::new(), roster: motion.roster() }
+        let drawn = vec![Drawn { name: "", first: 0, motion }];
+        Self { drawn, colours: Vec::new(), lights: vec![Light::fire()], roster: motion.roster() }
     }
 
     /// Creates the dragons of a show of several.
@@ -43,7 +47,9 @@ impl<'a> Dragons<'a> {
         };
         let drawn: Vec<Drawn> = ensemble.dragons().iter().enumerate().map(drawn).collect();
         let names: Vec<&str> = drawn.iter().map(|of| of.name).collect();
-        Self { colours: colours_of(&names), drawn, roster: ensemble.roster() }
+        let lights =
+            lights_of(&names).into_iter().enumerate().map(|(number, light)| Light::of(number, light)).collect();
+        Self { colours: colours_of(&names), lights, drawn, roster: ensemble.roster() }
     }
 
     /// Returns the dragons.
@@ -103,6 +109,11 @@ impl<'a> Dragons<'a> {
     /// Returns the colour of a bench's dragon, if there are several.
     pub fn colour(&self, bench: usize) -> Option<&'static str> {
         self.colours.get(self.owner(bench).0).copied()
+    }
+
+    /// Returns the lights of the dragons' lanterns, in the order of the dragons.
+    pub(super) fn lights(&self) -> &[Light] {
+        &self.lights
     }
 
     /// Returns the name of a bench in the picture: for heads, tails, and touching benches if they are few.

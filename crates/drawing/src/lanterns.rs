@@ -10,6 +10,8 @@ use svg::node::element::{
 
 use super::benches;
 use super::camera::StageBox;
+use super::dragons::Dragons;
+use super::light::{Light, css};
 use super::{Drawing, WIDTH, metres, rounded};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
@@ -55,16 +57,19 @@ impl Drawing<'_> {
         let longest = dragons.all().iter().map(|of| of.motion.team().head_length).fold(0.0, f64::max);
         let view = self.camera.view().padded(POOL + 0.5 * longest);
         let boards = dragons.seen(chain, &view);
-        let mut document = self.document(time, chain, &super::palette::DARK).add(definitions());
+        let mut document = self.document(time, chain, &super::palette::DARK).add(definitions(dragons.lights()));
         let black = Rectangle::new().set("width", WIDTH).set("height", rounded(self.height, 4)).set("fill", "#000000");
         document = document.add(black);
         let all_benches = dragons.all().iter().map(|of| of.motion.team().benches).sum();
         let is_head = |bench: usize| dragons.is_head(bench);
-        let stage = self.stage().add(ground(&boards, is_head, &view, exposure(all_benches, chain)));
+        let stage = self.stage().add(ground(&boards, dragons, &view, exposure(all_benches, chain)));
         let mut stage = self.with_obstacles(stage, &super::palette::DARK);
         let mut wood = Group::new().set("id", "benches");
+        let lights = dragons.lights();
+        let light_of = |bench: usize| &lights[dragons.owner(bench).0];
         for (bench, board) in boards.iter().rev() {
-            let outer = benches::polygon(board).set("id", format!("bench-{bench}")).set("fill", "#7a3518");
+            let outer = benches::polygon(board).set("id", format!("bench-{bench}"));
+            let outer = outer.set("fill", light_of(*bench).edge.as_str());
             let inner = Board { half_length: board.half_length - 0.02, half_width: 0.87 * board.half_width, ..*board };
             wood = wood.add(outer).add(benches::polygon(&inner).set("fill", "#1c0605"));
         }
@@ -82,9 +87,13 @@ impl Drawing<'_> {
             let places: &[f64] = if is_head(*bench) { &ON_HEAD } else { &ON_BODY };
             for (number, share) in places.iter().enumerate() {
                 let at = board.centre + share * board.half_length * board.axis;
-                let (halo, lamp) = if number == 1 { ("halo-gold", "gold") } else { ("halo-red", "red") };
-                halos = halos.add(used(halo).set("x", metres(at.x)).set("y", metres(at.y)));
-                lamps = lamps.add(used(lamp).set("transform", turned(at)));
+                let suffix = &light_of(*bench).suffix;
+                let (halo, lamp) = match number {
+                    1 => ("halo-gold".to_owned(), "gold".to_owned()),
+                    _ => (format!("halo-red{suffix}"), format!("red{suffix}")),
+                };
+                halos = halos.add(used(&halo).set("x", metres(at.x)).set("y", metres(at.y)));
+                lamps = lamps.add(used(&lamp).set("transform", turned(at)));
             }
         }
         stage = stage.add(wood).add(people).add(halos).add(lamps);
@@ -109,25 +118,46 @@ fn used(name: &str) -> Use {
     Use::new().set("href", format!("#{name}"))
 }
 
-/// Returns the paving in the light of the pools.
-fn ground(boards: &[(usize, Board)], is_head: impl Fn(usize) -> bool, view: &StageBox, exposure: f64) -> Group {
-    let whole = || {
-        let corner = Rectangle::new().set("x", metres(view.least.x)).set("y", metres(view.least.y));
-        corner.set("width", metres(view.width())).set("height", metres(view.height()))
-    };
-    let mut mask = Mask::new().set("id", "light").set("maskUnits", "userSpaceOnUse");
+/// Returns the paving in the light of the pools: the light of each of several dragons on top of those before it.
+fn ground(boards: &[(usize, Board)], dragons: &Dragons, view: &StageBox, exposure: f64) -> Group {
+    let lights = dragons.lights();
+    let mut group = Group::new().set("id", "ground");
+    for (number, light) in lights.iter().enumerate() {
+        let own = boards.iter().filter(|(bench, _)| dragons.owner(*bench).0 == number);
+        group = lit(group, own, dragons, view, exposure, light);
+    }
+    group
+}
+
+/// Adds the pools of light of a dragon, as a mask, and the paving in their light.
+fn lit<'a>(
+    ground: Group,
+    boards: impl Iterator<Item = &'a (usize, Board)>,
+    dragons: &Dragons,
+    view: &StageBox,
+    exposure: f64,
+    light: &Light,
+) -> Group {
+    let Light { suffix, tint, .. } = light;
+    let mut mask = Mask::new().set("id", format!("light{suffix}")).set("maskUnits", "userSpaceOnUse");
     for (attribute, value) in
         [("x", view.least.x), ("y", view.least.y), ("width", view.width()), ("height", view.height())]
     {
         mask = mask.set(attribute, metres(value));
     }
     for (bench, board) in boards {
-        let head = if is_head(*bench) { 1.3 } else { 1.0 };
+        let head = if dragons.is_head(*bench) { 1.3 } else { 1.0 };
         let pool = used("pool").set("x", metres(board.centre.x)).set("y", metres(board.centre.y));
         mask = mask.add(pool.set("opacity", rounded((exposure * head).min(1.0), 3)));
     }
-    let paving = whole().set("fill", "url(#paving)").set("mask", "url(#light)");
-    Group::new().set("id", "ground").add(mask).add(paving)
+    let mut paving = Rectangle::new().set("x", metres(view.least.x)).set("y", metres(view.least.y));
+    paving = paving.set("width", metres(view.width())).set("height", metres(view.height()));
+    paving = paving.set("fill", format!("url(#paving{suffix})")).set("mask", format!("url(#light{suffix})"));
+    if tint.is_some() {
+        // The lights of several dragons add up.
+        paving = paving.set("style", "mix-blend-mode:screen");
+    }
+    ground.add(mask).add(paving)
 }
 
 /// Returns the head with its pearl, or the tail.
@@ -156,14 +186,37 @@ fn crown(board: &Board, head: bool) -> Group {
     group.add(pearl(0.6, "url(#white)").set("style", "mix-blend-mode:screen")).add(pearl(0.15, "url(#pearl)"))
 }
 
+/// Returns the paving in a light, as a pattern: without a tint warm light on grey stone.
+fn paving(Light { suffix, tint, .. }: &Light) -> Pattern {
+    let stone = |share: f64, warm: &str| match tint {
+        Some(light) => css(light.map(|part| (f64::from(part) * share).round() as u8)),
+        None => warm.to_owned(),
+    };
+    let tile = |pattern: Pattern| pattern.set("width", 2.4).set("height", 1.6);
+    let joints = Rectangle::new().set("width", 2.4).set("height", 1.6).set("fill", stone(0.12, "#1f0f06"));
+    let pattern = Pattern::new().set("id", format!("paving{suffix}")).set("patternUnits", "userSpaceOnUse");
+    let slabs = [
+        (0.0, 0.0, 1.2, 0.72, "#b8602c"),
+        (1.2, 0.0, 1.2, 0.65, "#a65528"),
+        (-0.6, 0.8, 1.2, 0.61, "#9c4f25"),
+        (0.6, 0.8, 1.2, 0.75, "#c0662f"),
+        (1.8, 0.8, 1.2, 0.61, "#9c4f25"),
+    ];
+    slabs.into_iter().fold(tile(pattern).add(joints), |pattern, (x, y, width, share, warm)| {
+        let slab = Rectangle::new().set("x", rounded(x + 0.011, 3)).set("y", rounded(y + 0.011, 3)).set("rx", 0.03);
+        let slab = slab.set("width", rounded(width - 0.022, 3)).set("height", 0.778);
+        pattern.add(slab.set("fill", stone(share, warm)))
+    })
+}
+
 fn shades(name: &str, stops: &[(f64, &str, f64)]) -> RadialGradient {
     stops.iter().fold(RadialGradient::new().set("id", name), |gradient, (at, colour, opacity)| {
         gradient.add(Stop::new().set("offset", *at).set("stop-color", *colour).set("stop-opacity", *opacity))
     })
 }
 
-/// Returns the paving, the lanterns, the dancers and the light that the picture uses many times.
-fn definitions() -> Definitions {
+/// Returns the paving, the lanterns, the dancers and the lights that the picture uses many times.
+fn definitions(lights: &[Light]) -> Definitions {
     // (1 + (q / h)^2)^-1.5 of a near and a high lamp, as in sprites.js.
     let lamp = |q: f64, height: f64| (1.0 + (q / height).powi(2)).powf(-1.5);
     let light = |q: f64| 0.72 * lamp(q, 0.5) + 0.28 * lamp(q, 1.3);
@@ -174,7 +227,7 @@ fn definitions() -> Definitions {
             ((at * 1e4).round() / 1e4, "#ffffff", (left * 1e4).round() / 1e4)
         })
         .collect();
-    let halo = |name: &str, core: &'static str, skirt: &'static str| {
+    let halo = |name: &str, core: &str, skirt: &str| {
         let stops = [
             (0.0, core, 0.62),
             (0.12, core, 0.43),
@@ -188,20 +241,6 @@ fn definitions() -> Definitions {
     let disc = |name: &str, radius: f64, fill: &str| {
         Circle::new().set("id", name).set("r", radius).set("fill", format!("url(#{fill})"))
     };
-    // The warm light of the lanterns on grey stone.
-    let mut paving =
-        Pattern::new().set("id", "paving").set("patternUnits", "userSpaceOnUse").set("width", 2.4).set("height", 1.6);
-    paving = paving.add(Rectangle::new().set("width", 2.4).set("height", 1.6).set("fill", "#1f0f06"));
-    for (x, y, width, colour) in [
-        (0.0, 0.0, 1.2, "#b8602c"),
-        (1.2, 0.0, 1.2, "#a65528"),
-        (-0.6, 0.8, 1.2, "#9c4f25"),
-        (0.6, 0.8, 1.2, "#c0662f"),
-        (1.8, 0.8, 1.2, "#9c4f25"),
-    ] {
-        let slab = Rectangle::new().set("x", rounded(x + 0.011, 3)).set("y", rounded(y + 0.011, 3)).set("rx", 0.03);
-        paving = paving.add(slab.set("width", rounded(width - 0.022, 3)).set("height", 0.778).set("fill", colour));
-    }
     let dancer = |name: &str, cloth: &str, scarf: &str| {
         let shoulders = Ellipse::new().set("rx", 0.12).set("ry", 0.23).set("fill", cloth);
         let head = Ellipse::new().set("rx", 0.106).set("ry", 0.093).set("fill", scarf);
@@ -224,37 +263,33 @@ fn definitions() -> Definitions {
             .set("stroke-opacity", 0.28)
             .set("stroke-width", 0.006)
     };
-    let red = (0..8)
-        .map(rib)
-        .fold(Group::new().set("id", "red").add(Circle::new().set("r", 0.135).set("fill", "url(#barrel)")), Group::add);
+    let red = |suffix: &str| {
+        let barrel = Circle::new().set("r", 0.135).set("fill", format!("url(#barrel{suffix})"));
+        (0..8).map(rib).fold(Group::new().set("id", format!("red{suffix}")).add(barrel), Group::add)
+    };
     let gold = pane.set("id", "gold").set("fill", "url(#box)").set("stroke", "#6b3205").set("stroke-width", 0.012);
-    Definitions::new()
+    let common = Definitions::new()
         .add(shades("pool-light", &stops))
         .add(disc("pool", POOL, "pool-light"))
-        .add(halo("red-light", "#ffb060", "#ff541e"))
         .add(halo("gold-light", "#ffe296", "#ffa03c"))
         .add(halo("white", "#fffcf0", "#ffd696"))
-        .add(disc("halo-red", HALO, "red-light"))
         .add(disc("halo-gold", HALO, "gold-light"))
-        .add(shades(
-            "barrel",
-            &[
-                (0.0, "#fffdf0", 1.0),
-                (0.16, "#fff0b0", 1.0),
-                (0.42, "#ff6a2e", 1.0),
-                (0.8, "#d81f14", 1.0),
-                (1.0, "#5e0a08", 1.0),
-            ],
-        ))
         .add(shades(
             "box",
             &[(0.0, "#fffdf0", 1.0), (0.16, "#fffbe0", 1.0), (0.5, "#ffcf52", 1.0), (1.0, "#e8860f", 1.0)],
         ))
         .add(shades("pearl", &[(0.0, "#fffef6", 1.0), (0.55, "#ffe9b0", 1.0), (1.0, "#ff9a3a", 1.0)]))
         .add(shades("skull", &[(0.0, "#fff0b0", 1.0), (0.4, "#ff8a24", 1.0), (1.0, "#8f0d14", 1.0)]))
-        .add(paving)
         .add(dancer("dancer", "#7a1d14", "#c98a2a"))
         .add(dancer("dancer-2", "#3a2626", "#b52a18"))
-        .add(red)
-        .add(gold)
+        .add(gold);
+    lights.iter().fold(common, |all, light| {
+        let Light { suffix, halo: [core, skirt], barrel: [flame, lit, paper, rim], .. } = light;
+        let papers = [(0.0, "#fffdf0", 1.0), (0.16, flame, 1.0), (0.42, lit, 1.0), (0.8, paper, 1.0), (1.0, rim, 1.0)];
+        all.add(paving(light))
+            .add(halo(&format!("red-light{suffix}"), core, skirt))
+            .add(disc(&format!("halo-red{suffix}"), HALO, &format!("red-light{suffix}")))
+            .add(shades(&format!("barrel{suffix}"), &papers))
+            .add(red(suffix))
+    })
 }

@@ -14,6 +14,7 @@ mod figure;
 mod ground;
 mod labels;
 mod lanterns;
+mod light;
 mod look;
 mod marks;
 pub mod palette;

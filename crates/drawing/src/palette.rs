@@ -102,9 +102,39 @@ const NAMED: [(&str, usize); 14] = [
     ("white", 9),
 ];
 
-/// Returns the colours of dragons with these names, as on the page: a name that is a colour has that colour, the others
-/// have the first that are free.
+/// The light of their lanterns by night, in the same order, as on the page: red, green and blue.
+const LIGHTS: [[u8; 3]; 16] = [
+    [84, 150, 255],
+    [255, 120, 40],
+    [50, 225, 140],
+    [255, 90, 190],
+    [255, 178, 50],
+    [150, 110, 255],
+    [50, 215, 240],
+    [255, 56, 36],
+    [175, 230, 60],
+    [225, 232, 255],
+    [40, 100, 255],
+    [255, 150, 90],
+    [130, 255, 190],
+    [255, 150, 215],
+    [255, 214, 120],
+    [190, 160, 255],
+];
+
+/// Returns the colours of dragons with these names, as on the page.
 pub fn colours_of(names: &[&str]) -> Vec<&'static str> {
+    identities_of(names).into_iter().map(|place| DRAGONS[place]).collect()
+}
+
+/// Returns the light of the lanterns of dragons with these names, as on the page: red, green and blue.
+pub fn lights_of(names: &[&str]) -> Vec<[u8; 3]> {
+    identities_of(names).into_iter().map(|place| LIGHTS[place]).collect()
+}
+
+/// Returns the identities of dragons with these names: a name that is a colour has that colour, the others have the
+/// first that are free.
+fn identities_of(names: &[&str]) -> Vec<usize> {
     let mut places: Vec<Option<usize>> = Vec::with_capacity(names.len());
     for name in names {
         let own = NAMED.iter().find(|(named, _)| named == name).map(|(_, place)| *place);
@@ -112,7 +142,7 @@ pub fn colours_of(names: &[&str]) -> Vec<&'static str> {
     }
     let mut free = (0..DRAGONS.len()).cycle().filter(|place| !places.contains(&Some(*place)));
     // At most ten colours have names, so that some are always free.
-    places.iter().map(|place| DRAGONS[place.or_else(|| free.next()).unwrap_or(0)]).collect()
+    places.iter().map(|place| place.or_else(|| free.next()).unwrap_or(0)).collect()
 }
 
 impl Palette {

@@ -12,6 +12,7 @@ use svg::node::element::{
 
 use super::camera::StageBox;
 use super::figure::{self, Placed};
+use super::light::Light;
 use super::look::Seat;
 use super::{Drawing, FACE, WIDTH, rounded, village};
 use bench_dragon_motion::model::Point;
@@ -123,13 +124,15 @@ impl Drawing<'_> {
         chain.x.iter().zip(&chain.y).for_each(|(x, y)| stage.include(Point::new(*x, *y)));
         let eye = Eye::new(seat, &stage, self.height);
         let boards = dragons.seen(chain, &StageBox::ALL);
+        let lights = dragons.lights();
         let mut things: Vec<(f64, Group)> = Vec::new();
         let (mut pools, mut bloom) = (lighting("pools"), lighting("bloom"));
         for (bench, board) in &boards {
             let Some(foot) = eye.spot(board.centre, 0.0).filter(|foot| Eye::is_seen(foot, 4.0)) else { continue };
             let (wide, flat) = (2.6 * foot.scale, eye.flat(foot.depth));
+            let light = &lights[dragons.owner(*bench).0];
             pools = pools.add(
-                used("pool")
+                used(&format!("pool{}", light.suffix))
                     .set("transform", placed(&foot, wide, wide * flat))
                     .set("opacity", if dragons.is_head(*bench) { 0.4 } else { 0.24 }),
             );
@@ -138,7 +141,7 @@ impl Drawing<'_> {
                 (false, true) => End::Tail,
                 (false, false) => End::None,
             };
-            let (thing, halos) = carried(&eye, *bench, end, board);
+            let (thing, halos) = carried(&eye, *bench, end, board, light);
             bloom = bloom.add(halos);
             things.push((foot.depth, thing));
         }
@@ -165,7 +168,7 @@ impl Drawing<'_> {
             .add(joints(&eye, self.height));
         let picture =
             picture.add(village::night(&eye)).add(dragon).add(bloom).add(village::front_row(self.height)).add(note);
-        let document = self.document(time, chain, &super::palette::DARK).add(definitions());
+        let document = self.document(time, chain, &super::palette::DARK).add(definitions(lights));
         self.finished(&document.add(picture))
     }
 
@@ -191,7 +194,7 @@ fn placed(at: &Spot, wide: f64, high: f64) -> String {
 }
 
 /// Returns a bench with its lanterns and, at the ends, head or tail; and the lanterns' halos.
-fn carried(eye: &Eye, bench: usize, end: End, board: &Board) -> (Group, Group) {
+fn carried(eye: &Eye, bench: usize, end: End, board: &Board, light: &Light) -> (Group, Group) {
     let (axis, side) = (board.axis, board.axis.yx().component_mul(&nalgebra::Vector2::new(-1.0, 1.0)));
     let corner = |along: f64, across: f64, height: f64| eye.spot(board.centre + along * axis + across * side, height);
     let (long, wide) = (board.half_length, board.half_width);
@@ -205,7 +208,7 @@ fn carried(eye: &Eye, bench: usize, end: End, board: &Board) -> (Group, Group) {
     let edge =
         [(long, BOARD), (-long, BOARD), (-long, BOARD - THICK), (long, BOARD - THICK)].map(|(u, z)| corner(u, near, z));
     let mut thing = Group::new().set("id", format!("bench-{bench}"));
-    for shape in [polygon(top, "#8a3014"), polygon(edge, "#c2501c")].into_iter().flatten() {
+    for shape in [polygon(top, &light.top), polygon(edge, &light.side)].into_iter().flatten() {
         thing = thing.add(shape);
     }
     let is_away = axis.y * eye.right.0 - axis.x * eye.right.1 > 0.0;
@@ -215,13 +218,12 @@ fn carried(eye: &Eye, bench: usize, end: End, board: &Board) -> (Group, Group) {
     for step in 0..3 {
         let which = if is_away { 2 - step } else { step };
         let at = board.centre + places[which] * long * axis;
+        let named = |gold: &str, own: &str| if which == 1 { gold.to_owned() } else { format!("{own}{}", light.suffix) };
         if let Some(foot) = eye.spot(at, BOARD) {
-            lamps = lamps.add(
-                used(if which == 1 { "gold" } else { "red" }).set("transform", placed(&foot, foot.scale, foot.scale)),
-            );
+            lamps = lamps.add(used(&named("gold", "red")).set("transform", placed(&foot, foot.scale, foot.scale)));
         }
         if let Some(middle) = eye.spot(at, BOARD + 0.3) {
-            let halo = used(if which == 1 { "halo-gold" } else { "halo-red" });
+            let halo = used(&named("halo-gold", "halo-red"));
             halos = halos.add(halo.set("transform", placed(&middle, middle.scale, middle.scale)));
         }
     }
@@ -265,7 +267,7 @@ fn joints(eye: &Eye, height: f64) -> Group {
     group
 }
 
-type Shade = (f64, &'static str, f64);
+type Shade<'a> = (f64, &'a str, f64);
 
 fn disc(name: &str, shades: &[Shade]) -> RadialGradient {
     shades.iter().fold(RadialGradient::new().set("id", name), |gradient, shade| gradient.add(stop(shade)))
@@ -281,11 +283,11 @@ fn stop((at, colour, opacity): &Shade) -> Stop {
 }
 
 /// Returns the shapes that the picture uses many times: metres, upward is negative.
-fn definitions() -> Definitions {
-    let ball = |name: &str, core: &'static str, middle: &'static str, rim: &'static str| {
+fn definitions(lights: &[Light]) -> Definitions {
+    let ball = |name: &str, core: &str, middle: &str, rim: &str| {
         disc(name, &[(0.0, core, 1.0), (0.5, middle, 1.0), (1.0, rim, 1.0)]).set("cx", 0.42).set("cy", 0.36)
     };
-    let halo = |name: &str, core: &'static str, skirt: &'static str, alpha: f64| {
+    let halo = |name: &str, core: &str, skirt: &str, alpha: f64| {
         disc(name, &[(0.0, core, alpha), (0.2, skirt, 0.5 * alpha), (0.5, skirt, 0.16 * alpha), (1.0, skirt, 0.0)])
     };
     let round = |name: &str, radius: f64, fill: &str| {
@@ -322,26 +324,15 @@ fn definitions() -> Definitions {
     let watcher = Path::new()
         .set("id", "watcher")
         .set("d", "M-.24 0C-.26-1.75.26-1.75.24 0ZM-.1-1.42a.1.13 0 1 1 .2 0a.1.13 0 1 1-.2 0Z");
-    Definitions::new()
-        .add(disc(
-            "pool-light",
-            &[(0.0, "#ff8a3c", 1.0), (0.25, "#e06a28", 0.55), (0.6, "#a03c14", 0.16), (1.0, "#601c08", 0.0)],
-        ))
-        .add(round("pool", 1.0, "pool-light"))
-        .add(halo("red-light", "#ff9646", "#ff4618", 0.22))
+    let common = Definitions::new()
         .add(halo("gold-light", "#ffd682", "#ff8c2c", 0.2))
         .add(halo("white-light", "#fffae8", "#ffce82", 0.95))
-        .add(round("halo-red", 0.55, "red-light"))
         .add(round("halo-gold", 0.55, "gold-light"))
         .add(round("halo-white", 1.3, "white-light"))
         .add(round("pearl", 0.17, "white"))
         .add(ball("skin", "#ffb066", "#ea4a1c", "#b3160f"))
         .add(ball("lit-gold", "#fffbe0", "#ffc040", "#b0620e"))
         .add(ball("white", "#ffffff", "#fff4cf", "#d8a050"))
-        .add(disc(
-            "paper-red",
-            &[(0.0, "#fffbe4", 1.0), (0.3, "#ffdc8c", 1.0), (0.6, "#ff6a2a", 1.0), (1.0, "#b8140c", 1.0)],
-        ))
         .add(disc(
             "paper-gold",
             &[(0.0, "#fffdf0", 1.0), (0.4, "#fff2c0", 1.0), (0.8, "#ffc650", 1.0), (1.0, "#c96d10", 1.0)],
@@ -356,9 +347,23 @@ fn definitions() -> Definitions {
         ))
         .add(upward("cloth", &[(0.0, "#040203", 1.0), (0.4, "#4e100c", 1.0), (1.0, "#b0451f", 1.0)]))
         .add(upward("cloth-2", &[(0.0, "#040203", 1.0), (0.4, "#241c24", 1.0), (1.0, "#84503a", 1.0)]))
-        .add(lamp("red", "M-.085-.1C-.19-.17-.19-.43-.085-.5H.085C.19-.43.19-.17.085-.1Z", "paper-red", ribs))
         .add(lamp("gold", "M-.105-.1L-.152-.31-.105-.5H.105L.152-.31.105-.1Z", "paper-gold", flower))
         .add(dancer("dancer", "cloth", "#b57a22"))
         .add(dancer("dancer-2", "cloth-2", "#b02a16"))
-        .add(watcher)
+        .add(watcher);
+    let barrel = "M-.085-.1C-.19-.17-.19-.43-.085-.5H.085C.19-.43.19-.17.085-.1Z";
+    // The lanterns of the village are red.
+    let village = lights[0].tint.is_some().then(Light::fire);
+    lights.iter().chain(village.as_ref()).fold(common, |all, light| {
+        let Light { suffix, halo_aside: [core, skirt], paper: [flame, lit, paper, rim], pool: [a, b, c, d], .. } =
+            light;
+        let named = |name: &str| format!("{name}{suffix}");
+        let papers = [(0.0, flame.as_str(), 1.0), (0.3, lit, 1.0), (0.6, paper, 1.0), (1.0, rim, 1.0)];
+        all.add(disc(&named("pool-light"), &[(0.0, a, 1.0), (0.25, b, 0.55), (0.6, c, 0.16), (1.0, d, 0.0)]))
+            .add(round(&named("pool"), 1.0, &named("pool-light")))
+            .add(halo(&named("red-light"), core, skirt, 0.22))
+            .add(round(&named("halo-red"), 0.55, &named("red-light")))
+            .add(disc(&named("paper-red"), &papers))
+            .add(lamp(&named("red"), barrel, &named("paper-red"), ribs.clone()))
+    })
 }

@@ -5,6 +5,7 @@
 //! last bit.
 
 mod between;
+mod between_table;
 mod bounds;
 mod cells;
 mod grid;
@@ -21,9 +22,10 @@ use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::separation::{closest_points_board_board, signed_distance_board_board};
 use crate::model::team::Team;
-use crate::solve::Chain;
 use crate::solve::table::FollowerTable;
-pub use between::{BetweenMonitor, nearest_between_all_pairs};
+use crate::solve::{Chain, Positions};
+pub use between::{BetweenMonitor, Moment, nearest_between_all_pairs};
+pub use between_table::TabledDragon;
 use bounds::BoundTable;
 pub use obstacles::ObstacleMonitor;
 use search::{CarriedBounds, ClearanceSearch};
@@ -45,8 +47,9 @@ pub struct PairClearance {
 
 /// Returns the board of one bench of a chain. Panics if there is no such bench.
 #[inline]
-pub fn board(chain: &Chain, team: &Team, bench: usize) -> Board {
-    let handle = |k: usize| Point::new(chain.x[k], chain.y[k]);
+pub fn board<'a>(chain: impl Into<Positions<'a>>, team: &Team, bench: usize) -> Board {
+    let Positions { x, y } = chain.into();
+    let handle = |k: usize| Point::new(x[k], y[k]);
     Board::from_handles(handle(bench), handle(bench + 1), team.hole_inset, team.width)
 }
 
@@ -169,7 +172,12 @@ impl ClearanceMonitor {
 
     /// Returns the nearest two boards of `chain`, of equal ones the lowest (a, b). The head has travelled `travelled`
     /// metres of the path; NaN if it does not follow the path. `None` for fewer than three benches.
-    pub fn least_clearance(&mut self, chain: &Chain, travelled: f64) -> Option<PairClearance> {
+    pub fn least_clearance<'a>(&mut self, chain: impl Into<Positions<'a>>, travelled: f64) -> Option<PairClearance> {
+        self.least(chain.into(), travelled)
+    }
+
+    // A function of one type is compiled here, where the functions that it calls are inlined.
+    fn least(&mut self, chain: Positions, travelled: f64) -> Option<PairClearance> {
         self.counters.frames += 1;
         self.latest = None;
         if self.team.benches < 3 {

@@ -3,7 +3,8 @@
 //!
 //! In: a path, a team, the places where handles turn round ([`Singularities`](super::singularities::Singularities)),
 //! two places of the head. Out: an [`Event`] or a [`LeastClearance`], and how far the search came. The timeline,
-//! `check` and `plan pitch` call it.
+//! `check` and `plan pitch` call it. The search of `stepped_search` serves boards of one team, boards of two dragons
+//! ([`between`]), and boards and obstacles (`ground`).
 //!
 //! **How far handles move.** Handle 1 turns round only if the head is at a head turn, handle k + 1 only if handle k
 //! turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the turns
@@ -51,6 +52,7 @@ mod displacement;
 mod ground;
 mod reach;
 mod search;
+mod stepped_search;
 
 use crate::linkage::NoFollower;
 use crate::model::curve::Curve;

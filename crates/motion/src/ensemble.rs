@@ -9,16 +9,18 @@ use std::ops::Range;
 use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
+use crate::clearance::{BetweenMonitor, TabledDragon};
 use crate::contact::LeastClearance;
 use crate::contact::between::{self, Meeting, MovingDragon};
 use crate::event::{Budget, Event};
 use crate::ground::{Ground, Obstacle};
 use crate::linkage::NoFollower;
+use crate::model::team::Team;
 use crate::singularities::Singularities;
 use crate::solve::table::Instructions;
-use crate::solve::{Chain, Solver, Velocities};
+use crate::solve::{ChainMut, Solver, Velocities};
 use crate::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
-use crate::{CONTACT_BUDGET, Motion};
+use crate::{CONTACT_BUDGET, Choice, Motion};
 
 /// One of several dragons.
 #[derive(Debug, Clone, PartialEq)]
@@ -253,44 +255,72 @@ impl Ensemble {
         self.dragons.iter().zip(found).map(|(dragon, found)| moving(dragon, found)).collect()
     }
 
-    /// Returns the least clearance of any two boards that share no handle, from the start until the show ends at
-    /// `freeze`; `None` if there are no two, or the search failed.
-    pub fn least_clearance(&self, freeze: &TimedEvent, progress: &mut dyn FnMut(f64)) -> Option<TimedClearance> {
+    /// Returns the least clearances of any two boards that share no handle, of one dragon and of two, from the start
+    /// until the show ends at `freeze`.
+    pub fn least_clearances(&self, freeze: &TimedEvent, progress: &mut dyn FnMut(f64)) -> LeastClearances {
         let share = 0.5 / self.dragons.len() as f64;
-        let mut best: Option<TimedClearance> = None;
-        for (k, dragon) in self.dragons.iter().enumerate() {
-            let timeline = dragon.motion.timeline_without_contact();
-            let end = self.own_freeze(dragon, freeze);
-            let mut of_own = |part| progress(share * (k as f64 + part));
-            let Some(mut own) = dragon.motion.least_clearance(&timeline, &end, &mut of_own) else { continue };
-            let first = self.first_handles[k] as u32;
-            (own.least.bench_a, own.least.bench_b) = (own.least.bench_a + first, own.least.bench_b + first);
-            own.time += dragon.delay;
-            own.searched_until = own.searched_until.map(|until| until + dragon.delay);
-            best = Some(nearer(best, own));
-        }
+        let own = |k: usize| self.own_least_clearance(k, freeze, &mut |part| progress(share * (k as f64 + part)));
+        let own = (0..self.dragons.len()).filter_map(own).fold(None, |best, own| Some(nearer(best, own)));
+        let between = self.least_clearance_between(freeze.time, &mut |part| progress(0.5 + 0.5 * part));
+        LeastClearances { own, between }
+    }
+
+    /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show; `None`
+    /// if there are no two, or the search failed.
+    fn own_least_clearance(
+        &self,
+        dragon: usize,
+        freeze: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<TimedClearance> {
+        let Dragon { delay, motion, .. } = &self.dragons[dragon];
+        let end = self.own_freeze(&self.dragons[dragon], freeze);
+        let mut own = motion.least_clearance(&motion.timeline_without_contact(), &end, progress)?;
+        let first = self.first_handles[dragon] as u32;
+        (own.least.bench_a, own.least.bench_b) = (own.least.bench_a + first, own.least.bench_b + first);
+        own.time += delay;
+        own.searched_until = own.searched_until.map(|until| until + delay);
+        Some(own)
+    }
+
+    /// Returns the least clearance of boards of two dragons, from the start to a time; `None` if there are no two, or
+    /// the search failed.
+    fn least_clearance_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Option<TimedClearance> {
         let found = self.singularities();
         let moving = self.moving(&found).ok()?;
-        let mut of_between = |part: f64| progress(0.5 + 0.5 * part);
-        let mut budget = Budget::new(CONTACT_BUDGET, &mut of_between);
+        let mut budget = Budget::new(CONTACT_BUDGET, progress);
+        let mut best: Option<(Meeting, [usize; 2])> = None;
+        // The nearest guess leaves little to prove of the others.
         for pair in pairs(moving.len()) {
-            let below = best.map(|best| best.least.value);
-            let span = (0.0, freeze.time);
-            let found = between::least_clearance(pair.map(|k| &moving[k]), span, below, &mut budget).ok()?;
-            let searched_until = (found.searched_until < freeze.time).then_some(found.searched_until);
-            let Some(meeting) = found.value else {
-                best = best.map(|best| TimedClearance {
-                    searched_until: earlier(best.searched_until, searched_until),
-                    ..best
-                });
-                continue;
-            };
-            let [bench_a, bench_b] = self.numbered(&meeting, pair);
-            let travelled = self.dragons[pair[0]].travelled_at(meeting.time);
-            let least = LeastClearance { value: meeting.value, travelled, bench_a, bench_b };
-            best = Some(nearer(best, TimedClearance { least, time: meeting.time, searched_until }));
+            let guess = between::guess_least_clearance(pair.map(|k| &moving[k]), (0.0, to), &mut budget).ok()?;
+            best = guess.map(|meeting| (meeting, pair)).into_iter().chain(best).min_by(least);
         }
-        best
+        let mut searched_until = None;
+        for pair in pairs(moving.len()) {
+            let below = best.map(|(meeting, _)| meeting);
+            let found = between::least_clearance(pair.map(|k| &moving[k]), (0.0, to), below, &mut budget).ok()?;
+            searched_until = earlier(searched_until, (found.searched_until < to).then_some(found.searched_until));
+            best = found.value.map(|meeting| (meeting, pair)).into_iter().chain(best).min_by(least);
+        }
+        let (meeting, pair) = best?;
+        let [bench_a, bench_b] = self.numbered(&meeting, pair);
+        let travelled = self.dragons[pair[0]].travelled_at(meeting.time);
+        let least = LeastClearance { value: meeting.value, travelled, bench_a, bench_b };
+        Some(TimedClearance { least, time: meeting.time, searched_until })
+    }
+
+    /// Returns the time at which boards of two dragons are nearest, up to a time of the show, and a bench of each,
+    /// counted within it; `None` if the search failed.
+    pub fn nearest_of(&self, pair: [usize; 2], to: f64) -> Option<(f64, [usize; 2])> {
+        let two = pair.map(|dragon| &self.dragons[dragon]);
+        let found = two.map(|dragon| dragon.motion.singularities(&mut |_| ()));
+        let [one, other] = [0, 1].map(|k| moving(two[k], &found[k]).ok());
+        let moving = [&one?, &other?];
+        let mut unreported = |_| {};
+        let mut budget = Budget::new(CONTACT_BUDGET, &mut unreported);
+        let guess = between::guess_least_clearance(moving, (0.0, to), &mut budget).ok()?;
+        let nearer = between::least_clearance(moving, (0.0, to), guess, &mut budget).ok()?.value;
+        nearer.or(guess).map(|meeting| (meeting.time, meeting.benches))
     }
 
     /// Returns the least clearance of each obstacle over all dragons, as [`Motion::obstacle_clearances`].
@@ -328,19 +358,49 @@ impl Ensemble {
         TimedEvent { event: Event { travelled: dragon.motion.travelled_at(time), ..freeze.event }, time }
     }
 
+    /// Makes the monitor of the live clearance of different dragons. `choices` has the solver of each dragon's frames, in
+    /// its path's own coordinates.
+    pub fn between_monitor(&self, choices: &[Choice]) -> BetweenMonitor {
+        let teams: Vec<Team> = self.dragons.iter().map(|dragon| *dragon.motion.team()).collect();
+        let monitor = BetweenMonitor::new(&teams, self.link_tolerance().max(1e-9));
+        let mut dragons = Vec::new();
+        for (Dragon { motion, .. }, choice) in self.dragons.iter().zip(choices) {
+            let Some(table) = &choice.table else { return monitor };
+            let (team, path, placement) = (*motion.team(), motion.path(), *motion.placement());
+            dragons.push(TabledDragon { team, path, placement, table, head_speed: motion.head_speed() });
+        }
+        let end = self.timeline_without_contact().end().time;
+        monitor.with_table(&dragons, end, &|dragon, time| self.dragons[dragon].travelled_at(time))
+    }
+
     /// Makes a solver of all dragons, for the show's time. Its chains are placed on the stage.
     pub fn solver(&self, velocities: Velocities) -> EnsembleSolver {
-        let dancer = |dragon: &Dragon| {
-            let choice = dragon.motion.solver(velocities);
-            (dragon.clone(), choice.solver, Chain::new(dragon.motion.team().handles()))
+        let dancer = |(k, dragon): (usize, &Dragon)| {
+            (dragon.clone(), dragon.motion.solver(velocities).solver, self.handles_of(k))
         };
-        EnsembleSolver { dancers: self.dragons.iter().map(dancer).collect() }
+        EnsembleSolver { dancers: self.dragons.iter().enumerate().map(dancer).collect() }
+    }
+}
+
+/// The least clearances of a show of several dragons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeastClearances {
+    /// That of two boards of one dragon; `None` if there are no two, or the search failed.
+    pub own: Option<TimedClearance>,
+    /// That of boards of two dragons; likewise.
+    pub between: Option<TimedClearance>,
+}
+
+impl LeastClearances {
+    /// Returns the least clearance of the show.
+    pub fn of_show(&self) -> Option<TimedClearance> {
+        self.between.into_iter().fold(self.own, |best, other| Some(nearer(best, other)))
     }
 }
 
 /// The solver of all dragons of a show.
 pub struct EnsembleSolver {
-    dancers: Vec<(Dragon, Box<dyn Solver>, Chain)>,
+    dancers: Vec<(Dragon, Box<dyn Solver>, Range<usize>)>,
 }
 
 impl Solver for EnsembleSolver {
@@ -348,16 +408,14 @@ impl Solver for EnsembleSolver {
         "several"
     }
 
-    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
-        let mut first = 0;
-        for (dragon, solver, own) in &mut self.dancers {
+    fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        for (dragon, solver, handles) in &mut self.dancers {
             let (own_time, moves) = dragon.own_time(time);
-            solver.solve(own_time, own)?;
+            let mut own = chain.range_mut(handles.clone());
+            solver.solve_in(own_time, &mut own)?;
             if !moves {
                 own.stand();
             }
-            chain.put(first, own);
-            first += own.handles();
         }
         Ok(())
     }
@@ -408,6 +466,11 @@ fn collected(own: &[Timeline], end: TimedEvent, contact: Option<TimedEvent>, unt
     events.retain(|timed| timed.time <= end.time);
     events.push(end);
     Timeline::new(events, (until < end.time).then_some(until)).with_standing(standing)
+}
+
+/// Compares clearances.
+fn least((one, _): &(Meeting, [usize; 2]), (other, _): &(Meeting, [usize; 2])) -> std::cmp::Ordering {
+    one.value.total_cmp(&other.value)
 }
 
 fn nearer(best: Option<TimedClearance>, other: TimedClearance) -> TimedClearance {

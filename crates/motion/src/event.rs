@@ -37,6 +37,10 @@ pub struct Event {
     pub place: Option<Point>,
 }
 
+/// The budget of a search is spent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Spent;
+
 /// Work that a search may still do, and the receiver of its progress. One unit of work is one link solved or one pair
 /// of boards tested.
 pub struct Budget<'a> {
@@ -51,12 +55,14 @@ impl<'a> Budget<'a> {
         Self { left: limit, progress }
     }
 
-    /// Subtracts `work` units. Returns false if fewer are left; the budget is then empty.
-    #[must_use]
-    pub fn spend(&mut self, work: u64) -> bool {
+    /// Subtracts `work` units.
+    ///
+    /// # Errors
+    /// [`Spent`] if fewer are left; the budget is then empty.
+    pub fn spend(&mut self, work: u64) -> Result<(), Spent> {
         let enough = work <= self.left;
         self.left = self.left.saturating_sub(work);
-        enough
+        if enough { Ok(()) } else { Err(Spent) }
     }
 
     /// Reports the share of the search that is done.

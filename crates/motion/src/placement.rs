@@ -13,7 +13,7 @@ use crate::model::elementary;
 use crate::model::path::{OutlineKind, SegmentOutline};
 use crate::model::spiral::{Direction, Spiral};
 use crate::model::{Point, Vector};
-use crate::solve::{Chain, Solver};
+use crate::solve::{ChainMut, Solver};
 
 /// A rigid mapping of a path's own coordinates to the stage: mirrored (y to -y), then rotated, then moved.
 ///
@@ -112,9 +112,10 @@ impl Placement {
         self.origin.into()
     }
 
-    /// Returns the rotation, turns counter-clockwise from -1/2 to 1/2.
+    /// Returns the rotation, turns counter-clockwise, more than -1/2 and at most 1/2.
     pub fn rotation_turns(&self) -> f64 {
-        self.turn.map_or(0.0, |turn| turn.angle / TAU)
+        let turns = self.turn.map_or(0.0, |turn| turn.angle / TAU);
+        if turns == -0.5 { 0.5 } else { turns }
     }
 
     /// Returns true if the path is mirrored.
@@ -150,53 +151,25 @@ impl Placement {
     }
 
     /// Places all handles of a chain: positions, headings and velocities. Speeds along the path remain.
-    pub fn chain(&self, chain: &mut Chain) {
+    pub fn chain(&self, chain: &mut ChainMut) {
         if self.is_identity() {
             return;
         }
-        let Chain { x, y, heading, speed: _, vx, vy } = chain;
-        if let Some(turn) = &self.turn {
-            for (x, y) in x.iter_mut().zip(y.iter_mut()).chain(vx.iter_mut().zip(vy)) {
-                (*x, *y) = turn.vector(*x, *y);
-            }
-            heading.iter_mut().for_each(|heading| *heading = turn.heading(*heading));
+        let ChainMut { x, y, heading, speed: _, vx, vy } = chain;
+        let Some(turn) = &self.turn else {
+            x.iter_mut().for_each(|x| *x += self.origin.x);
+            y.iter_mut().for_each(|y| *y += self.origin.y);
+            return;
+        };
+        let origin = self.origin;
+        for (x, y) in x.iter_mut().zip(y.iter_mut()) {
+            let (turned_x, turned_y) = turn.vector(*x, *y);
+            (*x, *y) = (turned_x + origin.x, turned_y + origin.y);
         }
-        x.iter_mut().for_each(|x| *x += self.origin.x);
-        y.iter_mut().for_each(|y| *y += self.origin.y);
-    }
-
-    /// Places all handles of `own`, as [`Placement::chain`], among those of `all` from `first` on.
-    ///
-    /// # Panics
-    /// If `all` has fewer handles.
-    pub fn put(&self, own: &Chain, first: usize, all: &mut Chain) {
-        if self.is_identity() {
-            return all.put(first, own);
+        for (vx, vy) in vx.iter_mut().zip(vy.iter_mut()) {
+            (*vx, *vy) = turn.vector(*vx, *vy);
         }
-        let to = first..first + own.handles();
-        let Chain { x, y, heading, speed, vx, vy } = all;
-        let [x, y, heading, speed, vx, vy] = [x, y, heading, speed, vx, vy].map(|numbers| &mut numbers[to.clone()]);
-        speed.copy_from_slice(&own.speed);
-        match &self.turn {
-            Some(turn) => {
-                let origin = self.origin;
-                for ((x, y), (own_x, own_y)) in x.iter_mut().zip(y).zip(own.x.iter().zip(&own.y)) {
-                    let (turned_x, turned_y) = turn.vector(*own_x, *own_y);
-                    (*x, *y) = (turned_x + origin.x, turned_y + origin.y);
-                }
-                for ((vx, vy), (own_vx, own_vy)) in vx.iter_mut().zip(vy).zip(own.vx.iter().zip(&own.vy)) {
-                    (*vx, *vy) = turn.vector(*own_vx, *own_vy);
-                }
-                heading.iter_mut().zip(&own.heading).for_each(|(heading, own)| *heading = turn.heading(*own));
-            }
-            None => {
-                x.iter_mut().zip(&own.x).for_each(|(x, own)| *x = own + self.origin.x);
-                y.iter_mut().zip(&own.y).for_each(|(y, own)| *y = own + self.origin.y);
-                heading.copy_from_slice(&own.heading);
-                vx.copy_from_slice(&own.vx);
-                vy.copy_from_slice(&own.vy);
-            }
-        }
+        heading.iter_mut().for_each(|heading| *heading = turn.heading(*heading));
     }
 
     /// Returns the outline of a segment on the stage.
@@ -235,8 +208,8 @@ impl Solver for Placed {
         self.solver.name()
     }
 
-    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
-        self.solver.solve(time, chain)?;
+    fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        self.solver.solve_in(time, chain)?;
         self.placement.chain(chain);
         Ok(())
     }
@@ -245,6 +218,7 @@ impl Solver for Placed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::Chain;
 
     #[test]
     fn mirror_then_rotation_then_move() {
@@ -254,7 +228,7 @@ mod tests {
         (chain.x, chain.y, chain.heading) = (vec![1.0, -2.0], vec![3.0, 0.5], vec![0.4, PI]);
         (chain.speed, chain.vx, chain.vy) = (vec![2.0, 1.0], vec![2.0, 0.0], vec![0.0, -1.0]);
         let before = chain.clone();
-        placement.chain(&mut chain);
+        placement.chain(&mut chain.all_mut());
         let rotated = |x: f64, y: f64| (angle.cos() * x - angle.sin() * y, angle.sin() * x + angle.cos() * y);
         for k in 0..2 {
             let (x, y) = rotated(before.x[k], -before.y[k]);

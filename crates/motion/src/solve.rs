@@ -9,6 +9,8 @@ pub mod reference;
 pub mod selection;
 pub mod table;
 
+use std::ops::Range;
+
 use crate::linkage::NoFollower;
 
 /// The state of all handles at one moment, as flat arrays by handle, the head first.
@@ -49,26 +51,76 @@ impl Chain {
         self.x.len()
     }
 
+    /// Returns all handles, to write to.
+    #[inline]
+    pub fn all_mut(&mut self) -> ChainMut<'_> {
+        let Self { x, y, heading, speed, vx, vy } = self;
+        ChainMut { x, y, heading, speed, vx, vy }
+    }
+}
+
+/// The handles of a chain, or some of a longer chain's, to write to. The arrays are those of [`Chain`].
+#[derive(Debug)]
+pub struct ChainMut<'a> {
+    /// Metres to the right of the centre.
+    pub x: &'a mut [f64],
+    /// Metres up from the centre.
+    pub y: &'a mut [f64],
+    /// Radians in (-pi, pi].
+    pub heading: &'a mut [f64],
+    /// Metres per second along the path.
+    pub speed: &'a mut [f64],
+    /// Metres per second along x.
+    pub vx: &'a mut [f64],
+    /// Metres per second along y.
+    pub vy: &'a mut [f64],
+}
+
+impl ChainMut<'_> {
+    /// Returns the number of handles.
+    #[inline]
+    pub fn handles(&self) -> usize {
+        self.x.len()
+    }
+
+    /// Returns some of the handles: those of one of several dragons.
+    ///
+    /// # Panics
+    /// If there are fewer handles.
+    pub fn range_mut(&mut self, handles: Range<usize>) -> ChainMut<'_> {
+        let ChainMut { x, y, heading, speed, vx, vy } = self;
+        let [x, y, heading, speed, vx, vy] =
+            [x, y, heading, speed, vx, vy].map(|numbers| &mut numbers[handles.clone()]);
+        ChainMut { x, y, heading, speed, vx, vy }
+    }
+
+    /// Returns the positions of the handles.
+    #[inline]
+    pub fn positions(&self) -> Positions<'_> {
+        Positions { x: self.x, y: self.y }
+    }
+
     /// Sets all velocities to 0; those that are not computed stay NaN.
     pub fn stand(&mut self) {
-        for number in self.speed.iter_mut().chain(&mut self.vx).chain(&mut self.vy) {
+        for number in self.speed.iter_mut().chain(&mut *self.vx).chain(&mut *self.vy) {
             *number = if number.is_nan() { *number } else { 0.0 };
         }
     }
+}
 
-    /// Copies the handles of another chain to those from `first` on.
-    ///
-    /// # Panics
-    /// If this chain has fewer handles.
-    pub fn put(&mut self, first: usize, other: &Self) {
-        let Self { x, y, heading, speed, vx, vy } = other;
-        let to = first..first + other.handles();
-        self.x[to.clone()].copy_from_slice(x);
-        self.y[to.clone()].copy_from_slice(y);
-        self.heading[to.clone()].copy_from_slice(heading);
-        self.speed[to.clone()].copy_from_slice(speed);
-        self.vx[to.clone()].copy_from_slice(vx);
-        self.vy[to].copy_from_slice(vy);
+/// The positions of the handles of a chain, metres.
+#[derive(Debug, Clone, Copy)]
+pub struct Positions<'a> {
+    /// Metres to the right of the centre.
+    pub x: &'a [f64],
+    /// Metres up from the centre.
+    pub y: &'a [f64],
+}
+
+impl<'a> From<&'a Chain> for Positions<'a> {
+    #[inline]
+    fn from(chain: &'a Chain) -> Self {
+        Self { x: &chain.x, y: &chain.y }
     }
 }
 
@@ -106,5 +158,13 @@ pub trait Solver: Send {
     ///
     /// # Errors
     /// [`NoFollower`] if the motion has ended in a lock before `time`; `chain` is then unspecified.
-    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower>;
+    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+        self.solve_in(time, &mut chain.all_mut())
+    }
+
+    /// Does the same for the handles of one dragon in a longer chain.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower>;
 }

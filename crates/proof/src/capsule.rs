@@ -2,7 +2,7 @@
 
 use super::ground::Mapping;
 use super::interval::{Interval, Vector};
-use super::path::{At, Path, Place, Span};
+use super::path::{At, Path, Span};
 
 /// All places of a span: p(x) = p(m) + tau h t(m) + e, |tau| <= 1, |e| <= sag; |t(x) - t(m)| <= turn.
 #[derive(Debug, Clone)]
@@ -26,8 +26,7 @@ impl Capsule {
     /// Creates the capsule of a span whose places are in order.
     pub fn new(path: &Path, span: Span) -> Self {
         let Span(lo, hi) = span;
-        let between = |place: Place| path.has(place) && path.in_order(lo, place) && path.in_order(place, hi);
-        let middle = Some(path.middle(lo, hi)).filter(|place| between(*place)).unwrap_or(lo);
+        let middle = path.middle_of(span);
         let half = path.metres_bound(lo, middle).max(&path.metres_bound(middle, hi));
         let curvature = path.curvature_bound(lo, hi);
         let turn = (curvature * half).upper();
@@ -100,5 +99,19 @@ impl<'a> Pair<'a> {
     /// Returns the rear product g(u, x) = t(x) . d.
     pub fn rear_product(&self) -> Interval {
         self.product(self.rear, self.front)
+    }
+    /// Returns g(u, x) by Taylor's formula of the second order along the rear's span. With a junction in the span nothing
+    /// is known of it.
+    pub fn second_order_rear_product(&self, path: &Path) -> Interval {
+        let Self { front, rear, middle, distance, .. } = self;
+        let place = path.middle_of(rear.span);
+        let Some(rate) = path.bend_rate(rear.span) else { return Interval::new(0.0) };
+        let bend = path.bend(Span(place, place));
+        let across = rear.tangent.cross(&front.tangent).abs() * front.half + front.sag;
+        let along = self.along * front.half + front.sag;
+        let slope = (bend * rear.tangent.cross(middle) - Interval::new(1.0)).abs() + bend.abs() * across;
+        let second = (rate.abs() + rear.curvature.square()) * distance * Interval::new(0.5);
+        let slack = along + (slope + second * rear.half) * rear.half;
+        rear.tangent.dot(middle) + slack.around_zero()
     }
 }

@@ -106,8 +106,14 @@ fn odd_series(z: &Interval, sign: f64) -> Interval {
     sum * z
 }
 
-/// Returns the arctangent of a number of at least 0. Four halvings bring its angle to at most pi / 32.
+/// Returns the arctangent of a number of at least 0. It grows, so that those of the ends are enough.
 pub(super) fn atan(tangent: &Interval) -> Interval {
+    let lower = -(-tangent).upper();
+    atan_at(&lower).hull(&atan_at(&tangent.upper()))
+}
+
+/// Returns the arctangent of a number of at least 0. Four halvings bring its angle to at most pi / 32.
+fn atan_at(tangent: &Interval) -> Interval {
     let one = Interval::new(1.0);
     // tan(a / 2) = tan(a) / (1 + sqrt(1 + tan(a)^2)).
     let halved = |t: Interval| t / (one + (one + t.square()).sqrt());

@@ -187,7 +187,7 @@ impl Events {
         if self.near.is_some() {
             return Err("a second line `near`".to_owned());
         }
-        if a + 2 > b || b >= spans.len() {
+        if b < 2 || a > b - 2 || b >= spans.len() {
             return Err(format!("benches {a} and {b} share a handle, or are not both listed in order"));
         }
         let step = near_step(scene, steps.apart_end, head, (spans, at))?;

@@ -5,6 +5,7 @@
 
 use super::capsule::{Capsule, Pair};
 use super::chain::{Chain, span_is_one};
+use super::ground::Mapping;
 use super::interval::{Interval, Vector};
 use super::path::{At, Place, Span};
 use super::scene::{Scene, Team};
@@ -15,7 +16,7 @@ const ROUNDS: usize = 3;
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
 
-/// A handle: `point` + tau `velocity`, and an error.
+/// A handle: `point` + tau `velocity`, and an error. For two dragons tau is a time, and rates are metres per second.
 #[derive(Debug, Clone)]
 pub(super) struct Handle {
     /// p(m), t(m).
@@ -54,28 +55,45 @@ impl FirstOrder {
     /// # Errors
     /// A place that is missing or not in its span.
     pub fn new(scene: &Scene, chain: &Chain, at: &[Place]) -> Result<Self, String> {
-        let path = &scene.path;
-        if at.len() != chain.capsules.len() {
-            return Err(format!("{} places in `at`, expected {}", at.len(), chain.capsules.len()));
-        }
-        for (handle, (place, capsule)) in at.iter().zip(&chain.capsules).enumerate() {
-            span_is_one(scene, Span(*place, *place))
-                .map_err(|problem| format!("`at` of handle {handle}: {problem}"))?;
-            let Span(lo, hi) = capsule.span;
-            if !(path.in_order(lo, *place) && path.in_order(*place, hi)) {
-                return Err(format!("`at` of handle {handle} is not in the handle's span"));
-            }
-        }
+        check_places(scene, chain, at)?;
         let Span(from, to) = chain.capsules[0].span;
-        let half_step = path.metres_bound(from, at[0]).max(&path.metres_bound(at[0], to));
-        let zero = Interval::new(0.0);
-        let mut handles = vec![Handle::new(path.at(at[0]), &chain.capsules[0], Interval::new(1.0), zero, &half_step)];
+        let half_step = scene.path.metres_bound(from, at[0]).max(&scene.path.metres_bound(at[0], to));
+        Ok(Self::behind(scene, chain, at, (Interval::new(1.0), Interval::new(0.0), half_step)))
+    }
+
+    /// Encloses the listed handles of a chain from one time of the show to another (Lemma 12, *Further apart*). tau is
+    /// the time from the middle of the two, in seconds.
+    ///
+    /// # Errors
+    /// A place that is missing or not in its span.
+    pub fn in_time(scene: &Scene, chain: &Chain, at: &[Place], from: &Interval, to: &Interval) -> Result<Self, String> {
+        check_places(scene, chain, at)?;
+        let middle = (from + to) * Interval::new(0.5);
+        let half_step = (middle - from).max(&(to - middle)).upper();
+        let offset = (scene.path.travelled(at[0]) - scene.travelled_at(&middle)).abs().upper();
+        Ok(Self::behind(scene, chain, at, (scene.speed_between(from, to), offset, half_step)))
+    }
+
+    /// Encloses the handles behind a head that has the rate P_0 and is at most d_0 from its place at tau = 0.
+    fn behind(
+        scene: &Scene,
+        chain: &Chain,
+        at: &[Place],
+        (rate, offset, half_step): (Interval, Interval, Interval),
+    ) -> Self {
+        let path = &scene.path;
+        let mut handles = vec![Handle::new(path.at(at[0]), &chain.capsules[0], rate, offset, &half_step)];
         for (index, pair) in chain.capsules.windows(2).enumerate() {
             let point = path.at(at[index + 1]);
             let front = &handles[index];
             handles.push(front.follower(point, (&pair[0], &pair[1]), scene.team.link(index), &half_step));
         }
-        Ok(Self { handles, half_step })
+        Self { handles, half_step }
+    }
+
+    /// Returns the same handles on the stage.
+    pub fn placed(&self, frame: &Mapping) -> Self {
+        Self { handles: self.handles.iter().map(|handle| handle.placed(frame)).collect(), half_step: self.half_step }
     }
 
     /// Returns the board of a bench.
@@ -95,6 +113,22 @@ impl FirstOrder {
         let length = team.links(first, team.benches - 1);
         FirstOrderBoard::new(front.clone(), front.behind(&length), length, self.half_step, team)
     }
+}
+
+/// Checks that there is a place in the span of each listed handle.
+fn check_places(scene: &Scene, chain: &Chain, at: &[Place]) -> Result<(), String> {
+    let path = &scene.path;
+    if at.len() != chain.capsules.len() {
+        return Err(format!("{} places in `at`, expected {}", at.len(), chain.capsules.len()));
+    }
+    for (handle, (place, capsule)) in at.iter().zip(&chain.capsules).enumerate() {
+        span_is_one(scene, Span(*place, *place)).map_err(|problem| format!("`at` of handle {handle}: {problem}"))?;
+        let Span(lo, hi) = capsule.span;
+        if !(path.in_order(lo, *place) && path.in_order(*place, hi)) {
+            return Err(format!("`at` of handle {handle} is not in the handle's span"));
+        }
+    }
+    Ok(())
 }
 
 impl Handle {
@@ -159,6 +193,13 @@ impl Handle {
 
     fn error(&self, when: When) -> Interval {
         if when == When::Middle { self.still } else { self.error }
+    }
+
+    /// Returns the handle on the stage.
+    fn placed(&self, frame: &Mapping) -> Self {
+        let Self { point, tangent, velocity, .. } = self;
+        let (tangent, velocity) = (frame.turned(tangent), frame.turned(velocity));
+        Self { point: frame.on_stage(point), tangent, velocity, ..self.clone() }
     }
 }
 

@@ -43,7 +43,7 @@ pub use self::lines::{
 use self::path::Span;
 use self::pitch::Pitch;
 use self::scene::Scene;
-use self::several::{Alone, Pair};
+use self::several::{Alone, Claim, Pair};
 use self::steps::{Step, Steps};
 
 /// The version of the file format.
@@ -67,7 +67,10 @@ pub struct Proved {
     /// The least clearance, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_clearance: Option<ProvedClearance>,
-    /// The least clearance of each obstacle, in a certificate of that question.
+    /// With several dragons, that of each, and then that of each two.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub least_clearances: Vec<ProvedClearance>,
+    /// The least clearance of each obstacle, in a certificate of that question; with several dragons, for each of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub obstacle_clearances: Vec<ProvedObstacleClearance>,
     /// The greatest speed, in a certificate of that question.
@@ -156,7 +159,7 @@ pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<
     }
     match checker {
         Some(checker) if checker.is_complete() => Ok(checker.finished()),
-        Some(Checker { about: About::Events, .. }) => {
+        Some(checker) if checker.about == About::Events || checker.alone.is_some() => {
             Err(Refused::Form { line: 1, problem: "the file ends before its results".to_owned() })
         }
         Some(_) => Err(Refused::Form { line: 1, problem: "the file ends before its result".to_owned() }),
@@ -196,7 +199,7 @@ impl Checker {
         let alone = if scenes.is_empty() { None } else { Some(Vec::new()) };
         if alone.is_none() {
             scenes.push(Scene::read(&text).map_err(in_scene)?);
-        } else if about != About::Events {
+        } else if !matches!(about, About::Events | About::LeastClearance) {
             return Err("the scene has several dragons, of which this kind of certificate proves nothing".to_owned());
         }
         let dragons =
@@ -208,6 +211,7 @@ impl Checker {
             dragons,
             results,
             least_clearance: None,
+            least_clearances: Vec::new(),
             obstacle_clearances: Vec::new(),
             greatest_speed: None,
             least_pitch: None,
@@ -222,12 +226,20 @@ impl Checker {
 
     /// Returns the number of results of a dragon's section.
     fn results_of(&self, dragon: usize) -> usize {
-        4 + self.scenes[dragon].obstacles.len()
+        let kinds = if self.about == About::Events { 4 } else { 1 };
+        kinds + self.scenes[dragon].obstacles.len()
+    }
+
+    /// Returns the number of results of all sections so far.
+    fn results(&self) -> usize {
+        let Proved { results, least_clearance, least_clearances, obstacle_clearances, .. } = &self.proved;
+        let of_clearance = usize::from(least_clearance.is_some()) + least_clearances.len();
+        results.len() + of_clearance + obstacle_clearances.len()
     }
 
     /// Returns true if the section of a dragon or of two has its results.
     fn is_section_complete(&self) -> bool {
-        let so_far = self.proved.results.len() - self.before;
+        let so_far = self.results() - self.before;
         match (&self.alone, &self.between) {
             (_, Some(_)) => so_far == 1,
             (Some(alone), None) => self.is_in_section && so_far == self.results_of(alone.len()),
@@ -254,7 +266,7 @@ impl Checker {
         self.proved.steps += counts[0];
         self.proved.links += counts[1];
         self.proved.pairs += counts[2];
-        (self.is_in_section, self.before) = (false, self.proved.results.len());
+        (self.is_in_section, self.before) = (false, self.results());
         Ok(())
     }
 
@@ -271,8 +283,8 @@ impl Checker {
 
     /// Handles the lines of a scene of several dragons. Returns false for another line.
     fn add_of_several(&mut self, line: &ParsedLine) -> Result<bool, String> {
-        let Self { scenes, alone, between, proved, .. } = self;
-        let has_result = between.is_some() && proved.results.len() > self.before;
+        let has_result = self.between.is_some() && self.results() > self.before;
+        let Self { about, scenes, alone, between, proved, .. } = self;
         if has_result && !matches!(line, ParsedLine::Dragon { .. } | ParsedLine::Pair { .. }) {
             return Err("nothing of two dragons can follow their result".to_owned());
         }
@@ -294,17 +306,38 @@ impl Checker {
                 }
                 self.between = Some(Pair::new(*dragons));
             }
-            (ParsedLine::Both { from, to, heads, spans: [one, other] }, Some(pair), Some(_)) => {
-                pair.add_clear(scenes, [*from, *to], *heads, [one, other])?;
+            (ParsedLine::Both { from, to, heads, spans: [one, other], apart, at }, Some(pair), Some(_)) => {
+                let claim = match (&about, apart) {
+                    (About::Events, None) => Claim::Clear,
+                    (About::Events, Some(_)) => return Err("`apart` in a certificate of events".to_owned()),
+                    (_, None) => Claim::Links,
+                    (_, Some(metres)) => Claim::Apart(*metres, at.each_ref().map(Vec::as_slice)),
+                };
+                pair.add_both(scenes, [*from, *to], (*heads, [one, other]), claim)?;
+            }
+            (ParsedLine::NearBoth { benches, time, heads, spans: [one, other], at, most }, Some(pair), Some(_)) => {
+                let at = at.each_ref().map(Vec::as_slice);
+                pair.add_near(scenes, (*benches, *time), (*heads, [one, other]), (at, *most))?;
             }
             (ParsedLine::Meeting { benches, time, heads, spans: [one, other], point }, Some(pair), Some(alone)) => {
+                let alone = (*about == About::Events).then_some(alone.as_slice());
                 pair.add_meeting(scenes, alone, (*benches, *time), (*heads, [one, other]), *point)?;
             }
             (ParsedLine::Result(outcome), Some(pair), Some(alone)) => {
                 pair.check(scenes, alone, outcome)?;
                 proved.results.push(outcome.clone());
             }
-            (ParsedLine::Dragon { .. } | ParsedLine::Both { .. } | ParsedLine::Meeting { .. }, ..) => {
+            (ParsedLine::LeastClearance(outcome), Some(pair), Some(_)) => {
+                pair.check_clearance(scenes, outcome)?;
+                proved.least_clearances.push(outcome.clone());
+            }
+            (
+                ParsedLine::Dragon { .. }
+                | ParsedLine::Both { .. }
+                | ParsedLine::NearBoth { .. }
+                | ParsedLine::Meeting { .. },
+                ..,
+            ) => {
                 return Err("it is not in a section of two dragons, or not in its place".to_owned());
             }
             (_, Some(_), _) => return Err("it is about one dragon, in a section of two".to_owned()),
@@ -319,15 +352,11 @@ impl Checker {
     /// Returns true if all results of the question are there.
     fn is_complete(&self) -> bool {
         match self.about {
-            About::Events => match (&self.alone, &self.between) {
+            About::Events | About::LeastClearance => match (&self.alone, &self.between) {
                 (None, _) => self.is_section_complete(),
                 (Some(_), Some(pair)) => self.is_section_complete() && self.next_pair(Some(pair.dragons)).is_none(),
                 (Some(_), None) => self.scenes.len() == 1 && self.is_section_complete(),
             },
-            About::LeastClearance => {
-                let of_obstacles = self.proved.obstacle_clearances.len();
-                self.proved.least_clearance.is_some() && of_obstacles == self.scenes[0].obstacles.len()
-            }
             About::GreatestSpeed => self.proved.greatest_speed.is_some(),
             About::LeastPitch => self.proved.least_pitch.is_some(),
         }
@@ -337,25 +366,27 @@ impl Checker {
         if self.about != About::Events && self.is_complete() {
             return Err("nothing can follow the result".to_owned());
         }
+        let question = match line {
+            ParsedLine::Result(_) => Some(About::Events),
+            ParsedLine::LeastClearance(_) | ParsedLine::ObstacleClearance(_) => Some(About::LeastClearance),
+            ParsedLine::Speeds { .. } | ParsedLine::Fast { .. } | ParsedLine::GreatestSpeed(_) => {
+                Some(About::GreatestSpeed)
+            }
+            ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
+            _ => None,
+        };
+        if question.is_some_and(|question| question != self.about) {
+            return Err("it belongs to another question".to_owned());
+        }
         if self.add_of_several(&line)? {
             return Ok(());
         }
         let section = self.alone.as_ref().map(Vec::len);
-        let Self { about, scenes, before, steps, events, greatest, pitch, proved, .. } = self;
+        let so_far = self.results() - self.before;
+        let Self { about, scenes, steps, events, greatest, pitch, proved, .. } = self;
         let scene = &scenes[section.unwrap_or(0)];
-        let results = &proved.results[*before..];
-        let question = match line {
-            ParsedLine::Result(_) => Some(About::Events),
-            ParsedLine::LeastClearance(_) | ParsedLine::ObstacleClearance(_) => Some(About::LeastClearance),
-            ParsedLine::GreatestSpeed(_) => Some(About::GreatestSpeed),
-            ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
-            _ => None,
-        };
-        if question.is_some_and(|question| question != *about) {
-            return Err("it is a result of another question".to_owned());
-        }
-        let has_results = !results.is_empty() || proved.least_clearance.is_some();
-        if question.is_none() && (events.finish.is_some() || has_results) {
+        let of_section = Vec::from_iter(section);
+        if question.is_none() && (events.finish.is_some() || so_far > 0) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
         }
         match line {
@@ -390,26 +421,35 @@ impl Checker {
             }
             ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
             ParsedLine::Result(outcome) => {
-                results::check(scene, steps, events, &outcome, results)?;
-                if section.into_iter().collect::<Vec<_>>() != outcome.dragons {
+                let earlier = &proved.results[proved.results.len() - so_far..];
+                results::check(scene, steps, events, &outcome, earlier)?;
+                if of_section != outcome.dragons {
                     return Err("it is not the result for this dragon".to_owned());
                 }
                 proved.results.push(outcome);
                 Ok(())
             }
-            ParsedLine::LeastClearance(_) if proved.least_clearance.is_some() => Err("a second result".to_owned()),
+            ParsedLine::LeastClearance(_) if so_far > 0 => Err("a second result".to_owned()),
+            ParsedLine::LeastClearance(ProvedClearance { dragons, .. })
+            | ParsedLine::ObstacleClearance(ProvedObstacleClearance { dragons, .. })
+                if dragons != of_section =>
+            {
+                Err("it is not the result for this dragon".to_owned())
+            }
             ParsedLine::ObstacleClearance(outcome) => {
-                let earlier = proved.obstacle_clearances.len();
-                if proved.least_clearance.is_none() {
+                let Some(earlier) = so_far.checked_sub(1) else {
                     return Err("the result for two boards does not precede it".to_owned());
-                }
+                };
                 results::check_obstacle_clearance(scene, steps, events, &outcome, earlier)?;
                 proved.obstacle_clearances.push(outcome);
                 Ok(())
             }
             ParsedLine::LeastClearance(outcome) => {
                 results::check_clearance(scene, steps, events, &outcome)?;
-                proved.least_clearance = Some(outcome);
+                match section {
+                    Some(_) => proved.least_clearances.push(outcome),
+                    None => proved.least_clearance = Some(outcome),
+                }
                 Ok(())
             }
             ParsedLine::Speeds { from, to, spans, at } => greatest.add_step(scene, Span(from, to), &spans, &at),
@@ -432,6 +472,7 @@ impl Checker {
             ParsedLine::Dragon { .. }
             | ParsedLine::Pair { .. }
             | ParsedLine::Both { .. }
+            | ParsedLine::NearBoth { .. }
             | ParsedLine::Meeting { .. } => Err("the scene has one dragon".to_owned()),
             ParsedLine::LeastPitch(outcome) => {
                 begun(pitch)?.check(&outcome)?;

@@ -91,6 +91,18 @@ pub(super) enum ParsedLine {
         to: f64,
         heads: [Span; 2],
         spans: [Vec<Span>; 2],
+        #[serde(default)]
+        apart: Option<f64>,
+        #[serde(default)]
+        at: [Vec<Place>; 2],
+    },
+    NearBoth {
+        benches: [usize; 2],
+        time: f64,
+        heads: [Span; 2],
+        spans: [Vec<Span>; 2],
+        at: [Vec<Place>; 2],
+        most: f64,
     },
     Meeting {
         benches: [usize; 2],
@@ -243,12 +255,16 @@ pub struct ProvedClearance {
     /// Seconds of that end, for [`Until::Time`].
     #[serde(default)]
     pub time_until: Option<f64>,
-    /// The bench of the two that is nearer the head, counted from 0.
+    /// The bench of the two that is nearer the head, or that of the first of two dragons, counted from 0.
     #[serde(default)]
     pub bench_a: Option<usize>,
     /// The other bench.
     #[serde(default)]
     pub bench_b: Option<usize>,
+    /// In a scene of several dragons, the dragon that the result is about, or the two, counted from 0. Benches are
+    /// counted within each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dragons: Vec<usize>,
 }
 
 /// The proved least clearance of an obstacle, from the scene's start on.
@@ -271,6 +287,9 @@ pub struct ProvedObstacleClearance {
     /// The bench, counted from 0.
     #[serde(default)]
     pub bench: Option<usize>,
+    /// In a scene of several dragons, the dragon that the result is about, counted from 0.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dragons: Vec<usize>,
 }
 
 /// The proved greatest speed of the head at which no handle exceeds a limit.

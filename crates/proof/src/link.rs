@@ -9,6 +9,9 @@ use super::path::{Path, Place, Span};
 /// needs a few.
 const MOST_STRETCHES: usize = 100_000;
 
+/// Limit of stretches of a front's span.
+const MOST_FRONT_STRETCHES: usize = 2_000;
+
 /// Checks Lemma 1: for each place of `front`, the follower lies in `rear` and is continuous. Each capsule comes with the
 /// points at both ends of its span. Returns the front product.
 ///
@@ -24,10 +27,11 @@ pub(super) fn check(
         return Err("the rear's span is not behind the front's".to_owned());
     }
     let pair = Pair::new(front, rear);
-    if !pair.rear_product().is_positive() {
+    let falls = |stretch: Span| falls(path, &Pair::new(front, &Capsule::new(path, stretch)));
+    if !pair.rear_product().is_positive() && !all_stretches(path, rear.span, falls) {
         return Err("the rear product may be 0".to_owned());
     }
-    let product = pair.front_product();
+    let product = front_product(path, &pair);
     let squared = link.square();
     let distance = |u: &Vector, x: &Vector| u.minus(x).norm_squared();
     let (longest, shortest) = if product.is_positive() {
@@ -48,6 +52,37 @@ pub(super) fn check(
     } else {
         Err("a place between the handles may be at the link's length".to_owned())
     }
+}
+
+/// Returns the front product over two spans. If the capsules do not decide its sign, the front's span is cut into
+/// stretches, until one of them may have another sign than positive.
+fn front_product(path: &Path, pair: &Pair) -> Interval {
+    let whole = pair.front_product();
+    if whole.is_positive() || whole.is_negative() {
+        return whole;
+    }
+    let mut waiting = vec![pair.front.span];
+    let mut hull: Option<Interval> = None;
+    for _ in 0..MOST_FRONT_STRETCHES {
+        let Some(stretch) = waiting.pop() else { return hull.unwrap_or(whole) };
+        let capsule = Capsule::new(path, stretch);
+        // The way back from the front, along the tangent there: minus the front product.
+        let back = Pair::new(pair.rear, &capsule);
+        let products = [-back.rear_product(), -back.second_order_rear_product(path)];
+        if let Some(product) = products.into_iter().find(Interval::is_positive) {
+            hull = Some(hull.map_or(product, |hull| hull.hull(&product)));
+            continue;
+        }
+        let at_middle = capsule.tangent.dot(&capsule.point.minus(&pair.rear.point));
+        let Some([first, last]) = halves(path, stretch).filter(|_| at_middle.is_positive()) else { return whole };
+        waiting.extend([last, first]);
+    }
+    whole
+}
+
+/// Returns true if the rear product is positive for all places of the two spans.
+fn falls(path: &Path, pair: &Pair) -> bool {
+    pair.rear_product().is_positive() || pair.second_order_rear_product(path).is_positive()
 }
 
 /// Returns D(u, x) for all u of the span, by Taylor's formula about m_u.
@@ -99,7 +134,7 @@ fn is_nearer(path: &Path, front: &Capsule, span: Span, squared: &Interval) -> bo
         let capsule = Capsule::new(path, stretch);
         let pair = Pair::new(front, &capsule);
         // Kind (b), or kind (a).
-        is_stretch_nearer(&pair, squared) || pair.rear_product().is_positive()
+        is_stretch_nearer(&pair, squared) || falls(path, &pair)
     })
 }
 

@@ -433,6 +433,12 @@ impl Path {
             .upper()
     }
 
+    /// Returns the place of a span about which its capsule is: near the middle.
+    pub fn middle_of(&self, Span(from, to): Span) -> Place {
+        let between = |place: &Place| self.has(*place) && self.in_order(from, *place) && self.in_order(*place, to);
+        Some(self.middle(from, to)).filter(between).unwrap_or(from)
+    }
+
     /// Returns a place near the middle of two others. No proof depends on the choice: callers check that the place is
     /// between.
     pub fn middle(&self, from: Place, to: Place) -> Place {
@@ -461,6 +467,30 @@ impl Path {
             }
             rest = (rest - metres).max(0.0);
         }
-        from
+        let between = |place: &Place| {
+            self.has(*place)
+                && *place != from
+                && *place != to
+                && self.in_order(from, *place)
+                && self.in_order(*place, to)
+        };
+        self.beside_junction(from.0).into_iter().flatten().find(between).unwrap_or(from)
+    }
+
+    /// Returns places near the junction behind a segment, one on each side.
+    fn beside_junction(&self, segment: usize) -> [Option<Place>; 2] {
+        const ASIDE: f64 = 1e-15;
+        // The ends may be wide: the lower end for a coordinate that grows towards the junction, the upper for one that
+        // falls.
+        let at = |index: usize, end: Option<&Interval>, is_lower: bool| {
+            let end = end?;
+            let at = if is_lower { -(-end).upper() } else { end.upper() }.rough();
+            let aside = ASIDE * (1.0 + at.abs());
+            Some(Place(index, if is_lower { at - aside } else { at + aside }, 0.0))
+        };
+        let next = segment + 1;
+        let before = self.segments.get(segment).and_then(|this| at(segment, this.end.as_ref(), !self.falls(segment)));
+        let after = self.segments.get(next).and_then(|next_one| at(next, next_one.begin.as_ref(), self.falls(next)));
+        [before, after]
     }
 }

@@ -83,7 +83,7 @@ impl Pitch {
         point: [f64; 2],
     ) -> Result<(), String> {
         self.next(from, to)?;
-        if a + 2 > b || b >= spans.len() {
+        if b < 2 || a > b - 2 || b >= spans.len() {
             return Err(format!("benches {a} and {b} share a handle, or are not both listed in order"));
         }
         if !self.theta(from, to).is_at_most(&Interval::new(theta)) {

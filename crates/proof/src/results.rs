@@ -80,7 +80,7 @@ pub(super) fn check_clearance(
     events: &Events,
     outcome: &ProvedClearance,
 ) -> Result<(), String> {
-    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b } = *outcome;
+    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b, .. } = *outcome;
     let zero = Interval::new(0.0);
     let comes_to = |metres: &Interval| steps.apart_end.is_some_and(|end| metres.is_at_most(&scene.path.travelled(end)));
     if lo.is_some_and(|lo| !(lo.is_finite() && lo <= steps.apart && comes_to(&zero))) {
@@ -99,7 +99,7 @@ pub(super) fn check_clearance(
             Some(contact.map(|(benches, _)| (benches, zero)).ok_or("a first contact does not follow")?)
         }
         Until::Time => {
-            let is_reached = |time: f64| lo.is_none() || comes_to(&(Interval::new(time) * scene.head_speed));
+            let is_reached = |time: f64| lo.is_none() || comes_to(&scene.travelled_by(&Interval::new(time)));
             let Some(time) = time_until.filter(|time| *time >= 0.0 && is_reached(*time)) else {
                 return Err("time_until does not follow".to_owned());
             };
@@ -122,9 +122,9 @@ pub(super) fn check_clearance(
     }
 }
 
-/// Returns true if the head has surely travelled so far by a time.
+/// Returns true if the head has surely travelled so far by a time of the show.
 fn is_by(scene: &Scene, travelled: &Interval, time: f64) -> bool {
-    travelled.is_at_most(&(Interval::new(time) * scene.head_speed))
+    travelled.is_at_most(&scene.travelled_by(&Interval::new(time)))
 }
 
 /// Checks the result for an obstacle in a certificate of the least clearance.
@@ -138,7 +138,7 @@ pub(super) fn check_obstacle_clearance(
     outcome: &ProvedObstacleClearance,
     earlier: usize,
 ) -> Result<(), String> {
-    let ProvedObstacleClearance { obstacle, lo, hi, until, time_until, bench } = *outcome;
+    let ProvedObstacleClearance { obstacle, lo, hi, until, time_until, bench, .. } = *outcome;
     if obstacle != earlier || obstacle >= scene.obstacles.len() {
         return Err("the obstacles are not all named in their order".to_owned());
     }
@@ -150,7 +150,7 @@ pub(super) fn check_obstacle_clearance(
     let is_reached = match (until, time_until) {
         (Until::PathEnd, None) => beside.all && matches!(events.finish, Some(Finish::PathEnd)),
         (Until::Time, Some(time)) => {
-            time >= 0.0 && (lo.is_none() || comes_to(&(Interval::new(time) * scene.head_speed)))
+            time >= 0.0 && (lo.is_none() || comes_to(&scene.travelled_by(&Interval::new(time))))
         }
         _ => false,
     };

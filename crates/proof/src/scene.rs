@@ -229,6 +229,29 @@ impl Scene {
         }
     }
 
+    /// Returns the metres that the head has travelled at a time of the show if it never comes to the path's end.
+    pub fn travelled_by(&self, time: &Interval) -> Interval {
+        ((time - self.delay) * self.head_speed).max(&Interval::new(0.0))
+    }
+
+    /// Returns the metres that the head has travelled at a time of the show.
+    pub fn travelled_at(&self, time: &Interval) -> Interval {
+        self.travelled_by(time).min(&self.path.length)
+    }
+
+    /// Returns the head's speed from one time of the show to another: 0 while it stands, and every speed between where
+    /// that changes.
+    pub fn speed_between(&self, from: &Interval, to: &Interval) -> Interval {
+        let (zero, end) = (Interval::new(0.0), self.delay + self.path.length / self.head_speed);
+        if to.is_at_most(&self.delay) || end.is_at_most(from) {
+            zero
+        } else if self.delay.is_at_most(from) && to.is_at_most(&end) {
+            self.head_speed
+        } else {
+            zero.hull(&self.head_speed)
+        }
+    }
+
     /// Returns the same team in units of `unit` metres, on the inward spiral r = theta.
     pub fn in_units(&self, unit: &Interval) -> Self {
         let Team { benches, width, hole_inset, head_link, body_link } = &self.team;
@@ -326,7 +349,7 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
     };
     let both = (radius.square() + a.square()).sqrt();
     let second_radius = both / (Interval::new(1.0) + ratio);
-    let first_radius = both - second_radius;
+    let first_radius = second_radius * ratio;
     let angle = elementary::atan(&turn) * Interval::new(2.0);
     let at = inward.at(&turn);
     let first = Curve::arc(at.point, at.tangent, Interval::new(-1.0), first_radius);

@@ -4,8 +4,9 @@ use super::boards::{Board, covers};
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
 use super::events::{Events, Finish};
+use super::first_order::{FirstOrder, FirstOrderBoard, When};
 use super::interval::{Interval, Vector};
-use super::lines::{EventKind, ProvedEvent, Status};
+use super::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
 use super::path::{Place, Span};
 use super::scene::Scene;
 use super::steps::{Steps, straight_run};
@@ -40,13 +41,30 @@ impl Alone {
     }
 }
 
+/// What a stretch of time is said to show of two dragons, whose links do not lock.
+pub(super) enum Claim<'c> {
+    /// Nothing of their boards.
+    Links,
+    /// No boards of the two touch.
+    Clear,
+    /// Boards of the two are further apart than some metres. A place of each handle with the heads at one time.
+    Apart(f64, [&'c [Place]; 2]),
+}
+
 /// The section of two dragons.
 pub(super) struct Pair {
     pub dragons: [usize; 2],
-    /// Seconds up to which no boards of the two touch.
-    clear: Option<f64>,
+    /// Seconds up to which stretches follow one another from the start, and true if all of them were clear, and if all
+    /// say how far boards are apart.
+    end: Option<f64>,
+    all_clear: bool,
+    all_apart: bool,
+    /// The end of the last stretch that says how far boards are apart, and the least of these metres.
+    apart: Option<(f64, f64)>,
     /// Two benches that overlap, and seconds.
     meeting: Option<([usize; 2], f64)>,
+    /// Two benches that are no further apart than some metres at a time, seconds.
+    near: Option<([usize; 2], Interval, f64)>,
     /// Counts for the report.
     pub steps: u64,
     pub links: u64,
@@ -55,6 +73,8 @@ pub(super) struct Pair {
 
 /// The two dragons while their heads are in two spans.
 struct Together {
+    chains: Vec<Chain>,
+    /// The capsules of the handles on the stage.
     capsules: [Vec<Capsule>; 2],
     /// The boards on the line without end, if they are not listed.
     runs: [Option<(Capsule, Capsule, Interval)>; 2],
@@ -64,17 +84,15 @@ struct Together {
 /// Returns true if a head is surely in a span from one time to another: it stands at the start before its delay has
 /// passed, and at the path's end.
 fn is_in_span(scene: &Scene, Span(lo, hi): Span, from: &Interval, to: &Interval) -> bool {
-    let zero = Interval::new(0.0);
-    let travelled = |time: &Interval| ((time - scene.delay) * scene.head_speed).max(&zero).min(&scene.path.length);
-    scene.path.travelled(lo).is_at_most(&travelled(from))
-        && (scene.path.is_at_end(hi) || travelled(to).is_at_most(&scene.path.travelled(hi)))
+    scene.path.travelled(lo).is_at_most(&scene.travelled_at(from))
+        && (scene.path.is_at_end(hi) || scene.travelled_at(to).is_at_most(&scene.path.travelled(hi)))
 }
 
 impl Together {
     /// Checks that both heads are in their spans from one time to another, and Lemma 1 for the listed links.
     fn new(scenes: [&Scene; 2], [from, to]: [f64; 2], heads: [Span; 2], spans: [&[Span]; 2]) -> Result<Self, String> {
         let [from, to] = [from, to].map(Interval::new);
-        let mut together = Self { capsules: [Vec::new(), Vec::new()], runs: [None, None], links: 0 };
+        let mut together = Self { chains: Vec::new(), capsules: Default::default(), runs: [None, None], links: 0 };
         for (k, scene) in scenes.into_iter().enumerate() {
             span_is_one(scene, heads[k]).map_err(|problem| format!("head {k} of the two: {problem}"))?;
             if !is_in_span(scene, heads[k], &from, &to) {
@@ -88,6 +106,7 @@ impl Together {
                 let (front, rear, length) = straight_run(scene, &chain, chain.last());
                 together.runs[k] = Some((on_stage(&front), on_stage(&rear), length));
             }
+            together.chains.push(chain);
         }
         Ok(together)
     }
@@ -110,25 +129,51 @@ impl Together {
     }
 }
 
+impl Together {
+    /// Encloses both dragons to the first order on the stage.
+    fn first_order(
+        &self,
+        scenes: [&Scene; 2],
+        [from, to]: [f64; 2],
+        at: [&[Place]; 2],
+    ) -> Result<[FirstOrder; 2], String> {
+        let [from, to] = [from, to].map(Interval::new);
+        let of = |k: usize| {
+            let step = FirstOrder::in_time(scenes[k], &self.chains[k], at[k], &from, &to);
+            step.map(|step| step.placed(&scenes[k].frame))
+                .map_err(|problem| format!("dragon {k} of the two: {problem}"))
+        };
+        Ok([of(0)?, of(1)?])
+    }
+
+    /// Returns all boards of a dragon to the first order, as [`Together::boards`].
+    fn first_order_boards(&self, scene: &Scene, k: usize, step: &FirstOrder) -> Vec<FirstOrderBoard> {
+        let listed = self.capsules[k].len() - 1;
+        let boards = (0..listed).map(|bench| step.board(bench, &scene.team));
+        boards.chain(self.runs[k].is_some().then(|| step.straight_run(listed, &scene.team))).collect()
+    }
+}
+
 impl Pair {
     pub fn new(dragons: [usize; 2]) -> Self {
-        Self { dragons, clear: None, meeting: None, steps: 0, links: 0, pairs: 0 }
+        let (end, apart, meeting, near) = (None, None, None, None);
+        Self { dragons, end, all_clear: true, all_apart: true, apart, meeting, near, steps: 0, links: 0, pairs: 0 }
     }
 
     fn scenes<'s>(&self, scenes: &'s [Scene]) -> [&'s Scene; 2] {
         self.dragons.map(|dragon| &scenes[dragon])
     }
 
-    /// Checks and adds a stretch of time in which no boards of the two touch.
+    /// Checks and adds a stretch of time.
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_clear(
+    pub fn add_both(
         &mut self,
         scenes: &[Scene],
         [from, to]: [f64; 2],
-        heads: [Span; 2],
-        spans: [&[Span]; 2],
+        (heads, spans): ([Span; 2], [&[Span]; 2]),
+        claim: Claim,
     ) -> Result<(), String> {
         if self.meeting.is_some() {
             return Err("a step after a contact of the two".to_owned());
@@ -136,7 +181,7 @@ impl Pair {
         if !(from.is_finite() && to.is_finite() && from < to) {
             return Err("it does not go forward in time".to_owned());
         }
-        match self.clear {
+        match self.end {
             Some(end) if end != from => return Err("it does not begin when the step before it ended".to_owned()),
             None if from > 0.0 => return Err("the first step begins after the start".to_owned()),
             _ => {}
@@ -144,26 +189,88 @@ impl Pair {
         let scenes = self.scenes(scenes);
         let together = Together::new(scenes, [from, to], heads, spans)?;
         let boards = [together.boards(scenes[0], 0)?, together.boards(scenes[1], 1)?];
-        for (a, one) in boards[0].iter().enumerate() {
-            if let Some(b) = boards[1].iter().position(|other| !one.is_apart_from(other)) {
-                return Err(format!("bench {a} of the first and bench {b} of the second may touch (Lemma 2)"));
+        match claim {
+            Claim::Links => (self.all_clear, self.all_apart) = (false, false),
+            Claim::Clear => {
+                self.all_apart = false;
+                self.pairs += check_pairs(&boards, |[a, b]| boards[0][a].is_apart_from(&boards[1][b]), "2")?;
+            }
+            Claim::Apart(metres, at) => {
+                self.all_clear = false;
+                if !self.all_apart {
+                    return Err("it says how far boards are apart after a step that does not".to_owned());
+                }
+                if !metres.is_finite() {
+                    return Err(format!("`apart` is {metres:?}, expected a number"));
+                }
+                let steps = together.first_order(scenes, [from, to], at)?;
+                let first_order = [0, 1].map(|k| together.first_order_boards(scenes[k], k, &steps[k]));
+                let limit = Interval::new(metres);
+                let are_apart = |[a, b]: [usize; 2]| {
+                    let (one, other) = (&boards[0][a], &boards[1][b]);
+                    one.is_clearly_apart_by(&limit, other)
+                        || one.is_apart_by(&limit, other)
+                        || first_order[0][a].is_apart_by(&limit, &first_order[1][b], When::Always)
+                        || one.is_apart_somehow(&limit, other)
+                };
+                self.pairs += check_pairs(&boards, are_apart, "6")?;
+                self.apart = Some((to, self.apart.map_or(metres, |(_, least)| least.min(metres))));
             }
         }
-        self.pairs += (boards[0].len() * boards[1].len()) as u64;
         self.links += together.links;
         self.steps += 1;
-        self.clear = Some(to);
+        self.end = Some(to);
         Ok(())
     }
 
-    /// Checks and adds a contact of two boards at a time.
+    /// Checks and adds two boards that are no further apart than `most` metres at a time that the steps have come to.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn add_near(
+        &mut self,
+        scenes: &[Scene],
+        (benches, time): ([usize; 2], f64),
+        (heads, spans): ([Span; 2], [&[Span]; 2]),
+        (at, most): ([&[Place]; 2], f64),
+    ) -> Result<(), String> {
+        if self.near.is_some() {
+            return Err("a second line `near_both`".to_owned());
+        }
+        self.is_reached(time)?;
+        let scenes = self.scenes(scenes);
+        let together = Together::new(scenes, [time; 2], heads, spans)?;
+        let steps = together.first_order(scenes, [time; 2], at)?;
+        if let Some(k) = (0..2).find(|k| benches[*k] >= spans[*k].len()) {
+            return Err(format!("bench {} is not listed", benches[k]));
+        }
+        let [one, other] = [0, 1].map(|k| steps[k].board(benches[k], &scenes[k].team));
+        let most = Interval::new(most);
+        if !one.at_most(&other).is_at_most(&most) {
+            return Err("the two benches may be further apart than it says (Lemma 6)".to_owned());
+        }
+        self.near = Some((benches, most, time));
+        Ok(())
+    }
+
+    /// Checks that the steps have come to a time: no link has locked until then.
+    fn is_reached(&self, time: f64) -> Result<(), String> {
+        if time >= 0.0 && self.end.is_some_and(|end| time <= end) {
+            Ok(())
+        } else {
+            Err("the steps of the two have not come to the time".to_owned())
+        }
+    }
+
+    /// Checks and adds a contact of two boards at a time. The motions go on until then by the sections of both dragons
+    /// alone, if they are given, or else by the steps of the two.
     ///
     /// # Errors
     /// The condition that does not follow.
     pub fn add_meeting(
         &mut self,
         scenes: &[Scene],
-        alone: &[Alone],
+        alone: Option<&[Alone]>,
         (benches, time): ([usize; 2], f64),
         (heads, spans): ([Span; 2], [&[Span]; 2]),
         [x, y]: [f64; 2],
@@ -174,13 +281,17 @@ impl Pair {
         if !(time.is_finite() && time >= 0.0) {
             return Err("the time is before the start".to_owned());
         }
+        if alone.is_none() {
+            self.is_reached(time)?;
+        }
         let (scenes, point) = (self.scenes(scenes), Vector::new(x, y));
         let together = Together::new(scenes, [time; 2], heads, spans)?;
         for (k, scene) in scenes.into_iter().enumerate() {
             // Otherwise the motion may have ended with a lock.
-            let Alone { end, ends_with_path, .. } = alone[self.dragons[k]];
-            let has_come = |end: Place| scene.path.in_order(heads[k].1, end);
-            if !(ends_with_path || end.is_some_and(has_come)) {
+            let has_come = |Alone { end, ends_with_path, .. }: &Alone| {
+                *ends_with_path || end.is_some_and(|end| scene.path.in_order(heads[k].1, end))
+            };
+            if !alone.is_none_or(|alone| has_come(&alone[self.dragons[k]])) {
                 return Err(format!("no step of dragon {} has come there", self.dragons[k]));
             }
             if benches[k] >= spans[k].len() {
@@ -203,17 +314,17 @@ impl Pair {
         if event != EventKind::Contact || obstacle.is_some() || *dragons != self.dragons {
             return Err("it is not the result for a contact of these two dragons".to_owned());
         }
-        let clear = self.clear.unwrap_or(0.0);
+        if !self.all_clear {
+            return Err("not all steps of the two say that no boards touch".to_owned());
+        }
+        let clear = self.end.unwrap_or(0.0);
         let begins = |lo: f64| lo >= 0.0 && lo <= clear;
         let no_benches = bench_a.is_none() && bench_b.is_none();
-        let ends = |scene: &Scene| scene.time(&scene.path.length).is_at_most(&Interval::new(clear));
         let follows = match (status, time_lo, time_hi) {
-            (Status::None, None, None) => {
-                no_benches && self.clear.is_some() && self.scenes(scenes).into_iter().all(ends)
-            }
+            (Status::None, None, None) => no_benches && self.end.is_some() && self.ends_with_paths(scenes),
             (Status::None, Some(lo), None) => {
                 let is_of = |dragon: &usize| alone[*dragon].locks_just_after(&scenes[*dragon], lo);
-                no_benches && self.clear.is_some() && begins(lo) && self.dragons.iter().any(is_of)
+                no_benches && self.end.is_some() && begins(lo) && self.dragons.iter().any(is_of)
             }
             (Status::Undecided, Some(lo), None) => no_benches && begins(lo),
             (Status::Proved, Some(lo), Some(hi)) => {
@@ -230,4 +341,58 @@ impl Pair {
             Err("the result for a contact of two dragons does not follow".to_owned())
         }
     }
+
+    /// Returns true if the steps have come to the ends of both paths.
+    fn ends_with_paths(&self, scenes: &[Scene]) -> bool {
+        let end = Interval::new(self.end.unwrap_or(0.0));
+        self.scenes(scenes).into_iter().all(|scene| scene.time(&scene.path.length).is_at_most(&end))
+    }
+
+    /// Checks the result for the least clearance of the two.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn check_clearance(&self, scenes: &[Scene], outcome: &ProvedClearance) -> Result<(), String> {
+        let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b, ref dragons } = *outcome;
+        if *dragons != self.dragons {
+            return Err("it is not the result for the least clearance of these two dragons".to_owned());
+        }
+        let covers = |time: f64| self.apart.is_some_and(|(end, _)| time <= end);
+        if lo.is_some_and(|lo| !(lo.is_finite() && covers(0.0) && self.apart.is_some_and(|(_, least)| lo <= least))) {
+            return Err("the clearance lo does not follow".to_owned());
+        }
+        let near = self.near.map(|(benches, most, _)| (benches, most));
+        let near = match (until, time_until) {
+            (Until::PathEnd, None) if self.all_apart && self.ends_with_paths(scenes) => near,
+            (Until::Contact, None) => {
+                // Boards are apart at the start, and two overlap later.
+                let begins = covers(0.0) && self.apart.is_some_and(|(_, least)| least >= 0.0);
+                let meeting = self.meeting.filter(|_| begins && lo.is_none_or(|lo| lo <= 0.0));
+                let (benches, _) = meeting.ok_or("a first contact of the two does not follow")?;
+                Some((benches, Interval::new(0.0)))
+            }
+            (Until::Time, Some(time)) if time >= 0.0 && time.is_finite() && (lo.is_none() || covers(time)) => {
+                near.filter(|_| self.near.is_some_and(|(.., at)| at <= time))
+            }
+            _ => return Err("the end of the stretch does not follow".to_owned()),
+        };
+        let follows = match (hi, near) {
+            (None, _) => bench_a.is_none() && bench_b.is_none(),
+            (Some(hi), Some((benches, most))) => {
+                benches.map(Some) == [bench_a, bench_b] && most.is_at_most(&Interval::new(hi))
+            }
+            (Some(_), None) => false,
+        };
+        if follows { Ok(()) } else { Err("the clearance hi, or its benches, do not follow".to_owned()) }
+    }
+}
+
+/// Checks each board of the one with each of the other, by a lemma. Returns the number of pairs.
+fn check_pairs(boards: &[Vec<Board>; 2], are_apart: impl Fn([usize; 2]) -> bool, lemma: &str) -> Result<u64, String> {
+    for a in 0..boards[0].len() {
+        if let Some(b) = (0..boards[1].len()).find(|b| !are_apart([a, *b])) {
+            return Err(format!("bench {a} of the first and bench {b} of the second may be too near (Lemma {lemma})"));
+        }
+    }
+    Ok((boards[0].len() * boards[1].len()) as u64)
 }

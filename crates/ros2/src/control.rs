@@ -45,6 +45,8 @@ const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
+/// The longest interval at which an answer that RustDDS refuses is tried again: the interval doubles.
+const RETRY_INTERVAL: Duration = Duration::from_millis(32);
 /// The interval without services that conduct the show.
 const PARAMETERS_INTERVAL: Duration = Duration::from_millis(50);
 /// The time for clients to get the last answers.
@@ -103,6 +105,8 @@ struct Pending {
     call: Call,
     client: Client,
     progress: Progress,
+    /// When a refused answer is tried again, and how long after the refusal.
+    retry: Option<(Instant, Duration)>,
 }
 
 /// The progress of a call.
@@ -181,7 +185,7 @@ impl Server {
                 let Some(response) = refusal(call, &sentence) else { continue };
                 Progress::Answered(response, Instant::now())
             };
-            self.pending.push(Pending { port, call, client, progress });
+            self.pending.push(Pending { port, call, client, progress, retry: None });
         }
     }
 
@@ -227,8 +231,11 @@ impl Server {
     /// Sends the answers whose clients are matched, or whose patience is over.
     fn send_answers(&mut self) {
         let (ports, matches) = (&mut self.endpoints.ports, &self.matches);
-        self.pending.retain(|Pending { port, client, progress, .. }| {
+        self.pending.retain_mut(|Pending { port, client, progress, retry, .. }| {
             let Progress::Answered(response, since) = progress else { return true };
+            if retry.is_some_and(|(at, _)| Instant::now() < at) {
+                return true;
+            }
             let endpoint = &mut ports[*port];
             let reached =
                 matches.reaches(endpoint.responses_guid, endpoint.requests_guid, client.writer, client.reader);
@@ -244,11 +251,17 @@ impl Server {
                 Some(reader) => vec![reader],
                 None => matches.readers_in_process(endpoint.responses_guid, client.writer),
             };
+            // Cyclone drops an answer that is named in the first heartbeat.
+            if !client.header.is_empty() {
+                readers.iter().for_each(|reader| matches.announce(endpoint.responses_guid, *reader, endpoint.answers));
+            }
             let is_sent = endpoint.answer(client, &readers, response);
             let is_late = since.elapsed() >= patience;
             if !is_sent && is_late {
                 endpoint.report_discarded();
             }
+            let delay = retry.map_or(ANSWER_INTERVAL, |(_, delay)| RETRY_INTERVAL.min(2 * delay));
+            *retry = Some((Instant::now() + delay, delay));
             !is_sent && !is_late
         });
     }

@@ -11,14 +11,13 @@ use std::time::{Duration, Instant};
 
 use rustdds::{DomainParticipant, GUID};
 
-use super::retransmission::{addressed, send};
+use super::retransmission::{LITTLE_ENDIAN, addressed, reader_addresses, send, submessage};
 
 /// The time for a new subscriber to discover the writer, and the interval of the datagrams.
 const PATIENCE: Duration = Duration::from_secs(1);
 const INTERVAL: Duration = Duration::from_millis(1);
-/// The kind of the submessage, and its first flag.
+/// The kind of the submessage.
 const GAP: u8 = 0x08;
-const LITTLE_ENDIAN: u8 = 1;
 
 /// The messages of a writer that a new reader must not get.
 pub(super) struct OldMessages {
@@ -32,10 +31,7 @@ pub(super) struct OldMessages {
 impl OldMessages {
     /// Withholds the first `last` messages of `writer` from `reader`.
     pub(super) fn of(participant: &DomainParticipant, writer: GUID, reader: GUID, last: u32) -> Option<Self> {
-        let mut readers = participant.discovered_readers().into_iter();
-        let data = readers.find(|data| data.reader_proxy.remote_reader_guid == reader)?;
-        let locators = data.reader_proxy.unicast_locator_list.into_iter().filter(|locator| locator.is_udp());
-        let addresses = locators.map(SocketAddr::from).collect();
+        let addresses = reader_addresses(participant, reader)?;
         let datagram = datagram(writer.to_bytes(), reader.to_bytes(), last);
         (last > 0).then(|| Self { reader, datagram, addresses, since: Instant::now(), sent: None })
     }
@@ -59,12 +55,8 @@ impl OldMessages {
 /// Returns the message of `writer` to `reader`: its messages 1 to `last`, at least 1, are not for it.
 fn datagram(writer: [u8; 16], reader: [u8; 16], last: u32) -> Vec<u8> {
     let (mut bytes, [writer, reader]) = addressed(writer, reader);
-    bytes.extend([GAP, LITTLE_ENDIAN, 32, 0]);
-    bytes.extend([reader, writer].concat());
     // The start (high, low), the end, and a set of one number: the end.
-    for word in [0, 1, 0, last, 1, 1 << 31] {
-        bytes.extend(u32::to_le_bytes(word));
-    }
+    bytes.extend(submessage(GAP, LITTLE_ENDIAN, [reader, writer], &[0, 1, 0, last, 1, 1 << 31]));
     bytes
 }
 

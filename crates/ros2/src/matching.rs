@@ -12,6 +12,7 @@ use rustdds::policy::Durability;
 use rustdds::{DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
 
 use super::gaps::OldMessages;
+use super::heartbeats::send_heartbeat;
 use super::retransmission::FirstMessages;
 
 /// The matches of one participant, shared by its threads.
@@ -67,11 +68,23 @@ impl Matches {
         })
     }
 
+    /// Forgets a local writer that is gone: RustDDS reports no end of its matches.
+    pub(super) fn forget(&self, writer: GUID) {
+        let mut ends = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
+        ends.update();
+        ends.readers.retain(|(here, _)| *here != writer);
+    }
+
     /// Withholds the first `last` messages of a local writer from a new subscriber.
     pub(super) fn withhold(&self, writer: GUID, reader: GUID, last: u32) {
         let mut ends = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
         let old = OldMessages::of(&ends.participant, writer, reader, last);
         ends.old_messages.extend(old);
+    }
+
+    /// Tells a remote reader that a local writer has written `written` messages until now.
+    pub(super) fn announce(&self, writer: GUID, reader: GUID, written: u32) {
+        self.with(|ends| send_heartbeat(&ends.participant, writer, reader, written));
     }
 
     /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to

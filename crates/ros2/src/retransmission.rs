@@ -29,7 +29,8 @@ const FIRST_MESSAGES: u32 = 4;
 /// Kinds of submessages.
 const INFO_DST: u8 = 0x0e;
 const NACK_FRAG: u8 = 0x12;
-const LITTLE_ENDIAN: u8 = 1;
+/// The flag of a submessage in little endian.
+pub(super) const LITTLE_ENDIAN: u8 = 1;
 
 /// The times after a match at which the messages are requested. The first one usually suffices; a datagram can be lost,
 /// and discovery can tell the writer's address late.
@@ -75,6 +76,14 @@ impl FirstMessages {
     }
 }
 
+/// Returns the addresses of a remote reader.
+pub(super) fn reader_addresses(participant: &DomainParticipant, reader: GUID) -> Option<Vec<SocketAddr>> {
+    let mut readers = participant.discovered_readers().into_iter();
+    let data = readers.find(|data| data.reader_proxy.remote_reader_guid == reader)?;
+    let locators = data.reader_proxy.unicast_locator_list.into_iter().filter(|locator| locator.is_udp());
+    Some(locators.map(SocketAddr::from).collect())
+}
+
 /// Sends a datagram to these addresses. A failure is logged only: the network may lose any datagram.
 pub(super) fn send(datagram: &[u8], addresses: impl Iterator<Item = SocketAddr>) {
     for address in addresses {
@@ -99,16 +108,20 @@ pub(super) fn addressed(from: [u8; 16], to: [u8; 16]) -> (Vec<u8>, [[u8; 4]; 2])
     (bytes, [from.1, to.1])
 }
 
+/// Returns a submessage about the messages of a writer: its header, the numbers of reader and writer, and `words`.
+pub(super) fn submessage(kind: u8, flags: u8, [reader, writer]: [[u8; 4]; 2], words: &[u32]) -> Vec<u8> {
+    let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let [low, high] = ((8 + words.len()) as u16).to_le_bytes();
+    [[kind, flags, low, high].as_slice(), &reader, &writer, &words].concat()
+}
+
 /// Returns the message of `reader` to `writer`. `round` counts the messages of this kind from 0.
 fn datagram(reader: [u8; 16], writer: [u8; 16], round: u32) -> Vec<u8> {
-    let (mut bytes, [reader, writer]) = addressed(reader, writer);
+    let (mut bytes, ends) = addressed(reader, writer);
     for sequence in 1..=FIRST_MESSAGES {
-        bytes.extend([NACK_FRAG, LITTLE_ENDIAN, 32, 0]);
-        bytes.extend([reader, writer].concat());
         // The sequence number (high, low), the set of the first fragment alone (base, bits, bitmap), and the counter.
-        for word in [0, sequence, 1, 1, 1 << 31, round * FIRST_MESSAGES + sequence] {
-            bytes.extend(word.to_le_bytes());
-        }
+        let words = [0, sequence, 1, 1, 1 << 31, round * FIRST_MESSAGES + sequence];
+        bytes.extend(submessage(NACK_FRAG, LITTLE_ENDIAN, ends, &words));
     }
     bytes
 }

@@ -12,6 +12,8 @@
 //! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages for
 //! all subscribers of the topic, of a killed one for its lease: 20 s with Fast DDS. So a refused message is held and
 //! written again, and a writer that refuses for longer than a new subscriber takes is replaced.
+//!
+//! A volatile writer is relieved by a second one before it has written many messages ([`relief`](super::relief)).
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -23,6 +25,7 @@ use rustdds::{GUID, QosPolicies, QosPolicyBuilder, TopicKind};
 use serde::Serialize;
 
 use super::matching::Matches;
+use super::relief::Relief;
 use super::{Ros2Config, Ros2Error};
 use bench_dragon_messages::{MOST_CUES, MOST_DRAGONS, MOST_OBSTACLES, QUEUE_BYTES, Stage};
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
@@ -54,6 +57,7 @@ pub(super) struct TopicWriter<Message: Serialize> {
     replaced: Option<Instant>,
     /// The held message of a transient-local topic.
     latched: Option<Latched<Message>>,
+    relief: Relief<Publisher<Arc<Message>>>,
 }
 
 /// A message that RustDDS has refused, with the time of the first refusal.
@@ -128,11 +132,12 @@ impl<Message: Serialize> TopicWriter<Message> {
 
     fn write(&mut self, message: Arc<Message>) -> bool {
         let is_written = self.publisher.publish(message).is_ok();
-        if let Some(latched) = &mut self.latched
-            && is_written
-        {
-            latched.written += 1;
-            latched.is_written = true;
+        if is_written {
+            self.relief.count();
+            if let Some(latched) = &mut self.latched {
+                latched.written += 1;
+                latched.is_written = true;
+            }
         }
         is_written
     }
@@ -146,6 +151,26 @@ impl<Message: Serialize> TopicWriter<Message> {
         }
         if let Some(latched) = &mut self.latched {
             (latched.written, latched.is_written) = (0, false);
+        }
+        self.relief = Relief::default();
+    }
+
+    /// Relieves a volatile publisher when it is due.
+    fn relieve(&mut self, matches: &Matches, node: &mut Node) {
+        let (dds, topic) = (&self.dds, &self.topic);
+        let create = || match node.create_publisher(dds, None) {
+            Ok(publisher) => Some(publisher),
+            Err(error) => {
+                log::debug!("ROS 2 topic {topic}: {error}");
+                None
+            }
+        };
+        let is_matched = |first: &Publisher<_>, second: &Publisher<_>| {
+            let matched = matches.subscribers(second.guid());
+            matches.subscribers(first.guid()).keys().all(|reader| matched.contains_key(reader))
+        };
+        if let Some(ended) = self.relief.serve(&mut self.publisher, Instant::now(), create, is_matched) {
+            matches.forget(ended.guid());
         }
     }
 }
@@ -162,7 +187,7 @@ pub(super) trait Serviced {
 impl<Message: Serialize> Serviced for TopicWriter<Message> {
     fn service(&mut self, matches: &Matches, node: &mut Node) {
         self.end_refusal(node);
-        let Some(latched) = &mut self.latched else { return };
+        let Some(latched) = &mut self.latched else { return self.relieve(matches, node) };
         let writer = self.publisher.guid();
         let subscribers = matches.subscribers(writer);
         if subscribers.is_empty() && self.replaced.is_some_and(|replaced| replaced.elapsed() < MATCHING_TIME) {
@@ -271,7 +296,16 @@ impl WriterFactory<'_> {
             is_constant,
         };
         let latched = (qos.durability == Durability::TransientLocal).then_some(nothing);
-        Ok(Some(TopicWriter { publisher, dds, topic: name, reported: false, refused: None, replaced: None, latched }))
+        Ok(Some(TopicWriter {
+            publisher,
+            dds,
+            topic: name,
+            reported: false,
+            refused: None,
+            replaced: None,
+            latched,
+            relief: Relief::default(),
+        }))
     }
 }
 

@@ -3,14 +3,12 @@
 //! In: a motion and its own time. Out: the chain and its clearance. The show calls it, for its one dragon or for each
 //! of several.
 
-use std::ops::Range;
-
 use crate::scene::Scene;
-use bench_dragon_motion::Motion;
 use bench_dragon_motion::clearance::{ClearanceMonitor, ObstacleMonitor, PairClearance};
 use bench_dragon_motion::linkage::NoFollower;
 use bench_dragon_motion::placement::Placement;
-use bench_dragon_motion::solve::{Chain, Solver, Velocities};
+use bench_dragon_motion::solve::{Chain, ChainMut, Positions, Solver, Velocities};
+use bench_dragon_motion::{Choice, Motion};
 
 /// One dragon in play.
 pub(crate) struct Dancer {
@@ -38,10 +36,14 @@ pub(crate) struct Closest {
 }
 
 impl Dancer {
+    /// Returns the solver of a motion's frames.
+    pub(crate) fn choice(scene: &Scene, motion: &Motion) -> Choice {
+        motion.in_own_frame().solver(scene.velocities)
+    }
+
     /// Creates the dragon of `motion` with what the scene computes.
-    pub(crate) fn new(scene: &Scene, motion: &Motion) -> Self {
+    pub(crate) fn new(scene: &Scene, motion: &Motion, choice: Choice) -> Self {
         let own = motion.in_own_frame();
-        let choice = own.solver(scene.velocities);
         Self {
             velocities: scene.velocities,
             metres_per_second: motion.travelled_at(1.0),
@@ -60,46 +62,20 @@ impl Dancer {
     }
 
     /// Fills `chain` on the stage at a time of the dragon's own, and measures its clearance.
-    pub(crate) fn solve(&mut self, time: f64, moves: bool, chain: &mut Chain) -> Result<Closest, NoFollower> {
-        let solved = self.solve_in_own_frame(time, chain);
-        if solved.is_ok() {
+    pub(crate) fn solve(&mut self, time: f64, moves: bool, chain: &mut ChainMut) -> Result<Closest, NoFollower> {
+        let solved_at = solve_in_at_or_just_before(self.solver.as_mut(), time, chain);
+        let closest = solved_at.map(|solved_at| self.measure(solved_at, chain.positions()));
+        if closest.is_ok() {
             self.placement.chain(chain);
         }
-        if !moves {
-            self.stand(chain, 0..chain.handles());
+        if !moves && self.velocities == Velocities::Computed {
+            let ChainMut { speed, vx, vy, .. } = chain;
+            [speed, vx, vy].into_iter().for_each(|numbers| numbers.fill(0.0));
         }
-        solved
+        closest
     }
 
-    /// The same for one of several, whose handles are those of `all` from `first` on. `own` holds its chain meanwhile.
-    pub(crate) fn solve_among(
-        &mut self,
-        (time, moves): (f64, bool),
-        own: &mut Chain,
-        first: usize,
-        all: &mut Chain,
-    ) -> Result<Closest, NoFollower> {
-        let closest = self.solve_in_own_frame(time, own)?;
-        self.placement.put(own, first, all);
-        if !moves {
-            self.stand(all, first..first + own.handles());
-        }
-        Ok(closest)
-    }
-
-    fn solve_in_own_frame(&mut self, time: f64, chain: &mut Chain) -> Result<Closest, NoFollower> {
-        let solved_at = solve_at_or_just_before(self.solver.as_mut(), time, chain)?;
-        Ok(self.measure(solved_at, chain))
-    }
-
-    fn stand(&self, chain: &mut Chain, handles: Range<usize>) {
-        if self.velocities == Velocities::Computed {
-            let Chain { speed, vx, vy, .. } = chain;
-            [speed, vx, vy].into_iter().for_each(|numbers| numbers[handles.clone()].fill(0.0));
-        }
-    }
-
-    fn measure(&mut self, solved_at: f64, chain: &Chain) -> Closest {
+    fn measure(&mut self, solved_at: f64, chain: Positions) -> Closest {
         let Some(clearance) = &mut self.clearance else { return Closest { boards: None, any: None } };
         let travelled = self.metres_per_second * solved_at;
         let placed = |PairClearance { value, bench_a, bench_b, point_a, point_b }| {
@@ -123,9 +99,13 @@ impl Dancer {
 /// # Errors
 /// [`NoFollower`] if there is none so near. `chain` is then unspecified.
 pub fn solve_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<f64, NoFollower> {
+    solve_in_at_or_just_before(solver, time, &mut chain.all_mut())
+}
+
+fn solve_in_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut ChainMut) -> Result<f64, NoFollower> {
     let mut back = f64::EPSILON * time;
     let mut at = time;
-    while let Err(none) = solver.solve(at, chain) {
+    while let Err(none) = solver.solve_in(at, chain) {
         at = time - back;
         back *= 2.0;
         // Also ends for NaN and for a time of 0.

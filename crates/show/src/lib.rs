@@ -137,7 +137,7 @@ impl Cast {
     fn new(scene: &Scene) -> Self {
         match &scene.ensemble {
             Some(ensemble) => Self::Several(Box::new(Several::new(scene, ensemble))),
-            None => Self::One(Box::new(Dancer::new(scene, &scene.motion))),
+            None => Self::One(Box::new(Dancer::new(scene, &scene.motion, Dancer::choice(scene, &scene.motion)))),
         }
     }
 
@@ -152,7 +152,7 @@ impl Cast {
 
     fn solve(&mut self, sim_time: f64, moves: bool, chain: &mut Chain) -> Result<Closest, NoFollower> {
         match self {
-            Self::One(dancer) => dancer.solve(sim_time, moves, chain),
+            Self::One(dancer) => dancer.solve(sim_time, moves, &mut chain.all_mut()),
             Self::Several(several) => several.solve(sim_time, moves, chain),
         }
     }

@@ -7,18 +7,17 @@ use std::ops::Range;
 
 use crate::dancer::{Closest, Dancer};
 use crate::scene::Scene;
-use bench_dragon_motion::clearance::{BetweenMonitor, PairClearance};
+use bench_dragon_motion::Choice;
+use bench_dragon_motion::clearance::{BetweenMonitor, Moment, PairClearance};
 use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::linkage::NoFollower;
-use bench_dragon_motion::model::team::Team;
-use bench_dragon_motion::solve::Chain;
+use bench_dragon_motion::solve::{Chain, ChainMut};
 
 /// One of several dragons in play.
 struct Member {
     dragon: Dragon,
     dancer: Dancer,
     handles: Range<usize>,
-    chain: Chain,
     /// The own time solved, and true if it moved then.
     solved: Option<(f64, bool)>,
     /// The nearest of its boards, by the numbers of the show.
@@ -29,22 +28,24 @@ struct Member {
 pub(crate) struct Several {
     members: Vec<Member>,
     between: Option<BetweenMonitor>,
+    /// By dragon: the metres that its head has travelled in the latest frame.
+    travelled: Vec<f64>,
 }
 
 impl Several {
     pub(crate) fn new(scene: &Scene, ensemble: &Ensemble) -> Self {
-        let member = |(k, dragon): (usize, &Dragon)| Member {
-            dancer: Dancer::new(scene, &dragon.motion),
+        let choices: Vec<Choice> =
+            ensemble.dragons().iter().map(|dragon| Dancer::choice(scene, &dragon.motion)).collect();
+        let between = scene.alerts.map(|_| ensemble.between_monitor(&choices));
+        let member = |((k, dragon), choice): ((usize, &Dragon), Choice)| Member {
+            dancer: Dancer::new(scene, &dragon.motion, choice),
             handles: ensemble.handles_of(k),
-            chain: Chain::new(dragon.motion.team().handles()),
             solved: None,
             closest: Closest { boards: None, any: None },
             dragon: dragon.clone(),
         };
-        let members = ensemble.dragons().iter().enumerate().map(member).collect();
-        let teams: Vec<Team> = ensemble.dragons().iter().map(|dragon| *dragon.motion.team()).collect();
-        let between = scene.alerts.map(|_| BetweenMonitor::new(&teams, ensemble.link_tolerance().max(1e-9)));
-        Self { members, between }
+        let members: Vec<Member> = ensemble.dragons().iter().enumerate().zip(choices).map(member).collect();
+        Self { travelled: vec![0.0; members.len()], members, between }
     }
 
     /// Returns the names of the solvers and the reasons for their choice.
@@ -73,18 +74,22 @@ impl Several {
     /// Fills `chain` with all dragons at a time of the show. `moves` is false while the show stands still.
     pub(crate) fn solve(&mut self, show_time: f64, moves: bool, chain: &mut Chain) -> Result<Closest, NoFollower> {
         let all_handles = chain.handles();
+        let mut all = chain.all_mut();
         for member in &mut self.members {
-            member.solve(show_time, moves, all_handles, chain)?;
+            member.solve(show_time, moves, all_handles, &mut all)?;
         }
         let nearer = |one: Option<PairClearance>, other: Option<PairClearance>| match (one, other) {
             (Some(one), Some(other)) if other.value < one.value => Some(other),
             (one, other) => one.or(other),
         };
         let own = self.members.iter().map(|member| member.closest.boards).fold(None, nearer);
-        let between = self
-            .between
-            .as_mut()
-            .and_then(|monitor| monitor.nearest(chain, own.map_or(f64::INFINITY, |own| own.value)));
+        let Self { members, between, travelled } = self;
+        let between = between.as_mut().and_then(|monitor| {
+            travelled.clear();
+            travelled.extend(members.iter().map(|member| member.dragon.travelled_at(show_time)));
+            let moment = Moment { time: show_time, travelled };
+            monitor.nearest(chain, own.map_or(f64::INFINITY, |own| own.value), moment)
+        });
         let boards = nearer(own, between);
         let any = self.members.iter().map(|member| member.closest.any).fold(boards, nearer);
         Ok(Closest { boards, any })
@@ -92,16 +97,28 @@ impl Several {
 }
 
 impl Member {
-    /// Solves the dragon and puts it in its place of the chain of all. One that stands is solved once.
-    fn solve(&mut self, show_time: f64, moves: bool, all_handles: usize, chain: &mut Chain) -> Result<(), NoFollower> {
+    /// Solves the dragon in its place of the chain of all. One that stands is solved once.
+    fn solve(
+        &mut self,
+        show_time: f64,
+        moves: bool,
+        all_handles: usize,
+        chain: &mut ChainMut,
+    ) -> Result<(), NoFollower> {
         let (own_time, dances) = self.dragon.own_time(show_time);
         let state = (own_time, dances && moves);
         if self.solved == Some(state) {
             return Ok(());
         }
-        self.solved = None;
+        let before = self.solved.take();
         let (first, own_handles) = (self.handles.start, self.handles.len());
-        let Closest { boards, any } = self.dancer.solve_among(state, &mut self.chain, first, chain)?;
+        let mut own = chain.range_mut(self.handles.clone());
+        let solved = self.dancer.solve(state.0, state.1, &mut own);
+        if let (Err(_), Some((time, moves))) = (&solved, before) {
+            // The frame keeps the dragon where it was.
+            let _ = self.dancer.solve(time, moves, &mut own);
+        }
+        let Closest { boards, any } = solved?;
         let numbered = |pair: PairClearance| {
             let PairClearance { bench_a, bench_b, .. } = pair;
             let bench_b = if bench_b < own_handles { bench_b + first } else { bench_b - own_handles + all_handles };

@@ -66,22 +66,18 @@ pub fn proved_of(
 
 /// Returns a sentence for each result.
 fn sentences(proved: &Proved) -> Vec<String> {
-    let Proved { results, least_clearance, obstacle_clearances, greatest_speed, least_pitch, .. } = proved;
-    let others = [
-        least_clearance.as_ref().map(clearance_sentence),
-        greatest_speed.as_ref().map(speed_sentence),
-        least_pitch.as_ref().map(pitch_sentence),
-    ];
-    let obstacles = obstacle_clearances.iter().map(obstacle_sentence);
-    let of_dragons = |outcome: &ProvedEvent| {
-        let names = outcome.dragons.iter().filter_map(|dragon| proved.dragons.get(*dragon)).map(String::as_str);
-        let names: Vec<&str> = names.collect();
-        match names.is_empty() {
-            true => sentence(outcome),
-            false => format!("{}, {}", printable(&names.join(" and ")), sentence(outcome)),
-        }
+    let Proved { results, least_clearance, least_clearances, obstacle_clearances, .. } = proved;
+    let named = |dragons: &[usize], sentence: String| {
+        let names: Vec<&str> =
+            dragons.iter().filter_map(|dragon| proved.dragons.get(*dragon)).map(String::as_str).collect();
+        if names.is_empty() { sentence } else { format!("{}, {sentence}", printable(&names.join(" and "))) }
     };
-    results.iter().map(of_dragons).chain(others.into_iter().flatten()).chain(obstacles).collect()
+    let events = results.iter().map(|outcome| named(&outcome.dragons, sentence(outcome)));
+    let clearances = least_clearance.iter().chain(least_clearances);
+    let clearances = clearances.map(|outcome| named(&outcome.dragons, clearance_sentence(outcome)));
+    let others = [proved.greatest_speed.as_ref().map(speed_sentence), proved.least_pitch.as_ref().map(pitch_sentence)];
+    let obstacles = obstacle_clearances.iter().map(|outcome| named(&outcome.dragons, obstacle_sentence(outcome)));
+    events.chain(clearances).chain(others.into_iter().flatten()).chain(obstacles).collect()
 }
 
 /// Returns the error for a refused certificate.
@@ -140,13 +136,15 @@ fn sentence(outcome: &ProvedEvent) -> String {
 
 /// Returns a sentence on a proved least clearance.
 fn clearance_sentence(outcome: &ProvedClearance) -> String {
-    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b } = *outcome;
+    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b, ref dragons } = *outcome;
     let until = match (until, time_until) {
         (Until::PathEnd, _) => "from the start to the path's end".to_owned(),
         (Until::Contact, _) => "from the start to the first contact".to_owned(),
         (Until::Time, time) => format!("from the start to {} s", time.unwrap_or(0.0)),
     };
-    let below = lo.map(|lo| format!("no two boards that share no handle are nearer than {lo} m"));
+    let boards =
+        if dragons.len() == 2 { "board of the one and board of the other" } else { "two boards that share no handle" };
+    let below = lo.map(|lo| format!("no {boards} are nearer than {lo} m"));
     let above = hi.zip(bench_a.zip(bench_b)).map(|(hi, (a, b))| {
         format!("benches {} and {} (counting from 1) are no further apart than {hi} m at one moment", a + 1, b + 1)
     });
@@ -159,7 +157,7 @@ fn clearance_sentence(outcome: &ProvedClearance) -> String {
 
 /// Returns a sentence on the proved least clearance of an obstacle.
 fn obstacle_sentence(outcome: &ProvedObstacleClearance) -> String {
-    let ProvedObstacleClearance { obstacle, lo, hi, until, time_until, bench } = *outcome;
+    let ProvedObstacleClearance { obstacle, lo, hi, until, time_until, bench, .. } = *outcome;
     let until = match (until, time_until) {
         (Until::Time, Some(time)) => format!("from the start to {time} s"),
         _ => "from the start to the path's end".to_owned(),

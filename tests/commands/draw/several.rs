@@ -1,7 +1,7 @@
 //! Pictures of several dragons: every look has the boards of all, and the ends of each.
 
 use super::*;
-use bench_dragon::drawing::palette::colours_of;
+use bench_dragon::drawing::palette::{colours_of, lights_of};
 
 /// The handles of `config/coil.toml`: those of gold, then those of jade.
 const HANDLES: [usize; 2] = [61, 61];
@@ -86,6 +86,46 @@ fn the_look_from_a_seat_has_the_boards_of_all() {
     // A pearl before each head, and a dancer at each handle.
     assert_eq!(used("#pearl"), 2);
     assert_eq!(used("#dancer") + used("#dancer-2"), 122);
+}
+
+/// Returns the lights of the page's identities: red, green and blue.
+fn page_lights() -> Vec<[u8; 3]> {
+    let page = include_str!("../../../crates/outputs/src/view/palette.js");
+    let list = page.split_once("const IDENTITIES = [").unwrap().1.split_once("].map").unwrap().0;
+    let numbers = |rest: &str| {
+        let numbers: Vec<u8> =
+            rest.split_once(']').unwrap().0.split(',').map(|part| part.trim().parse().unwrap()).collect();
+        <[u8; 3]>::try_from(numbers).unwrap()
+    };
+    list.split("light: [").skip(1).map(numbers).collect()
+}
+
+#[test]
+fn lanterns_have_the_light_of_their_dragon() {
+    let lights = page_lights();
+    let many: Vec<String> = (0..16).map(|number| format!("dragon{number}")).collect();
+    assert_eq!(lights_of(&many.iter().map(String::as_str).collect::<Vec<_>>()), lights);
+    let colour = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
+    let scene = scene_file("coil");
+    for look in ["lanterns", "seat=0,60,6"] {
+        let svg = answer(&["--scene", &scene, "draw", "--at", "300", "--look", look]);
+        let svg = Document::parse(&svg).unwrap();
+        let used = |name: &str| svg.descendants().filter(|node| node.attribute("href") == Some(name)).count();
+        // From above the head has a lantern more.
+        let own = if look == "lanterns" { 2 * 60 + 1 } else { 2 * 60 };
+        // Gold and jade, on the places 4 and 2 of the page's list.
+        for (number, light) in [(0, lights[4]), (1, lights[2])] {
+            assert_eq!(used(&format!("#red-{number}")), own, "lanterns of dragon {number}, {look}");
+            let halo = with_id(&svg, &format!("red-light-{number}")).unwrap();
+            let rim = halo.children().rfind(Node::is_element).unwrap();
+            assert_eq!(rim.attribute("stop-color"), Some(colour(light).as_str()), "dragon {number}, {look}");
+        }
+        assert_eq!(used("#gold"), 120, "{look}");
+        // The village has lanterns of its own. Every shape that is used is defined.
+        for name in svg.descendants().filter_map(|node| node.attribute("href")?.strip_prefix('#')) {
+            assert!(with_id(&svg, name).is_some(), "{name}, {look}");
+        }
+    }
 }
 
 #[test]

@@ -16,7 +16,7 @@ use super::scene::is_quick;
 use super::truth::{Found, certificate, scene};
 
 pub const TARGET: Target =
-    Target { name: "certificate", run, seeds, mutate, cases: 1500, hung: Duration::from_secs(30) };
+    Target { name: "certificate", run, seeds, mutate, cases: 100_000, hung: Duration::from_secs(120) };
 
 /// Bytes of the longest certificate that is checked: some hundred steps of a small team.
 const MOST_BYTES: usize = 200_000;

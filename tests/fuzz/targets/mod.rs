@@ -37,7 +37,7 @@ pub struct Target {
     pub seeds: fn() -> Vec<Vec<u8>>,
     /// Returns a changed input.
     pub mutate: fn(&[u8], &mut Rng) -> Vec<u8>,
-    /// Number of cases, about as many as run in a second.
+    /// Number of cases, some seconds of work at most.
     pub cases: u64,
     /// Time after which a case counts as hung: some hundred times the slowest case, for a busy machine.
     pub hung: Duration,

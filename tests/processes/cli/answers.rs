@@ -7,7 +7,7 @@ use bench_dragon::messages::state::EventKind;
 use serde_json::Value;
 
 use crate::cli::events::time_of;
-use crate::cli::scenes::{DEADLINE, SceneFile, assert_keys, numbers, same_bits, scenes};
+use crate::cli::scenes::{SceneFile, assert_keys, numbers, same_bits, scenes};
 use crate::harness::{Process, aloud, can_run, long, python, python_modules, text};
 
 const REACH: f64 = 2.0;
@@ -118,7 +118,7 @@ fn read_svg(files: &[&Path]) -> Vec<Value> {
                 \x20   names = collections.Counter(element.tag.removeprefix(svg) for element in root.iter())\n\
                 \x20   texts = [''.join(element.itertext()).strip() for element in root.iter(svg + 'text')]\n\
                 \x20   print(json.dumps({'names': names, 'texts': texts}))\n";
-    let output = Process::start(python().args(["-c", code]).args(files)).output_within(DEADLINE);
+    let output = Process::start(python().args(["-c", code]).args(files)).output();
     assert!(output.status.success(), "{}", text(&output.stderr));
     text(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
@@ -155,7 +155,7 @@ fn trade_has_its_keys_for_every_solver() {
         }
         measured += 1;
         let arguments = ["--json", "trade", "--plot", plot.to_str().unwrap()];
-        let output = Process::start(&mut scene.command(&arguments)).output_within(10 * DEADLINE);
+        let output = Process::start(&mut scene.command(&arguments)).output();
         // If no progress bar can be drawn, a sentence comes first: half a minute without output is too long.
         let began =
             format!("measuring every solver on scene {} ({} benches), which takes ", scene.name, scene.benches());

@@ -3,7 +3,7 @@
 use std::fs::OpenOptions;
 use std::process::{Command, Output, Stdio};
 
-use crate::cli::scenes::{DEADLINE, program, scene, scenes};
+use crate::cli::scenes::{program, scene, scenes};
 use crate::harness::{Place, Process, text};
 
 /// Every command that ends by itself, with the options that make it short.
@@ -25,7 +25,7 @@ fn options_stand_before_or_after_the_subcommand() {
     let path = scene.path.to_str().unwrap();
     for command in COMMANDS.iter().filter(|command| command[0] != "run" && !command.contains(&"--json")) {
         let answer = |arguments: &[&str]| {
-            let output = Process::start(program().args(arguments)).output_within(DEADLINE);
+            let output = Process::start(program().args(arguments)).output();
             assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
             // The time for making a table is measured again in each run.
             let made = |line: &str| line.split(", made in ").next().unwrap_or_default().to_owned();
@@ -50,7 +50,7 @@ fn every_command_refuses_a_bad_scene_in_the_same_sentence() {
     let line = content.lines().position(|line| line.starts_with("pitch")).unwrap() + 1;
     let also: [&[&str]; 3] = [&["trade"], &["run"], &["soak", "--duration", "1s"]];
     for command in COMMANDS.iter().chain(&also) {
-        let output = Process::start(program().arg("--scene").arg(&bad).args(*command)).output_within(DEADLINE);
+        let output = Process::start(program().arg("--scene").arg(&bad).args(*command)).output();
         let printed = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{command:?}: {printed}");
         assert!(output.stdout.is_empty() && printed.lines().count() == 1, "{command:?}: {printed}");
@@ -87,7 +87,7 @@ fn end_unread(command: &mut Command, stdout: bool, stderr: bool) -> Output {
     if stderr {
         process.close_stderr();
     }
-    process.output_within(DEADLINE)
+    process.output()
 }
 
 /// `| head` and `2>&1 | head`: the reader has closed the pipe.
@@ -124,7 +124,7 @@ fn help_and_version_are_on_standard_output() {
     for (arguments, word) in
         [(&["--help"][..], "Usage"), (&["--version"], "bench-dragon "), (&["solve", "--help"], "--at")]
     {
-        let output = Process::start(program().args(arguments)).output_within(DEADLINE);
+        let output = Process::start(program().args(arguments)).output();
         assert!(output.status.success() && text(&output.stdout).contains(word), "{arguments:?}");
         assert!(output.stderr.is_empty(), "{arguments:?}");
     }

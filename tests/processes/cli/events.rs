@@ -3,7 +3,7 @@
 use bench_dragon::messages::state::EventKind;
 use serde_json::Value;
 
-use crate::cli::scenes::{DEADLINE, SceneFile, assert_keys, numbers, program, same_bits, scene, scenes};
+use crate::cli::scenes::{SceneFile, assert_keys, numbers, program, same_bits, scene, scenes};
 use crate::harness::{Process, text};
 
 const KINDS: [&str; 4] = ["contact", "stall", "lock", "path_end"];
@@ -78,7 +78,7 @@ fn events_of_the_paper_scene_are_the_known_ones() {
     }
     // Without --scene it is the paper's, which is built in.
     let built_in = Process::start(program().args(["events", "--json"]));
-    let built_in = text(&built_in.output_within(DEADLINE).stdout);
+    let built_in = text(&built_in.output().stdout);
     assert_eq!(built_in, scene("paper").answer(&["events", "--json"]));
 }
 
@@ -199,7 +199,7 @@ fn check_states_what_each_scene_models() {
         assert!(at_contact.starts_with(if stops { "freezes" } else { "continues" }), "{at_contact}");
     }
     let noalerts = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/noalerts.toml");
-    let text = text(&Process::start(program().args(["check", "--scene", noalerts])).output_within(DEADLINE).stdout);
+    let text = text(&Process::start(program().args(["check", "--scene", noalerts])).output().stdout);
     assert!(text.contains("At a contact the show continues, unnoticed;"), "{text}");
 }
 

@@ -123,7 +123,7 @@ fn two_seconds_of_every_scene_are_published_and_watched() {
         });
         for (scene, place, mut monitor, publisher) in started.collect::<Vec<_>>() {
             let lines = monitor.lines();
-            let summary = summary(&publisher.output_within(300));
+            let summary = summary(&publisher.output());
             let periods = (2.01 * scene.number("publish", "rate")).ceil() as u64;
             assert_summary(&summary, periods, "duration", speaks_ros2(scene));
             // The second in which the publisher ended is complete when the next line does not list it.
@@ -132,10 +132,10 @@ fn two_seconds_of_every_scene_are_published_and_watched() {
                 watched.iter().any(|line| line.contains("moving")) && watched.last().unwrap().contains("waiting")
             };
             while !ended(&watched) {
-                watched.push(lines.until("{", 300));
+                watched.push(lines.until("{"));
             }
             monitor.signal(SIGTERM);
-            watched.extend(lines.rest(300));
+            watched.extend(lines.rest());
             let watched: Vec<Value> = watched.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
             assert_watched(scene, &watched);
             place.assert_clean();
@@ -156,7 +156,7 @@ fn the_command_line_overrides_the_rate_of_the_file() {
         (&["--rate", "100", "--duration", "0.01m"], 60),
         (&["--rate", "100", "--duration", "0.0001h"], 36),
     ] {
-        let output = Process::start(publisher(&place, &scene).args(arguments)).output_within(300);
+        let output = Process::start(publisher(&place, &scene).args(arguments)).output();
         assert_summary(&summary(&output), periods, "duration", false);
     }
 }
@@ -169,7 +169,7 @@ fn a_person_is_told_what_lies_ahead() {
     let printed = |scene: &SceneFile, arguments: &[&str]| {
         let mut command = place.program();
         command.arg("--scene").arg(&scene.path).args(["run", "--duration", "0.3"]).args(arguments);
-        let output = Process::start(&mut command).output_within(300);
+        let output = Process::start(&mut command).output();
         assert!(output.status.success(), "{}", text(&output.stderr));
         text(&output.stderr)
     };
@@ -197,15 +197,15 @@ fn signals_end_both_ends_with_exit_code_0_and_whole_lines() {
         let publisher = Process::start(publisher(&place, &scene).args(["--rate", "200"]));
         let mut monitor = Process::start(place.program().args(["--json", "watch"]));
         let lines = monitor.lines();
-        lines.until("\"moving\"", 300);
+        lines.until("\"moving\"");
         publisher.signal(signal);
-        assert_summary(&summary(&publisher.output_within(300)), 0, "signal", false);
-        lines.until("\"waiting\"", 300);
+        assert_summary(&summary(&publisher.output()), 0, "signal", false);
+        lines.until("\"waiting\"");
         monitor.signal(signal);
-        for line in lines.rest(300) {
+        for line in lines.rest() {
             serde_json::from_str::<Value>(&line).unwrap();
         }
-        let output = monitor.output_within(300);
+        let output = monitor.output();
         assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
     }
 }
@@ -215,10 +215,10 @@ fn a_name_before_or_after_the_subcommand_is_the_services_name() {
     let scene = scene("school");
     let place = Place::new("cli_name");
     let mut before = place.program();
-    before.args(["--name", "lion", "--scene"]).arg(&scene.path).args(["run", "--json", "--duration", "20"]);
+    before.args(["--name", "lion", "--scene"]).arg(&scene.path).args(["run", "--json"]);
     let lion = Process::start(&mut before);
     let watch = |arguments: &[&str]| {
-        json_lines(&Process::start(place.program().args(["watch", "--json"]).args(arguments)).output_within(300))
+        json_lines(&Process::start(place.program().args(["watch", "--json"]).args(arguments)).output())
     };
     let heard = watch(&["--duration", "3", "--name", "lion"]);
     assert!(number(heard.last().unwrap(), "received") > 0, "{heard:?}");
@@ -227,11 +227,11 @@ fn a_name_before_or_after_the_subcommand_is_the_services_name() {
     // A second publisher of that name, named after the subcommand, is refused.
     let mut after = place.program();
     after.args(["run", "--json", "--duration", "1", "--name", "lion", "--scene"]).arg(&scene.path);
-    let output = Process::start(&mut after).output_within(300);
+    let output = Process::start(&mut after).output();
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("lion"), "{}", text(&output.stderr));
     lion.signal(SIGINT);
-    assert_eq!(summary(&lion.output_within(300))["end"], "signal");
+    assert_eq!(summary(&lion.output())["end"], "signal");
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn watch_ends_quietly_when_nobody_reads_it() {
             if both {
                 monitor.close_stderr();
             }
-            let output = monitor.output_within(300);
+            let output = monitor.output();
             assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", text(&output.stderr));
         }
     }

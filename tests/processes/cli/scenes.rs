@@ -8,9 +8,6 @@ use serde_json::Value;
 
 use crate::harness::{Process, text};
 
-/// A deadline for hanging processes, not for slow ones, seconds.
-pub const DEADLINE: u64 = 600;
-
 /// A scene file and its content.
 pub struct SceneFile {
     pub name: String,
@@ -86,7 +83,7 @@ impl SceneFile {
 
     /// Runs the program on this scene.
     pub fn run(&self, arguments: &[&str]) -> Output {
-        Process::start(&mut self.command(arguments)).output_within(DEADLINE)
+        Process::start(&mut self.command(arguments)).output()
     }
 
     /// Returns the output of the program, which must end with exit code 0 and nothing on standard error.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose};
+use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, List, Stage, StageDragon, StageMessage};
 use bench_dragon::recording::mcap::recorder::{Recorder, RecorderConfig};
 use bench_dragon::ros2_messages::settings::Topic;
 
@@ -79,4 +79,26 @@ fn what_is_counted_is_in_the_files() {
     recorder.finish().unwrap();
     let counts = recorder.recorded().counts;
     assert_eq!((counts.frames, counts.messages, entries(&std::fs::read(&file).unwrap()).len()), (0, 1, 1));
+}
+
+#[test]
+fn what_needs_the_stage_begins_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("early.mcap");
+    let mut recorder = library_recorder(&file, &[Topic::Handles, Topic::Markers, Topic::Tf], false);
+    let record = |ticks: std::ops::Range<u64>, recorder: &mut Recorder| {
+        ticks.for_each(|tick| recorder.frame(&frame(1, tick, tick), &[HandlePose::default(); 2], 0).unwrap());
+    };
+    record(0..3, &mut recorder);
+    let dragons = List::of([StageDragon { benches: 1, ..Default::default() }]);
+    let stage = Stage { run_id: 1, stamp_ns: 3, dragons, ..Default::default() };
+    recorder.stage(&StageMessage { stage, segments: Vec::new() }).unwrap();
+    record(3..5, &mut recorder);
+    recorder.finish().unwrap();
+    let entries = entries(&std::fs::read(&file).unwrap());
+    let times = |topic| entries.iter().filter(move |entry| entry.0 == topic).map(|entry| entry.2).collect::<Vec<_>>();
+    assert_eq!(times("/p/handles"), [0, 1, 2, 3, 4]);
+    for topic in ["/p/markers", "/tf"] {
+        assert_eq!(times(topic), [3, 4], "{topic}");
+    }
 }

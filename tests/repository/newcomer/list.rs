@@ -70,7 +70,6 @@ pub const INSTEAD: &[(&str, &str, &str)] = &[
     ("--seconds 60", "--seconds 2", "shorter"),
     ("--rate RATE", "--rate 60", "the reader's own number"),
     ("--name NAME", "--name mine", "the reader's own name"),
-    ("--scene FILE", "--scene config/school.toml", "the reader's own scene"),
     ("events --certify FILE", "--scene tests/scenes/tiny_1.toml events --certify proof.jsonl", "the reader's own file"),
     ("verify FILE", "verify proof.jsonl", "the reader's own file"),
     ("--plot FILE.svg", "--plot trade.svg", "the reader's own file"),

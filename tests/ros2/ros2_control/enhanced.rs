@@ -95,7 +95,7 @@ where
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let answer = runtime.block_on(async {
         let call = async {
-            tokio::time::timeout(Duration::from_secs(60), client.wait_for_service(&node)).await.ok()?;
+            tokio::time::timeout(crate::harness::patience(), client.wait_for_service(&node)).await.ok()?;
             Some(tokio::time::timeout(Duration::from_secs(seconds), client.async_call_service(Fields(request))).await)
         };
         tokio::select! {

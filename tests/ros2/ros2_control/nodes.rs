@@ -1,7 +1,5 @@
 //! The node, as other nodes see it.
 
-use std::time::Duration;
-
 use ros2_client::{Context, ContextOptions, NodeEvent, NodeName, NodeOptions};
 
 use super::*;
@@ -26,7 +24,7 @@ fn nodes_beside(name: &str) -> Vec<String> {
         };
         tokio::select! {
             ended = spinner.spin() => panic!("the spinner ended: {ended:?}"),
-            found = tokio::time::timeout(Duration::from_secs(60), found) => found.unwrap(),
+            found = tokio::time::timeout(harness::patience(), found) => found.unwrap(),
         }
     });
     node.stop_spinner();
@@ -80,7 +78,7 @@ fn arguments_of_ros_that_cannot_be_honoured_are_refused_in_a_sentence() {
         (&["run", "--ros2", "--ros-args", "-r", "__node:=2nd"], "2nd"),
         (&["watch", "--ros-args", "-r", "__node:=gold"], "run and replay"),
     ] {
-        let output = Process::start(program("ros_args").args(arguments)).output_within(60);
+        let output = Process::start(program("ros_args").args(arguments)).output();
         let printed = text(&output.stderr);
         assert_eq!((output.status.code(), printed.trim().lines().count()), (Some(2), 1), "{printed}");
         assert!(printed.contains(expected), "{printed}");

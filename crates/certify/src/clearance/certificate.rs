@@ -3,7 +3,7 @@
 use std::io;
 
 use super::beside::{Beside, UpperBeside};
-use super::{Descent, Finish, Upper, Write};
+use super::{Descent, Finish, Part, Upper, Write};
 use crate::capsule::Spanned;
 use crate::first_order::When;
 use crate::first_order_step::{FirstOrderStep, step_points};
@@ -16,7 +16,7 @@ use crate::path::Place;
 const SPARE: f64 = 1e-12;
 
 /// Writes the first line.
-pub(super) fn first_line(write: Write<'_>, scene: &str) -> io::Result<()> {
+pub(crate) fn first_line(write: Write<'_>, scene: &str) -> io::Result<()> {
     let (version, about) = (env!("CARGO_PKG_VERSION"), Some(About::LeastClearance));
     write(&CertificateLine::Certificate { format: crate::FORMAT, version, about, scene })
 }
@@ -65,7 +65,8 @@ impl Descent<'_, '_> {
             true => (Until::PathEnd, None),
             false => (Until::Time, Some(self.time_of(shown.map(|(_, end)| end), head_speed))),
         };
-        CertifiedObstacleClearance { obstacle, lo: shown.map(|(least, _)| least), hi, until, time_until, bench }
+        let (lo, dragons) = (shown.map(|(least, _)| least), self.part.dragons.clone());
+        CertifiedObstacleClearance { obstacle, lo, hi, until, time_until, bench, dragons }
     }
 
     /// Returns true if the clearance of an obstacle is shown from the start to the path's end.
@@ -76,13 +77,17 @@ impl Descent<'_, '_> {
 
     /// Returns a time by which the head has come to a place; 0 without a place.
     fn time_of(&self, place: Option<Place>, head_speed: f64) -> f64 {
-        let time = |end| (self.chain.exact.travelled(end).over(Interval::point(head_speed)) * (1.0 - 1e-14)).lo;
+        let Part { delay, show_end, .. } = self.part;
+        let own = |end| self.chain.exact.travelled(end).over(Interval::point(head_speed));
+        let time =
+            |end| ((own(end) + Interval::point(delay)) * (1.0 - 1e-14)).lo.min(show_end.unwrap_or(f64::INFINITY));
         place.map_or(0.0, time).max(0.0)
     }
 
     /// Returns true if the head comes to a place by the time that is stated for the end of a stretch.
     fn is_by(&self, place: Place, end: Place, head_speed: f64) -> bool {
-        let until = Interval::point(self.time_of(Some(end), head_speed)) * head_speed;
+        let time = Interval::point(self.time_of(Some(end), head_speed));
+        let until = (time - Interval::point(self.part.delay)) * head_speed;
         self.chain.exact.travelled(place).hi <= until.lo.max(0.0)
     }
 
@@ -123,6 +128,7 @@ impl Descent<'_, '_> {
             time_until: None,
             bench_a: benches.map(|benches| benches[0]),
             bench_b: benches.map(|benches| benches[1]),
+            dragons: self.part.dragons.clone(),
         };
         match self.finish {
             Some(Finish::PathEnd) => {

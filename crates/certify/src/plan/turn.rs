@@ -6,6 +6,7 @@
 
 use super::PlanError;
 use super::turn_trial::{Family, Witness};
+use crate::path::Place;
 use crate::turn::{Passage, Turns};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::team::Team;
@@ -21,8 +22,8 @@ pub struct LeastTurn {
     pub value_lo: f64,
     /// Upper bound, metres: with this radius the team turns round. `None` if this is shown for no radius.
     pub value_hi: Option<f64>,
-    /// Least radius with which the ordinary search finds no event, metres: within 1e-8 m of `value_lo`, and equal to
-    /// `value_hi` if `proved`. `None` if the search was given up before.
+    /// Least radius with which the ordinary search finds no event, metres: within 1e-9 m of `value_lo`, and equal to
+    /// `value_hi` if that is within a nanometre too. `None` if the search was given up before.
     pub value: Option<f64>,
     /// Metres of the S with the radius `value`.
     pub length: Option<f64>,
@@ -55,11 +56,11 @@ pub struct TurnLimit {
 }
 
 /// Distance of the two numbers in metres, with room for rounding.
-const WIDTH: f64 = 9e-9;
+const WIDTH: f64 = 0.95e-9;
 
 /// Multiples of [`WIDTH`] that are tried. Next to a lock the follower is so fast that doubles cannot resolve its way, and
 /// the proof needs a greater distance from the lock.
-const FURTHER: [f64; 6] = [1.0, 4.0, 16.0, 64.0, 256.0, 4096.0];
+const FURTHER: [f64; 7] = [1.0, 4.0, 10.0, 40.0, 160.0, 640.0, 4096.0];
 
 /// Number of benches with which a radius is tried first.
 const FEW: usize = 4;
@@ -69,7 +70,7 @@ const MOST_INTERVALS: u64 = 200_000;
 
 /// Length of an interval in metres, at least and at first; the factors after an interval that is shown and one that is
 /// not.
-const LEAST_INTERVAL: f64 = 1e-11;
+const LEAST_INTERVAL: f64 = 1e-12;
 const FIRST_INTERVAL: f64 = 1e-3;
 const GROWTH: f64 = 1.5;
 const SHRINK: f64 = 0.5;
@@ -130,16 +131,17 @@ pub fn least_turn(
         return Ok(found);
     }
     (found.value, found.length) = (Some(upper), Some(family.length(upper)));
+    let closely = shown.is_some_and(|witness| matches!(witness, Witness::Overlap { .. }));
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
         let passage = |team: &Team| Passage::new(team, (pitch, family.arc_ratio), upper);
         // The first benches fail as soon as the whole team does, at less cost.
         let few = Team { benches: team.benches.min(FEW), ..*team };
-        if !passage(&few).is_some_and(|passage| passage.is_free(&few, &mut |_| ())) {
+        if !passage(&few).is_some_and(|passage| passage.is_free(&few, closely, &mut |_| ())) {
             continue;
         }
         let Some(passage) = passage(team) else { break };
-        if passage.is_free(team, &mut |share| progress(0.5 + 0.5 * share)) {
+        if passage.is_free(team, closely, &mut |share| progress(0.5 + 0.5 * share)) {
             found.value_hi = Some(upper);
             found.leads = Some([passage.lead_in, passage.lead_out]);
             found.proved = upper - value_lo <= 1e-8;
@@ -197,7 +199,8 @@ impl Blocked<'_> {
         let mut others_below = OTHERS_BELOW;
         while self.intervals < MOST_INTERVALS && self.radius < Accepted::LENGTH.greatest {
             if !self.holds(width) {
-                let same = self.family.follow(self.radius, &self.witness);
+                let (family, witness) = (self.family, self.witness);
+                let same = family.follow(self.radius, &witness);
                 let mut next = self.widest(same, width, LEAST_INTERVAL);
                 if next.is_none_or(|next| next < others_below) {
                     // The event may have gone or be about to go, and another one remain further on.
@@ -217,7 +220,7 @@ impl Blocked<'_> {
     }
 
     /// Takes the witness with the widest interval of at most `width` and at least `least` metres, and returns its width.
-    fn widest(&mut self, witnesses: Vec<Witness>, width: f64, least: f64) -> Option<f64> {
+    fn widest(&mut self, witnesses: impl IntoIterator<Item = Witness>, width: f64, least: f64) -> Option<f64> {
         let (before, mut best) = (self.witness, None);
         let mut widest = least;
         for witness in witnesses {
@@ -241,12 +244,15 @@ impl Blocked<'_> {
     fn holds(&self, width: f64) -> bool {
         let Family { team, pitch, arc_ratio } = self.family;
         let radii = [self.radius, self.radius + width];
-        let [Some(first), Some(last)] = radii.map(|radius| self.family.path(radius)) else { return false };
-        let turns = |ends| Turns::new(team, (pitch, arc_ratio), radii, ends);
+        let middle = 0.5 * radii[0] + 0.5 * radii[1];
+        let Some(path) = self.family.path(middle) else { return false };
+        let turns = Turns::new(team, (pitch, arc_ratio), radii, path);
+        let at = |place| self.family.on_path(middle, place);
         match &self.witness {
-            Witness::Fold { link, pivot, end, .. } => turns([first, last]).fold(*link, *pivot, *end),
-            Witness::Overlap { pair, head, .. } => {
-                turns([first, last]).overlap(*head, [pair.0 as usize, pair.1 as usize])
+            Witness::Fold { link, pivot, end, .. } => turns.fold(*link, at(*pivot), at(*end)),
+            Witness::Overlap { pair, head: Place(segment, place, _), radius, rate } => {
+                let head = Place(*segment, place + rate * (middle - radius), 0.0);
+                turns.overlap((at(head), *rate), [pair.0 as usize, pair.1 as usize])
             }
         }
     }

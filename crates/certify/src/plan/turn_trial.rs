@@ -40,6 +40,9 @@ const STEPS: u32 = 64;
 /// Distance from the last contact, in links, within which the same two boards are followed.
 const WINDOW: f64 = 0.3;
 
+/// Difference of two radii from which the rate of the deepest place is taken, metres.
+const RATE_STEP: f64 = 1e-6;
+
 /// Greatest multiple of the depth of a fold by which the end of its stretch is beyond the other handle, the number of
 /// halvings that are tried, and the share of the depth that remains at the end.
 const BEYOND: f64 = 2.0;
@@ -57,13 +60,15 @@ pub(super) struct Family<'a> {
     pub arc_ratio: f64,
 }
 
-/// An event, as a proof needs it.
+/// An event, as a proof needs it. The coordinate of its places on a spiral is the polar angle less that at the S: such
+/// a place moves little as the radius grows.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Witness {
     /// One handle of a link at a pivot, the other one before `end` and on the wrong side of the pivot's normal.
     Fold { kind: EventKind, link: usize, pivot: Place, end: Place },
-    /// Two boards that overlap with the head at a place.
-    Overlap { pair: (u32, u32), head: Place },
+    /// Two boards that overlap with the head at a place with this radius. The place's coordinate grows by `rate` per metre
+    /// of the radius.
+    Overlap { pair: (u32, u32), head: Place, radius: f64, rate: f64 },
 }
 
 impl Witness {
@@ -92,9 +97,25 @@ impl Family<'_> {
         2.0 * radius.hypot(a) * (radius / a).atan()
     }
 
-    /// Returns the metres of path from the beginning of the S to a place.
+    /// Returns the metres of path from the beginning of the S to a place of an event.
     pub fn past(&self, radius: f64, at: Place) -> f64 {
-        self.path(radius).map_or(f64::NAN, |path| path.travelled(param(at)))
+        self.path(radius).map_or(f64::NAN, |path| path.travelled(param(self.on_path(radius, at))))
+    }
+
+    /// Returns the place of the turnaround with a radius that is a place of an event.
+    pub fn on_path(&self, radius: f64, at: Place) -> Place {
+        self.moved(at, radius)
+    }
+
+    /// Returns the place of an event that is a place of the turnaround with a radius.
+    fn event_place(&self, radius: f64, at: Param) -> Place {
+        self.moved(place(at), -radius)
+    }
+
+    /// Returns a place with the polar angle of a radius added to its coordinate, if it is on a spiral.
+    fn moved(&self, Place(segment, at, low): Place, radius: f64) -> Place {
+        let is_arc = segment == 1 || segment == 2;
+        Place(segment, if is_arc { at } else { at + radius * std::f64::consts::TAU / self.pitch }, low)
     }
 
     /// Returns an event with this radius, if the search finds one.
@@ -188,7 +209,12 @@ impl Family<'_> {
             (merit, pivot)
         };
         let end = folded(pivot)?.end;
-        (merit < 0.0).then(|| Witness::Fold { kind, link, pivot: place(pivot), end: place(end) })
+        (merit < 0.0).then(|| Witness::Fold {
+            kind,
+            link,
+            pivot: self.event_place(radius, pivot),
+            end: self.event_place(radius, end),
+        })
     }
 
     /// Returns two boards that overlap with this radius, at their deepest.
@@ -201,37 +227,46 @@ impl Family<'_> {
         let mut unreported = |_| {};
         let mut budget = Budget::new(TRIAL_BUDGET, &mut unreported);
         let least = advancement.least_clearance(0.0, path.length(), &mut budget).ok()?.value?;
-        let head = place(path.param_at(least.travelled));
-        (least.value <= 0.0).then_some(Witness::Overlap { pair: (least.bench_a, least.bench_b), head })
+        let head = self.event_place(radius, path.param_at(least.travelled));
+        let pair = (least.bench_a, least.bench_b);
+        (least.value <= 0.0).then_some(Witness::Overlap { pair, head, radius, rate: 0.0 })
     }
 
-    /// Returns the same event with another radius, with several pivots.
-    pub fn follow(&self, radius: f64, witness: &Witness) -> Vec<Witness> {
+    /// Returns the same event with another radius, with several pivots, each found when it is asked for.
+    pub fn follow(&self, radius: f64, witness: &Witness) -> Box<dyn Iterator<Item = Witness> + '_> {
         let past = self.past(radius, witness.place());
         match *witness {
             Witness::Fold { kind, link, .. } => {
-                let pivoted = |reach| self.pivoted(radius, (kind, link), past, reach * self.team.link(link));
-                REACHES.into_iter().filter_map(pivoted).collect()
+                let pivoted = move |reach| self.pivoted(radius, (kind, link), past, reach * self.team.link(link));
+                Box::new(REACHES.into_iter().filter_map(pivoted))
             }
-            Witness::Overlap { pair, .. } => self.deepest(radius, pair, past).into_iter().collect(),
+            Witness::Overlap { pair, .. } => Box::new(self.overlaps(radius, pair, past).into_iter()),
         }
     }
 
     /// Returns the deepest overlap of two boards, or of others near them, with the head near a place, metres past the
-    /// beginning of the S.
-    fn deepest(&self, radius: f64, (a, b): (u32, u32), past: f64) -> Option<Witness> {
+    /// beginning of the S: first with a head that stays at the deepest as the radius grows.
+    fn overlaps(&self, radius: f64, (a, b): (u32, u32), past: f64) -> Vec<Witness> {
+        let others = [(a, b), (a, b + 1), (a, b.saturating_sub(1).max(a + 2)), (a + 1, b + 1)];
+        let Some((pair, head)) = self.deepest(radius, &others, past) else { return Vec::new() };
+        let before = self.deepest(radius - RATE_STEP, &[pair], past).filter(|(_, before)| before.0 == head.0);
+        let rate = before.map(|(_, before)| (head.1 - before.1) / RATE_STEP);
+        rate.into_iter().chain([0.0]).map(|rate| Witness::Overlap { pair, head, radius, rate }).collect()
+    }
+
+    /// Returns the boards of several pairs that overlap most deeply with the head near a place, metres past the beginning
+    /// of the S, and the head's place then.
+    fn deepest(&self, radius: f64, pairs: &[(u32, u32)], past: f64) -> Option<((u32, u32), Place)> {
         let window = WINDOW * self.team.shortest_link();
         let lead_in = self.spiral_between(radius, radius.max(self.team.longest_link()) + BOARDS_BEFORE * self.pitch);
         let path = self.path_between(radius, lead_in, self.team.length())?;
         let advancement = ConservativeAdvancement::new(&path, self.team, &[], &[]);
         let at = (lead_in + past).clamp(0.0, path.length());
         let parts = [((at - window).max(0.0), at), (at, (at + window).min(path.length()))];
-        let others = [(a, b), (a, b + 1), (a, b.saturating_sub(1).max(a + 2)), (a + 1, b + 1)];
-        let pairs = others.into_iter().filter(|pair| (pair.1 as usize) < self.team.benches);
-        let found = pairs.flat_map(|pair| parts.map(|(from, to)| (pair, advancement.minimum_of(pair, from, to))));
+        let pairs = pairs.iter().filter(|pair| (pair.1 as usize) < self.team.benches);
+        let found = pairs.flat_map(|pair| parts.map(|(from, to)| (*pair, advancement.minimum_of(*pair, from, to))));
         let (pair, (clearance, travelled)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
-        let head = place(path.param_at(travelled));
-        (clearance < 0.0).then_some(Witness::Overlap { pair, head })
+        (clearance < 0.0).then(|| (pair, self.event_place(radius, path.param_at(travelled))))
     }
 }
 

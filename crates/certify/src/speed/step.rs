@@ -180,6 +180,10 @@ impl Speeds<'_> {
         for (link, pair) in wide.windows(2).enumerate() {
             let [ahead, behind] = pair else { return None };
             if self.is_rigid(ahead, behind) {
+                // The checker divides by the rear product of a rigid link too.
+                if ahead.capsule.product(&behind.capsule, true).lo <= 0.0 {
+                    return None;
+                }
                 continue;
             }
             let (sample, rear) = (samples[link], samples[link + 1]);

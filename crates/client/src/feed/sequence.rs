@@ -14,6 +14,11 @@ struct Latest {
 }
 
 impl SequenceTracker {
+    /// Returns the run of the latest frame; `None` before the first.
+    pub fn run(&self) -> Option<u64> {
+        self.latest.map(|latest| latest.run_id)
+    }
+
     /// Records a frame. Returns the number of frames missing between the latest frame of its run and this one, or
     /// `None` for the first received frame of a run. A frame that is not newer than the latest has no gap before it and
     /// closes no gap.

@@ -3,6 +3,9 @@
 //! In: the chain of all dragons on the stage, and the clearance of the nearest two boards found so far. Out: a nearer
 //! pair, if there is one. The show calls it if a scene has several dragons and alerts.
 //!
+//! Where all dragons have tables of their frames, a table lists the pairs that can be the nearest at each time of the
+//! show ([`super::between_table`]). Otherwise the pairs are found from frame to frame.
+//!
 //! The broad phase is that of [`super::search`]: every bench carries from frame to frame a lower bound of its distance
 //! to the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A bench is
 //! tested again only when its bound comes within the limit. The box about each dragon gives a wide bound to benches
@@ -14,6 +17,7 @@
 //! handles. So two boards have approached by no more than [`corner_reach`] times the movement of the handles as seen
 //! from the bench. A board of the list is measured again only when this bound comes within the limit.
 
+use super::between_table::{BetweenTable, TabledDragon};
 use super::grid::Grid;
 use super::{Nearest, PairClearance, board, circle_radius, corner_reach};
 use crate::model::board::Board;
@@ -129,6 +133,15 @@ impl Listed {
     }
 }
 
+/// The moment of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<'a> {
+    /// Seconds of the show.
+    pub time: f64,
+    /// By dragon: the metres that its head has travelled.
+    pub travelled: &'a [f64],
+}
+
 /// Finds the nearest two boards of different dragons. All memory is reserved by the constructor.
 #[derive(Debug, Clone)]
 pub struct BetweenMonitor {
@@ -155,6 +168,7 @@ pub struct BetweenMonitor {
     /// By bench: its board in this frame, once the grid is filled, and the radius of the circle about it.
     boards: Vec<(Board, f64)>,
     last_pair: Option<(usize, usize)>,
+    table: Option<BetweenTable>,
     tested: u64,
 }
 
@@ -187,9 +201,16 @@ impl BetweenMonitor {
             grid: Grid::new(first),
             boards: vec![(NO_BOARD, 0.0); first],
             last_pair: None,
+            table: None,
             tested: 0,
             parts,
         }
+    }
+
+    /// Returns the same monitor with a table of a show of these dragons from its start to `end` seconds. `travelled` has
+    /// the metres that the head of a dragon has travelled at a time of the show.
+    pub fn with_table(self, dragons: &[TabledDragon<'_>], end: f64, travelled: &dyn Fn(usize, f64) -> f64) -> Self {
+        Self { table: BetweenTable::new(dragons, end, travelled), ..self }
     }
 
     /// Returns the pairs of boards tested so far.
@@ -198,11 +219,30 @@ impl BetweenMonitor {
     }
 
     /// Returns the nearest two boards of different dragons if they are nearer than `limit` metres.
-    pub fn nearest(&mut self, chain: &Chain, limit: f64) -> Option<PairClearance> {
+    pub fn nearest(&mut self, chain: &Chain, limit: f64, moment: Moment<'_>) -> Option<PairClearance> {
+        self.nearest_by_table(chain, limit, moment).unwrap_or_else(|| self.search(chain, limit))
+    }
+
+    /// Returns the same by the table; `None` if it has no list for this frame.
+    fn nearest_by_table(&mut self, chain: &Chain, limit: f64, moment: Moment<'_>) -> Option<Option<PairClearance>> {
+        let list = self.table.as_ref()?.list(&moment, (&chain.x, &chain.y))?;
+        let mut nearest = Nearest { value: limit, ..Nearest::NONE };
+        for entry in list {
+            if f64::from(entry.bound) > nearest.value {
+                return Some(nearest.finish());
+            }
+            let (a, b) = entry.pair?;
+            test(&self.parts, &mut self.tested, chain, &mut nearest, (a as usize, b as usize));
+        }
+        None
+    }
+
+    /// Returns the same by a search that follows the previous one.
+    pub(super) fn search(&mut self, chain: &Chain, limit: f64) -> Option<PairClearance> {
         self.follow(chain);
         let mut nearest = Nearest { value: limit, ..Nearest::NONE };
         if let Some((a, b)) = self.last_pair {
-            self.test(chain, &mut nearest, (a, b));
+            test(&self.parts, &mut self.tested, chain, &mut nearest, (a, b));
         }
         let mut filled = false;
         for k in 0..self.parts.len().saturating_sub(1) {
@@ -329,7 +369,7 @@ impl BetweenMonitor {
             if bound <= nearest.value + margin {
                 let b = listed.bench as usize;
                 let board_a = board_a.get_or_insert_with(|| self.parts[k].board(chain, a));
-                let board_b = self.parts[self.part_of(b)].board(chain, b);
+                let board_b = self.parts[part_of(&self.parts, b)].board(chain, b);
                 self.tested += 1;
                 bound = measured(nearest, (a, b), board_a, &board_b);
                 self.listed[a][place] = Listed::new(chain, &seat, b, bound, reach);
@@ -339,10 +379,6 @@ impl BetweenMonitor {
         least
     }
 
-    fn part_of(&self, bench: usize) -> usize {
-        self.parts.partition_point(|part| part.first <= bench) - 1
-    }
-
     /// Returns the metres across the boxes about all dragons: no two boards are further apart.
     fn sight(&self) -> f64 {
         let edge = |side: usize| self.parts.iter().map(move |part| part.bounds[side]);
@@ -350,12 +386,17 @@ impl BetweenMonitor {
         let high = edge(3).fold(f64::NEG_INFINITY, f64::max) - edge(2).fold(f64::INFINITY, f64::min);
         wide + high
     }
+}
 
-    fn test(&mut self, chain: &Chain, nearest: &mut Nearest, (a, b): (usize, usize)) {
-        let [board_a, board_b] = [a, b].map(|bench| self.parts[self.part_of(bench)].board(chain, bench));
-        self.tested += 1;
-        nearest.consider(signed_distance_board_board(&board_a, &board_b), (a, b), &board_a, &board_b);
-    }
+/// Tests two boards.
+fn test(parts: &[Part], tested: &mut u64, chain: &Chain, nearest: &mut Nearest, (a, b): (usize, usize)) {
+    let [board_a, board_b] = [a, b].map(|bench| parts[part_of(parts, bench)].board(chain, bench));
+    *tested += 1;
+    nearest.consider(signed_distance_board_board(&board_a, &board_b), (a, b), &board_a, &board_b);
+}
+
+fn part_of(parts: &[Part], bench: usize) -> usize {
+    parts.partition_point(|part| part.first <= bench) - 1
 }
 
 /// Tests two boards. Returns their distance if they are within the limit, or else a lower bound of it.

@@ -7,7 +7,7 @@ use crate::model::Vector;
 use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::solve::table::FollowerTable;
-use crate::solve::table::rows::{Band, Rows};
+use crate::solve::table::rows::{Alpha, Band, Rows};
 
 /// The head at the boundary of a cell.
 #[derive(Debug, Clone, Copy)]
@@ -67,17 +67,55 @@ pub(super) fn end_of_near(rows: &Rows, of: impl Fn(usize) -> bool, link: f64, di
 /// Returns a handle while its phase goes from `begin` to `end`, which are in these pieces.
 fn handle(band: &Band, pieces: std::ops::RangeInclusive<usize>, row: usize, (begin, end): (f64, f64)) -> Quadratic {
     let middle = 0.5 * (begin + end);
-    let at = |piece: usize, phase: f64| {
-        let beta = band.pieces[piece].beta(phase);
-        let [x, y] = band.coordinates(piece, row);
-        let value = |c: [f64; 6]| c.iter().rev().fold(0.0, |value, c| value * beta + c);
-        Vector::new(value(x), value(y))
-    };
+    let at = |piece: usize, phase: f64| place(band, piece, row, phase);
     let mut quadratic =
         Quadratic::through(at(*pieces.start(), begin), at(band.piece_at(middle), middle), at(*pieces.end(), end));
-    for piece in pieces {
+    let time = |phase: f64| (2.0 * phase - begin - end) / (end - begin);
+    quadratic.error = greatest_miss(band, pieces, row, (begin, end), &quadratic, time);
+    quadratic
+}
+
+/// Returns a handle while alpha goes from a row and phase on by `width`, less than 1; `None` beyond the table.
+pub(super) fn track(rows: &Rows, row: usize, phase: f64, width: f64) -> Option<Quadratic> {
+    let band = |row: usize| rows.bands.get(rows.band_of(row)).filter(|band| row >= band.first_row);
+    let at = |by: f64| {
+        let Alpha { row, phase } = Alpha { row, phase }.plus(by);
+        band(row).map(|band| place(band, band.piece_at(phase), row, phase))
+    };
+    let mut quadratic = Quadratic::through(at(0.0)?, at(0.5 * width)?, at(width)?);
+    let end = phase + width;
+    for (row, begin, end, offset) in [(row, phase, end.min(1.0), 0.0), (row + 1, 0.0, end - 1.0, 1.0)] {
+        if width > 0.0 && end > begin {
+            let band = band(row)?;
+            let pieces = band.piece_at(begin)..=band.piece_at(end);
+            let time = |of: f64| 2.0 * (offset + of - phase) / width - 1.0;
+            let miss = greatest_miss(band, pieces, row, (begin, end), &quadratic, time);
+            quadratic.error = quadratic.error.max(miss);
+        }
+    }
+    Some(quadratic)
+}
+
+/// Returns T at a phase in a piece.
+fn place(band: &Band, piece: usize, row: usize, phase: f64) -> Vector {
+    let beta = band.pieces[piece].beta(phase);
+    let [x, y] = band.coordinates(piece, row);
+    let value = |c: [f64; 6]| c.iter().rev().fold(0.0, |value, c| value * beta + c);
+    Vector::new(value(x), value(y))
+}
+
+/// Returns a bound of the distance of T and a quadratic polynomial of the time from phase `begin` to `end`, which are
+/// in these pieces.
+fn greatest_miss(
+    band: &Band,
+    pieces: std::ops::RangeInclusive<usize>,
+    row: usize,
+    (begin, end): (f64, f64),
+    quadratic: &Quadratic,
+    time: impl Fn(f64) -> f64,
+) -> f64 {
+    let miss = |piece: usize| {
         let part = (band.pieces[piece].begin.max(begin), band.pieces[piece].end.min(end));
-        let time = |phase: f64| (2.0 * phase - begin - end) / (end - begin);
         let local = |low: f64, high: f64| (0.5 * (low + high), 0.5 * (high - low));
         let betas = local(band.pieces[piece].beta(part.0), band.pieces[piece].beta(part.1));
         let times = local(time(part.0), time(part.1));
@@ -85,9 +123,9 @@ fn handle(band: &Band, pieces: std::ops::RangeInclusive<usize>, row: usize, (beg
             let coefficients = band.coordinates(piece, row)[axis];
             largest_difference(coefficients, betas, quadratic.terms.map(|term| term[axis]), times)
         });
-        quadratic.error = quadratic.error.max(hypot(miss[0], miss[1]));
-    }
-    quadratic
+        hypot(miss[0], miss[1])
+    };
+    pieces.map(miss).fold(0.0, f64::max)
 }
 
 /// Returns a bound of the difference of two polynomials, each on an interval given by its middle and half its length.

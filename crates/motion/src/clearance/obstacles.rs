@@ -14,7 +14,7 @@ use super::{PairClearance, board, corner_reach};
 use crate::ground::Ground;
 use crate::model::board::Board;
 use crate::model::team::Team;
-use crate::solve::Chain;
+use crate::solve::Positions;
 use crate::solve::table::FollowerTable;
 use crate::solve::table::rows::Alpha;
 
@@ -90,7 +90,7 @@ pub struct ObstacleMonitor {
 /// The nearest board so far.
 struct NearestObstacle<'a> {
     monitor: &'a ObstacleMonitor,
-    chain: &'a Chain,
+    chain: Positions<'a>,
     value: f64,
     found: Option<(usize, usize, Board)>,
 }
@@ -121,7 +121,17 @@ impl ObstacleMonitor {
     /// Returns the bench and the obstacle with the least clearance, if it is below `limit`, metres. `bench_b` is the
     /// number of handles plus the obstacle's place on the ground, `point_b` a point of the obstacle. `travelled` is as
     /// in [`ClearanceMonitor::least_clearance`](super::ClearanceMonitor::least_clearance).
-    pub fn nearest(&mut self, chain: &Chain, travelled: f64, limit: f64) -> Option<PairClearance> {
+    pub fn nearest<'a>(
+        &mut self,
+        chain: impl Into<Positions<'a>>,
+        travelled: f64,
+        limit: f64,
+    ) -> Option<PairClearance> {
+        self.nearest_of(chain.into(), travelled, limit)
+    }
+
+    // A function of one type is compiled here, where the functions that it calls are inlined.
+    fn nearest_of(&mut self, chain: Positions, travelled: f64, limit: f64) -> Option<PairClearance> {
         let benches = self.team.benches;
         let mut nearest = NearestObstacle { monitor: self, chain, value: limit, found: None };
         nearest.test(self.last_bench);
@@ -165,6 +175,7 @@ mod tests {
     use crate::model::Point;
     use crate::model::path::Path;
     use crate::model::shape::Shape;
+    use crate::solve::Chain;
     use crate::solve::{Solver, Velocities};
 
     const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };

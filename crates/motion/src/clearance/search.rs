@@ -9,7 +9,7 @@ use super::{Nearest, board, circle_radius, corner_reach};
 use crate::model::board::Board;
 use crate::model::separation::{separation_board_board, signed_distance_board_board};
 use crate::model::team::Team;
-use crate::solve::Chain;
+use crate::solve::Positions;
 
 /// Numbers that are compared together, so that vector instructions apply.
 const BOUNDS_AT_ONCE: usize = 64;
@@ -53,7 +53,7 @@ impl CarriedBounds {
     }
 
     /// Updates the bounds to the handles of a chain.
-    fn follow(&mut self, chain: &Chain, team: &Team, link_error: f64) {
+    fn follow(&mut self, chain: Positions, team: &Team, link_error: f64) {
         const LANES: usize = 8;
         let (mut most, mut sum) = ([0.0; LANES], [0.0; LANES]);
         let old = self.x.chunks_mut(LANES).zip(self.y.chunks_mut(LANES));
@@ -79,7 +79,7 @@ impl CarriedBounds {
 
 /// The search for the nearest pair of one chain.
 pub(super) struct ClearanceSearch<'a> {
-    chain: &'a Chain,
+    chain: Positions<'a>,
     team: &'a Team,
     pub nearest: Nearest,
     /// The pair that was tested first, and its clearance.
@@ -95,7 +95,7 @@ pub(super) struct ClearanceSearch<'a> {
 impl<'a> ClearanceSearch<'a> {
     /// Creates a search that has tested the pair `likely`, which is probably near.
     #[inline]
-    pub(super) fn new(chain: &'a Chain, team: &'a Team, link_error: f64, likely: Option<(usize, usize)>) -> Self {
+    pub(super) fn new(chain: Positions<'a>, team: &'a Team, link_error: f64, likely: Option<(usize, usize)>) -> Self {
         let pair = likely.unwrap_or((0, 2));
         let board_per_link = 1.0 + 2.0 * team.hole_inset / team.link(1);
         let first = (pair, f64::INFINITY);
@@ -199,7 +199,7 @@ impl<'a> ClearanceSearch<'a> {
 
     /// Puts the benches from `from` on into a grid whose squares are as large as the search distance.
     fn fill(&self, grid: &mut Grid, from: usize, skin: f64) {
-        let Chain { x, y, .. } = self.chain;
+        let Positions { x, y } = self.chain;
         let diameter = 2.0 * self.body_radius();
         grid.clear((diameter + self.nearest.value).max(0.0) + skin);
         for bench in from..self.team.benches {
@@ -221,7 +221,7 @@ impl<'a> ClearanceSearch<'a> {
 
     /// Does the same as [`by_grid`](Self::by_grid) for every later bench of the chain.
     fn against_all(&mut self, a: usize, skin: f64) -> f64 {
-        let Chain { x, y, .. } = self.chain;
+        let Positions { x, y } = self.chain;
         let board_a = board(self.chain, self.team, a);
         let centre = board_a.centre;
         let radii = board_a.circle_radius() + self.body_radius();
@@ -273,7 +273,7 @@ impl<'a> ClearanceSearch<'a> {
     /// Returns a lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides
     /// and without a square root: half the link of `b` is scaled to half its board, and its width is taken across.
     fn gap_bound(&self, board_a: &Board, b: usize) -> f64 {
-        let Chain { x, y, .. } = self.chain;
+        let Positions { x, y } = self.chain;
         let half_link = (0.5 * (x[b] - x[b + 1]), 0.5 * (y[b] - y[b + 1]));
         let offset = (x[b + 1] + half_link.0 - board_a.centre.x, y[b + 1] + half_link.1 - board_a.centre.y);
         let axis = board_a.axis;

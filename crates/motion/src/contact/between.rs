@@ -7,21 +7,17 @@
 //! within the step, move relative to each other by the difference of their two vectors, along a straight line: B is
 //! its length. So two dragons that go side by side, or one behind the other, cost few steps.
 
-use nalgebra::center;
-
 use crate::event::Budget;
 use crate::linkage::NoFollower;
 use crate::model::board::Board;
 use crate::model::root::golden_section_min;
-use crate::model::separation::{
-    circle_bound_board_board, closest_points_board_board, overlap_centre, signed_distance_board_board,
-};
+use crate::model::separation::{circle_bound_board_board, middle_between, overlap_centre, signed_distance_board_board};
 use crate::model::{Point, Vector};
 use crate::placement::Placement;
 
-use super::configuration::{Configuration, Halt};
+use super::configuration::{Configuration, last_solvable, near_pairs};
 use super::displacement::{Displacements, Weights};
-use super::search::{MOST_GUESSES, UNIMODAL_SHARE, last_solvable};
+use super::stepped_search::{GUESS_SHARE, Goal, Halt, MOST_GUESSES, SearchState, SteppedSearch, may_reach};
 use super::{ConservativeAdvancement, Found};
 
 /// A dragon on the stage, as a function of the show's time.
@@ -84,28 +80,37 @@ pub fn first_contact(
     span: (f64, f64),
     budget: &mut Budget,
 ) -> Result<Found<Meeting>, NoFollower> {
-    Search::new(moving, Goal::Contact, budget).run(span)
+    BetweenSearch::new(moving, Goal::Contact, None, budget).found(span)
 }
 
-/// Finds the least clearance of two dragons between two times, below that of `best`, if it is given.
+/// Guesses the least clearance of two dragons between two times: the nearest boards at times of a few metres of travel
+/// from each other, refined. Other boards may be nearer at a time between.
+///
+/// # Errors
+/// [`NoFollower`] if a configuration inside the motion cannot be solved.
+pub fn guess_least_clearance(
+    moving: [&MovingDragon; 2],
+    (from, to): (f64, f64),
+    budget: &mut Budget,
+) -> Result<Option<Meeting>, NoFollower> {
+    let mut search = BetweenSearch::new(moving, Goal::Least, None, budget);
+    match search.begin(from).and_then(|_| search.guess(from, to)) {
+        Ok(()) | Err(Halt::Spent) => Ok(search.best),
+        Err(Halt::NoFollower) => Err(NoFollower),
+    }
+}
+
+/// Finds the least clearance of two dragons between two times, if it is below that of `best` by more than rounding.
 ///
 /// # Errors
 /// [`NoFollower`] if a configuration inside the motion cannot be solved.
 pub fn least_clearance(
     moving: [&MovingDragon; 2],
     span: (f64, f64),
-    best: Option<f64>,
+    best: Option<Meeting>,
     budget: &mut Budget,
 ) -> Result<Found<Meeting>, NoFollower> {
-    let mut search = Search::new(moving, Goal::Least, budget);
-    search.limit = best.unwrap_or(f64::INFINITY);
-    search.run(span)
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Goal {
-    Contact,
-    Least,
+    BetweenSearch::new(moving, Goal::Least, best, budget).found(span)
 }
 
 /// A bench of each dragon.
@@ -138,75 +143,60 @@ impl Snapshot {
         pairs.iter().map(|&pair| (self.clearance(pair), pair)).min_by(|one, other| one.0.total_cmp(&other.0))
     }
 
-    /// Returns the pairs whose circle bound is at most `distance`. The second dragon's boards are sorted into squares.
+    /// Returns a lower bound of the distance of any two boards.
+    fn least_circle_bound(&self) -> f64 {
+        let all = (0..self.boards[0].len()).flat_map(|a| (0..self.boards[1].len()).map(move |b| [a, b]));
+        all.map(|pair| self.circle_bound(pair)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns the pairs whose circle bound is at most `distance`.
     fn near_pairs(&self, distance: f64) -> Vec<Pair> {
-        let widest = |boards: &[Board]| boards.iter().map(|board| board.circle_radius()).fold(0.0, f64::max);
-        let cell = widest(&self.boards[0]) + widest(&self.boards[1]) + distance.max(0.0);
-        let key = |board: &Board| ((board.centre.x / cell).floor() as i64, (board.centre.y / cell).floor() as i64);
-        let mut cells: Vec<((i64, i64), usize)> = self.boards[1].iter().map(key).zip(0..).collect();
-        cells.sort_unstable();
-        let mut pairs = Vec::new();
-        for (a, board) in self.boards[0].iter().enumerate() {
-            let (column, row) = key(board);
-            for neighbour in column - 1..=column + 1 {
-                let from = cells.partition_point(|(key, _)| *key < (neighbour, row - 1));
-                let others = cells[from..].iter().take_while(|(key, _)| *key <= (neighbour, row + 1));
-                pairs.extend(others.map(|(_, b)| [a, *b]).filter(|&pair| self.circle_bound(pair) <= distance));
-            }
-        }
-        pairs
+        near_pairs(&self.boards[0], &self.boards[1], distance, |_| true).into_iter().map(Pair::from).collect()
     }
 }
 
-struct Search<'s, 'a, 'b> {
+struct BetweenSearch<'s, 'a, 'b> {
     moving: [&'s MovingDragon<'a>; 2],
-    goal: Goal,
-    budget: &'s mut Budget<'b>,
+    state: SearchState<'s, 'b>,
     /// The clearance from which a pair matters: 0, or the least so far.
     limit: f64,
     best: Option<Meeting>,
-    searched_until: f64,
 }
 
-impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
-    fn new(moving: [&'s MovingDragon<'a>; 2], goal: Goal, budget: &'s mut Budget<'b>) -> Self {
-        Self { moving, goal, budget, limit: 0.0, best: None, searched_until: f64::NEG_INFINITY }
+impl<'s, 'a, 'b> BetweenSearch<'s, 'a, 'b> {
+    fn new(moving: [&'s MovingDragon<'a>; 2], goal: Goal, best: Option<Meeting>, budget: &'s mut Budget<'b>) -> Self {
+        let limit = if goal == Goal::Contact { 0.0 } else { best.map_or(f64::INFINITY, limit_below) };
+        Self { moving, state: SearchState::new(goal, budget), limit, best: None }
     }
 
-    fn run(&mut self, (from, to): (f64, f64)) -> Result<Found<Meeting>, NoFollower> {
-        self.searched_until = from;
-        let searched_until = match self.search(from, to) {
-            Ok(()) => to,
-            Err(Halt::Spent) => self.searched_until,
-            Err(Halt::NoFollower) => return Err(NoFollower),
-        };
+    fn found(mut self, (from, to): (f64, f64)) -> Result<Found<Meeting>, NoFollower> {
+        let searched_until = self.run(from, to)?;
         Ok(Found { value: self.best, searched_until })
     }
 
-    fn search(&mut self, from: f64, to: f64) -> Result<(), Halt> {
+    /// Returns both dragons at the first time, after their nearest boards have been recorded.
+    fn begin(&mut self, from: f64) -> Result<Snapshot, Halt> {
         let start = self.solved(from, None)?;
         let pairs = start.near_pairs(self.limit.max(0.0));
-        self.spend(pairs.len())?;
-        if let Some((value, pair)) = start.deepest(&pairs).filter(|(value, _)| *value <= self.limit) {
-            let (a, b) = start.boards_of(pair);
-            let place = if value <= 0.0 { overlap_centre(a, b) } else { middle_between(a, b) };
-            self.record(Meeting { time: from, value, benches: pair, place });
-        }
-        if self.goal == Goal::Least {
-            self.guess(from, to)?;
-        }
-        self.sweep(start, to)
+        self.state.budget.spend(pairs.len() as u64)?;
+        // Boards may overlap deeply at the start.
+        self.record_with(&start, &pairs, overlap_centre);
+        Ok(start)
     }
 
-    fn spend(&mut self, work: usize) -> Result<(), Halt> {
-        if self.budget.spend(work as u64) { Ok(()) } else { Err(Halt::Spent) }
-    }
-
-    fn record(&mut self, meeting: Meeting) {
-        if self.goal == Goal::Least {
-            self.limit = meeting.value - 8.0 * f64::EPSILON * (meeting.place.coords.norm() + 1.0);
+    /// Records the deepest pair, if it touches or is below the least clearance so far. Returns true at a contact, whose
+    /// place `touching_point` returns.
+    fn record_with(&mut self, at: &Snapshot, pairs: &[Pair], touching_point: impl Fn(&Board, &Board) -> Point) -> bool {
+        let least = self.state.goal == Goal::Least;
+        let matters = |value: f64| if least { value < self.limit } else { value <= self.limit };
+        let Some((value, pair)) = at.deepest(pairs).filter(|(value, _)| matters(*value)) else { return false };
+        let (a, b) = at.boards_of(pair);
+        let meeting = Meeting { time: at.time, value, benches: pair, place: touching_point(a, b) };
+        if least {
+            self.limit = limit_below(meeting);
         }
         self.best = Some(meeting);
+        !least
     }
 
     /// Returns both dragons at a time, as far back as `benches`, or in full; what stands is taken from `before`.
@@ -226,7 +216,7 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         });
         for (k, own) in own.iter_mut().enumerate() {
             let MovingDragon { chain, rounding_from, .. } = self.moving[k];
-            match own.solve_to(benches[k], chain.path, chain.team, self.budget) {
+            match own.solve_to(benches[k], chain.path, chain.team, self.state.budget) {
                 Err(Halt::NoFollower) if own.travelled >= *rounding_from => return Ok(None),
                 outcome => outcome?,
             }
@@ -249,22 +239,29 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         self.snapshot(time, before, all)?.ok_or(Halt::NoFollower)
     }
 
-    /// Guesses the least clearance from places in equal distances, and refines it.
+    /// Guesses the least clearance from places in equal distances, and refines it. Places are left out from which the
+    /// dragons come no nearer than the least so far, at the speeds of their heads.
     fn guess(&mut self, from: f64, to: f64) -> Result<(), Halt> {
-        let count = ((to - from) / self.time_per_link()).ceil().min(MOST_GUESSES);
-        let spacing = (to - from) / count;
-        for k in 1..=count as usize {
-            let at = self.solved((from + k as f64 * spacing).min(to), None)?;
+        let spacing = (to - from) / ((to - from) / self.step_unit()).ceil().min(MOST_GUESSES);
+        let closing = self.moving.iter().map(|dragon| dragon.head_speed).sum::<f64>();
+        let mut time = from;
+        while time < to {
+            let at = self.solved(time, None)?;
             let pairs = at.near_pairs(self.limit);
-            self.spend(pairs.len())?;
-            self.consider(&at, &pairs);
-            self.budget.report(0.3 * k as f64 / count);
+            self.state.budget.spend(pairs.len() as u64)?;
+            self.record(&at, &pairs)?;
+            let far = if pairs.is_empty() { at.least_circle_bound() - self.limit } else { 0.0 };
+            time += (far / closing).max(spacing);
+            self.state.budget.report(GUESS_SHARE * ((time - from) / (to - from)).min(1.0));
         }
+        let last = self.solved(to, None)?;
+        let pairs = last.near_pairs(self.limit);
+        self.record(&last, &pairs)?;
         let Some(Meeting { time, benches, .. }) = self.best else { return Ok(()) };
         let near = ((time - spacing).max(from), (time + spacing).min(to));
         let (_, time) = golden_section_min(|time| self.clearance_at(time, benches), near.0, near.1);
         if let Some(at) = self.snapshot(time, None, benches.map(|bench| bench + 1))? {
-            self.consider(&at, &[benches]);
+            self.record(&at, &[benches])?;
         }
         Ok(())
     }
@@ -274,86 +271,10 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
         at.ok().flatten().map_or(f64::INFINITY, |at| at.clearance(pair))
     }
 
-    /// Returns the seconds in which the faster head travels the shortest link.
-    fn time_per_link(&self) -> f64 {
-        let [a, b] = self.moving;
-        let shortest = a.chain.team.shortest_link().min(b.chain.team.shortest_link());
-        shortest / a.head_speed.max(b.head_speed)
-    }
-
-    /// Goes from `start` to `to` in steps, as [`super::search`]. No step contains a time at which a dragon begins or
-    /// ends to move.
-    fn sweep(&mut self, start: Snapshot, to: f64) -> Result<(), Halt> {
-        if self.goal == Goal::Contact && self.best.is_some() {
-            return Ok(());
-        }
-        let (from, unit) = (start.time, self.time_per_link());
-        let [a, b] = self.moving.map(|dragon| [dragon.delay, dragon.delay + dragon.end / dragon.head_speed]);
-        let breaks = [a[0], a[1], b[0], b[1]];
-        let mut step = 0.25 * unit;
-        let mut before = start;
-        while before.time < to {
-            self.searched_until = before.time;
-            let share = (before.time - from) / (to - from);
-            self.budget.report(if self.goal == Goal::Least { 0.3 + 0.7 * share } else { share });
-            let next = (before.time + step).max(before.time.next_up());
-            let ahead = breaks.into_iter().filter(|time| *time > before.time);
-            let next = ahead.fold(next, f64::min).min(to);
-            let all = self.moving.map(MovingDragon::benches);
-            let after = match self.snapshot(next, Some(&before), all)? {
-                Some(after) => after,
-                None => self.solved(to, Some(&before))?,
-            };
-            let steps = self.displacements((&before, &after), all)?;
-            let mut pairs = before.near_pairs(self.limit + self.most_motion(&steps));
-            self.retain_uncertain(&steps, (&before, &after), &mut pairs)?;
-            if pairs.is_empty() {
-                step *= 2.0;
-            } else {
-                self.consider(&after, &pairs);
-                if self.narrow(&before, &after, pairs)? {
-                    return Ok(());
-                }
-                step = (0.7 * step).max(1e-3 * unit);
-            }
-            before = after;
-        }
-        Ok(())
-    }
-
-    /// Halves a step until its uncertain pairs are certain or the doubles are exhausted. Returns true at a contact.
-    fn narrow(&mut self, before: &Snapshot, after: &Snapshot, pairs: Vec<Pair>) -> Result<bool, Halt> {
-        if pairs.is_empty() {
-            return Ok(false);
-        }
-        let benches = [0, 1].map(|k| pairs.iter().map(|pair| pair[k] + 1).max().unwrap_or(0));
-        let time = before.time + 0.5 * (after.time - before.time);
-        let has_middle = time > before.time && time < after.time;
-        let middle = if has_middle { self.snapshot(time, Some(before), benches)? } else { None };
-        let Some(middle) = middle else {
-            self.consider(after, &pairs);
-            return Ok(self.touching(after, &pairs));
-        };
-        self.consider(&middle, &pairs);
-        for ends in [(before, &middle), (&middle, after)] {
-            self.searched_until = self.searched_until.max(ends.0.time);
-            let mut uncertain = pairs.clone();
-            if self.goal == Goal::Least {
-                self.retain_possible_minima(ends, [before, &middle, after], &mut uncertain);
-            }
-            let steps = self.displacements(ends, benches)?;
-            self.retain_uncertain(&steps, ends, &mut uncertain)?;
-            if self.narrow(ends.0, ends.1, uncertain)? {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
     fn displacements(&mut self, ends: (&Snapshot, &Snapshot), benches: [usize; 2]) -> Result<[Displacements; 2], Halt> {
         let mut steps = [Displacements::default(), Displacements::default()];
         for (k, step) in steps.iter_mut().enumerate() {
-            step.extend_to(benches[k] + 1, &self.moving[k].chain, (&ends.0.own[k], &ends.1.own[k]), self.budget)?;
+            step.extend_to(benches[k] + 1, &self.moving[k].chain, (&ends.0.own[k], &ends.1.own[k]), self.state.budget)?;
         }
         Ok(steps)
     }
@@ -391,66 +312,93 @@ impl<'s, 'a, 'b> Search<'s, 'a, 'b> {
     }
 
     /// Keeps the pairs that may be at or below the limit somewhere in a step.
-    fn retain_uncertain(
+    fn retain_uncertain_in(
         &mut self,
         steps: &[Displacements; 2],
         ends: (&Snapshot, &Snapshot),
         pairs: &mut Vec<Pair>,
     ) -> Result<(), Halt> {
-        self.spend(pairs.len())?;
-        let (before, after) = ends;
-        let limit = self.limit;
-        let weights = Weights::for_limit(limit);
+        self.state.budget.spend(pairs.len() as u64)?;
+        let weights = Weights::for_limit(self.limit);
+        let both = [ends.0, ends.1];
         pairs.retain(|&pair| {
-            let most = 2.0 * limit + self.relative_motion_bound(steps, ends, pair, weights);
-            if before.circle_bound(pair) + after.circle_bound(pair) > most {
-                return false;
-            }
-            let (first, last) = (before.clearance(pair), after.clearance(pair));
-            first.min(last) <= limit || first + last <= most
+            let motion = self.relative_motion_bound(steps, ends, pair, weights);
+            may_reach(self.limit, motion, both.map(|at| at.circle_bound(pair)), || both.map(|at| at.clearance(pair)))
         });
         Ok(())
     }
+}
 
-    /// Drops the pairs whose minimum is in the other half, as in [`super::search`].
-    fn retain_possible_minima(
-        &self,
-        half: (&Snapshot, &Snapshot),
-        [before, middle, after]: [&Snapshot; 3],
-        pairs: &mut Vec<Pair>,
-    ) {
-        if after.time - before.time > UNIMODAL_SHARE * self.time_per_link() {
-            return;
-        }
-        let first_half = half.0.time == before.time;
-        pairs.retain(|&pair| {
-            let [first, least, last] = [before, middle, after].map(|at| at.clearance(pair));
-            (least < first && least < last) || first_half == (first <= last)
-        });
+impl<'s, 'b: 's> SteppedSearch<'s, 'b> for BetweenSearch<'s, '_, 'b> {
+    type Bodies = Snapshot;
+    type Pair = Pair;
+
+    fn state(&mut self) -> &mut SearchState<'s, 'b> {
+        &mut self.state
     }
 
-    /// Lowers the least clearance to that of the nearest of `pairs`.
-    fn consider(&mut self, at: &Snapshot, pairs: &[Pair]) {
-        if self.goal == Goal::Least
-            && let Some((value, pair)) = at.deepest(pairs).filter(|(value, _)| *value < self.limit)
-        {
-            let (a, b) = at.boards_of(pair);
-            self.record(Meeting { time: at.time, value, benches: pair, place: middle_between(a, b) });
-        }
+    fn coordinate(at: &Snapshot) -> f64 {
+        at.time
     }
 
-    /// Records the contact of the deepest pair, if it touches.
-    fn touching(&mut self, at: &Snapshot, pairs: &[Pair]) -> bool {
-        let touching = at.deepest(pairs).filter(|(value, _)| self.goal == Goal::Contact && *value <= 0.0);
-        if let Some((value, pair)) = touching {
-            let (a, b) = at.boards_of(pair);
-            self.record(Meeting { time: at.time, value, benches: pair, place: middle_between(a, b) });
+    /// Returns the seconds in which the faster head travels the shortest link.
+    fn step_unit(&self) -> f64 {
+        let [a, b] = self.moving;
+        let shortest = a.chain.team.shortest_link().min(b.chain.team.shortest_link());
+        shortest / a.head_speed.max(b.head_speed)
+    }
+
+    fn search(&mut self, from: f64, to: f64) -> Result<(), Halt> {
+        let start = self.begin(from)?;
+        match self.state.goal {
+            Goal::Contact if self.best.is_some() => return Ok(()),
+            Goal::Contact => {}
+            Goal::Least => self.guess(from, to)?,
         }
-        touching.is_some()
+        self.advance(start, to)
+    }
+
+    /// No step contains a time at which a dragon begins or ends to move.
+    fn step(&mut self, before: &mut Snapshot, length: f64, to: f64) -> Result<(Snapshot, Vec<Pair>), Halt> {
+        let next = (before.time + length).max(before.time.next_up());
+        let breaks = self.moving.map(|dragon| [dragon.delay, dragon.delay + dragon.end / dragon.head_speed]);
+        let ahead = breaks.into_iter().flatten().filter(|time| *time > before.time);
+        let next = ahead.fold(next, f64::min).min(to);
+        let all = self.moving.map(MovingDragon::benches);
+        let after = match self.snapshot(next, Some(before), all)? {
+            Some(after) => after,
+            None => self.solved(to, Some(before))?,
+        };
+        let steps = self.displacements((before, &after), all)?;
+        let mut pairs = before.near_pairs(self.limit + self.most_motion(&steps));
+        self.retain_uncertain_in(&steps, (before, &after), &mut pairs)?;
+        Ok((after, pairs))
+    }
+
+    fn solve_within(&mut self, before: &Snapshot, time: f64, pairs: &[Pair]) -> Result<Option<Snapshot>, Halt> {
+        self.snapshot(time, Some(before), benches_of(pairs))
+    }
+
+    fn retain_uncertain(&mut self, ends: (&Snapshot, &Snapshot), pairs: &mut Vec<Pair>) -> Result<(), Halt> {
+        let steps = self.displacements(ends, benches_of(pairs))?;
+        self.retain_uncertain_in(&steps, ends, pairs)
+    }
+
+    fn clearance(&self, at: &Snapshot, pair: Pair) -> f64 {
+        at.clearance(pair)
+    }
+
+    fn record(&mut self, at: &Snapshot, pairs: &[Pair]) -> Result<bool, Halt> {
+        Ok(self.record_with(at, pairs, middle_between))
     }
 }
 
-fn middle_between(a: &Board, b: &Board) -> Point {
-    let (on_a, on_b) = closest_points_board_board(a, b);
-    center(&on_a, &on_b)
+/// Returns the clearance from which a pair is nearer than the least so far by more than the rounding of both.
+fn limit_below(least: Meeting) -> f64 {
+    least.value - 8.0 * f64::EPSILON * (least.place.coords.norm() + 1.0)
+}
+
+/// Returns how many of the foremost benches of each dragon the pairs have.
+fn benches_of(pairs: &[Pair]) -> [usize; 2] {
+    [0, 1].map(|k| pairs.iter().map(|pair| pair[k] + 1).max().unwrap_or(0))
 }

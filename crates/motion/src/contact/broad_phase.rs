@@ -2,11 +2,12 @@
 
 use crate::model::path::Param;
 
-use super::configuration::{Configuration, Halt, Pair};
+use super::configuration::{Configuration, Pair};
 use super::displacement::{Displacements, Weights, progress};
-use super::search::AdvancementSearch;
+use super::search::ChainSearch;
+use super::stepped_search::{Halt, may_reach};
 
-impl AdvancementSearch<'_, '_, '_> {
+impl ChainSearch<'_, '_, '_> {
     /// Returns true if pairs without boards 0 and 1 matter: handle 2 is behind the start of handle 1, or may be within
     /// `excursion` metres of these configurations.
     pub(super) fn all_pairs(&self, ends: &[&Configuration], excursion: f64) -> bool {
@@ -60,7 +61,7 @@ impl AdvancementSearch<'_, '_, '_> {
         } else {
             (0..2).flat_map(|a| (a + 2..benches).map(move |b| (a, b))).collect()
         };
-        self.retain_uncertain(&step, ends, limit, &mut pairs)?;
+        self.retain_uncertain_in(&step, ends, &mut pairs)?;
         Ok(pairs)
     }
 
@@ -81,29 +82,23 @@ impl AdvancementSearch<'_, '_, '_> {
             self.solve(after, benches)?;
         }
         let ends = (&*before, after.as_deref().unwrap_or(before));
-        step.extend_to(benches + 1, self.chain, ends, self.budget)
+        step.extend_to(benches + 1, self.chain, ends, self.state.budget)
     }
 
-    /// Keeps the pairs that may be at or below `limit` somewhere in a step.
-    pub(super) fn retain_uncertain(
+    /// Keeps the pairs that may be at or below the limit somewhere in a step.
+    pub(super) fn retain_uncertain_in(
         &mut self,
         step: &Displacements,
         ends: (&Configuration, &Configuration),
-        limit: f64,
         pairs: &mut Vec<Pair>,
     ) -> Result<(), Halt> {
-        if !self.budget.spend(pairs.len() as u64) {
-            return Err(Halt::Spent);
-        }
-        let (before, after) = ends;
+        self.state.budget.spend(pairs.len() as u64)?;
+        let limit = self.limit(ends.0);
         let weights = Weights::for_limit(limit);
+        let both = [ends.0, ends.1];
         pairs.retain(|&pair| {
-            let most = 2.0 * limit + step.relative_motion_bound(self.chain, ends, pair, weights);
-            if before.circle_bound(pair) + after.circle_bound(pair) > most {
-                return false;
-            }
-            let (first, last) = (before.clearance(pair), after.clearance(pair));
-            first.min(last) <= limit || first + last <= most
+            let motion = step.relative_motion_bound(self.chain, ends, pair, weights);
+            may_reach(limit, motion, both.map(|at| at.circle_bound(pair)), || both.map(|at| at.clearance(pair)))
         });
         Ok(())
     }

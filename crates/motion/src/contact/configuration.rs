@@ -1,29 +1,18 @@
 //! The foremost part of a team at one place of the head, solved as far back as the search needs, and its near pairs.
 
 use crate::event::Budget;
-use crate::linkage::{NoFollower, follower, link_pose};
+use crate::linkage::{follower, link_pose};
 use crate::model::board::Board;
 use crate::model::path::{Param, Path};
+use crate::model::root::bisect_predicate;
 use crate::model::separation::{circle_bound_board_board, signed_distance_board_board};
 use crate::model::team::Team;
 
+use super::ConservativeAdvancement;
+use super::stepped_search::Halt;
+
 /// Two benches without a common handle, the bench nearer the head first.
 pub(super) type Pair = (usize, usize);
-
-/// The reason for an early end of a search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Halt {
-    /// The budget is spent.
-    Spent,
-    /// A configuration inside the motion cannot be solved.
-    NoFollower,
-}
-
-impl From<NoFollower> for Halt {
-    fn from(_: NoFollower) -> Self {
-        Self::NoFollower
-    }
-}
 
 /// The foremost handles and boards of a team.
 #[derive(Debug, Clone)]
@@ -44,9 +33,7 @@ impl Configuration {
     /// Solves followers until there are `benches` boards.
     pub fn solve_to(&mut self, benches: usize, path: &Path, team: &Team, budget: &mut Budget) -> Result<(), Halt> {
         let missing = benches.saturating_sub(self.boards.len());
-        if !budget.spend(missing as u64) {
-            return Err(Halt::Spent);
-        }
+        budget.spend(missing as u64)?;
         self.places.reserve(missing);
         self.boards.reserve(missing);
         for bench in self.boards.len()..benches {
@@ -74,25 +61,71 @@ impl Configuration {
         pairs.iter().map(|&pair| (self.clearance(pair), pair)).min_by(|one, other| one.0.total_cmp(&other.0))
     }
 
-    /// Returns all pairs of the foremost boards whose circle bound is at most `motion`. A grid finds them; its cells
-    /// are as wide as the longest board plus `motion`.
+    /// Returns all pairs of the foremost boards whose circle bound is at most `motion`.
     pub fn near_pairs(&self, benches: usize, motion: f64) -> Vec<Pair> {
         let boards = &self.boards[..benches];
-        let cell = boards.iter().map(|board| 2.0 * board.circle_radius()).fold(0.0, f64::max) + motion.max(0.0);
-        let key = |board: &Board| ((board.centre.x / cell).floor() as i64, (board.centre.y / cell).floor() as i64);
-        let mut cells: Vec<((i64, i64), usize)> = boards.iter().map(key).zip(0..).collect();
-        cells.sort_unstable();
-        let mut pairs = Vec::new();
-        for (a, board) in boards.iter().enumerate() {
-            let (column, row) = key(board);
-            for neighbour in column - 1..=column + 1 {
-                // Three neighbouring cells of a column are adjacent in the sorted list.
-                let from = cells.partition_point(|(key, _)| *key < (neighbour, row - 1));
-                let others = cells[from..].iter().take_while(|(key, _)| *key <= (neighbour, row + 1));
-                let later = others.map(|(_, b)| (a, *b)).filter(|&(a, b)| b >= a + 2);
-                pairs.extend(later.filter(|&pair| self.circle_bound(pair) <= motion));
-            }
+        near_pairs(boards, boards, motion, |(a, b)| b >= a + 2)
+    }
+}
+
+/// Returns the pairs of boards of two lists that pass `counts` and whose circle bound is at most `motion`. A grid finds
+/// them. Its cells are as wide as the longest boards plus `motion`.
+pub(super) fn near_pairs(
+    first: &[Board],
+    second: &[Board],
+    motion: f64,
+    counts: impl Fn((usize, usize)) -> bool,
+) -> Vec<(usize, usize)> {
+    let widest = |boards: &[Board]| boards.iter().map(|board| board.circle_radius()).fold(0.0, f64::max);
+    let cell = widest(first) + widest(second) + motion.max(0.0);
+    let key = |board: &Board| ((board.centre.x / cell).floor() as i64, (board.centre.y / cell).floor() as i64);
+    let mut cells: Vec<((i64, i64), usize)> = second.iter().map(key).zip(0..).collect();
+    cells.sort_unstable();
+    let is_near = |(a, b): (usize, usize)| circle_bound_board_board(&first[a], &second[b]) <= motion;
+    let mut pairs = Vec::new();
+    for (a, board) in first.iter().enumerate() {
+        let (column, row) = key(board);
+        for neighbour in column - 1..=column + 1 {
+            // Three neighbouring cells of a column are adjacent in the sorted list.
+            let from = cells.partition_point(|(key, _)| *key < (neighbour, row - 1));
+            let others = cells[from..].iter().take_while(|(key, _)| *key <= (neighbour, row + 1));
+            pairs.extend(others.map(|(_, b)| (a, *b)).filter(|&pair| counts(pair) && is_near(pair)));
         }
-        pairs
+    }
+    pairs
+}
+
+/// Returns the last place up to `to` at which the whole team can be solved, and the metres of travel from which on
+/// rounding may prevent a solution.
+pub(super) fn last_solvable(
+    chain: &ConservativeAdvancement,
+    budget: &mut Budget,
+    from: f64,
+    to: f64,
+) -> Result<(f64, f64), Halt> {
+    let (path, team) = (chain.path, chain.team);
+    let rounding_from = to - 1e-9 * (to.abs() + team.longest_link());
+    let mut solve = |travelled| Configuration::new(path, travelled).solve_to(team.benches, path, team, budget);
+    match solve(to) {
+        Err(Halt::NoFollower) if to > from => {}
+        outcome => return outcome.map(|()| (to, rounding_from)),
+    }
+    let last = bisect_predicate(|travelled| solve(travelled).is_err(), from, to).next_down();
+    solve(last)?;
+    if last >= rounding_from { Ok((last, rounding_from)) } else { Err(Halt::NoFollower) }
+}
+
+/// Returns the configuration of a place within a step; `None` if rounding prevents it, from `rounding_from` on.
+pub(super) fn within(
+    chain: &ConservativeAdvancement,
+    budget: &mut Budget,
+    travelled: f64,
+    benches: usize,
+    rounding_from: f64,
+) -> Result<Option<Configuration>, Halt> {
+    let mut configuration = Configuration::new(chain.path, travelled);
+    match configuration.solve_to(benches, chain.path, chain.team, budget) {
+        Err(Halt::NoFollower) if travelled >= rounding_from => Ok(None),
+        outcome => outcome.map(|()| Some(configuration)),
     }
 }

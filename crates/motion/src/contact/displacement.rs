@@ -10,8 +10,9 @@ use crate::model::team::Team;
 use crate::model::{Point, Vector};
 
 use super::ConservativeAdvancement;
-use super::configuration::{Configuration, Halt, Pair};
+use super::configuration::{Configuration, Pair};
 use super::reach::Reach;
+use super::stepped_search::Halt;
 
 /// The motion of one handle in a step.
 #[derive(Debug, Clone, Copy)]
@@ -114,9 +115,7 @@ impl Displacements {
             from = to;
         }
         fronts.pop();
-        if !budget.spend(fronts.len() as u64) {
-            return Err(Halt::Spent);
-        }
+        budget.spend(fronts.len() as u64)?;
         let link = chain.team.link(handle);
         let rears: Option<Vec<Param>> =
             fronts.into_iter().map(|front| follower(chain.path, front, link).ok()).collect();

@@ -27,9 +27,9 @@ use crate::model::shape::ShapeKind;
 use crate::model::{Point, Vector};
 
 use super::ConservativeAdvancement;
-use super::configuration::{Configuration, Halt};
+use super::configuration::{Configuration, last_solvable, within};
 use super::displacement::{Displacements, Weights, progress};
-use super::search::{MOST_GUESSES, UNIMODAL_SHARE, last_solvable, middle};
+use super::stepped_search::{GUESS_SHARE, Goal, Halt, MOST_GUESSES, SearchState, SteppedSearch};
 
 /// The first touch of an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,13 +58,6 @@ pub struct ObstacleClearance {
 /// A bench and an obstacle.
 type Meeting = (usize, usize);
 
-/// The goal of a search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Goal {
-    Touch,
-    Least,
-}
-
 /// Rounding of a clearance that no search resolves, as a share of the coordinates.
 const RESOLUTION: f64 = 1e-13;
 
@@ -74,8 +67,7 @@ const COARSE_TESTS_PER_UNIT: usize = 16;
 struct GroundSearch<'s, 'a, 'b> {
     chain: &'s ConservativeAdvancement<'a>,
     obstacles: &'s [Obstacle],
-    goal: Goal,
-    budget: &'s mut Budget<'b>,
+    state: SearchState<'s, 'b>,
     /// By obstacle: its first touch.
     touches: Vec<Option<Touch>>,
     /// By obstacle: the least clearance so far.
@@ -84,7 +76,6 @@ struct GroundSearch<'s, 'a, 'b> {
     second_handle: Param,
     /// Metres of travel from which on rounding may prevent a solution.
     rounding_from: f64,
-    searched_until: f64,
 }
 
 /// The results of a search and how far it came, metres of travel.
@@ -97,7 +88,7 @@ pub(super) fn first_touches(
     (from, to): (f64, f64),
     budget: &mut Budget,
 ) -> Results<Touch> {
-    let mut search = GroundSearch::new(chain, ground, Goal::Touch, budget);
+    let mut search = GroundSearch::new(chain, ground, Goal::Contact, budget);
     let until = search.run(from, to)?;
     Ok((search.touches, until))
 }
@@ -120,48 +111,22 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
         Self {
             chain,
             obstacles,
-            goal,
-            budget,
+            state: SearchState::new(goal, budget),
             touches: vec![None; obstacles.len()],
             best: vec![None; obstacles.len()],
             second_handle: chain.path.param_at(0.0),
             rounding_from: f64::INFINITY,
-            searched_until: f64::NEG_INFINITY,
         }
-    }
-
-    /// Searches, and returns how far the search came.
-    fn run(&mut self, from: f64, to: f64) -> Result<f64, NoFollower> {
-        match self.search(from, to) {
-            Ok(()) => Ok(to),
-            Err(Halt::Spent) => Ok(self.searched_until),
-            Err(Halt::NoFollower) => Err(NoFollower),
-        }
-    }
-
-    fn search(&mut self, from: f64, to: f64) -> Result<(), Halt> {
-        self.searched_until = from;
-        let mut start = Configuration::new(self.chain.path, from);
-        let benches = self.chain.team.benches;
-        self.solve(&mut start, benches)?;
-        self.second_handle = start.places[1];
-        self.consider(&start, self.all_meetings(benches))?;
-        let (to, rounding_from) = last_solvable(self.chain, self.budget, from, to)?;
-        self.rounding_from = rounding_from;
-        if self.goal == Goal::Least {
-            self.guess(from, to)?;
-        }
-        self.sweep(start, to)
     }
 
     fn solve(&mut self, configuration: &mut Configuration, benches: usize) -> Result<(), Halt> {
-        configuration.solve_to(benches, self.chain.path, self.chain.team, self.budget)
+        configuration.solve_to(benches, self.chain.path, self.chain.team, self.state.budget)
     }
 
     /// Returns the clearance of an obstacle from which a board matters; `None` if none does.
     fn limit(&self, obstacle: usize, at: &Board) -> Option<f64> {
-        match (self.goal, self.best[obstacle]) {
-            (Goal::Touch, _) => self.touches[obstacle].is_none().then_some(0.0),
+        match (self.state.goal, self.best[obstacle]) {
+            (Goal::Contact, _) => self.touches[obstacle].is_none().then_some(0.0),
             (Goal::Least, Some(best)) if best.value == f64::NEG_INFINITY => None,
             (Goal::Least, Some(best)) => {
                 let size = self.chain.team.longest_link() + at.centre.coords.norm() + best.value.abs();
@@ -172,38 +137,8 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
     }
 
     /// Returns each of the foremost benches with each obstacle.
-    fn all_meetings(&self, benches: usize) -> impl Iterator<Item = Meeting> + use<> {
-        let obstacles = self.obstacles.len();
-        (0..benches).flat_map(move |bench| (0..obstacles).map(move |j| (bench, j)))
-    }
-
-    /// Records the clearances of a configuration: a touch at 0 or less, or a lower least clearance.
-    fn consider(&mut self, at: &Configuration, meetings: impl IntoIterator<Item = Meeting>) -> Result<(), Halt> {
-        for (bench, j) in meetings {
-            let (board, obstacle) = (&at.boards[bench], &self.obstacles[j]);
-            let least = self.best[j].map_or(f64::INFINITY, |best| best.value);
-            let limit = if self.goal == Goal::Touch { least.min(0.0) } else { least };
-            if obstacle.coarse_clearance(board) > limit {
-                continue;
-            }
-            if !self.budget.spend(1) {
-                return Err(Halt::Spent);
-            }
-            let value = obstacle.clearance(board);
-            if value < least && (self.goal == Goal::Least || value <= 0.0) {
-                let (travelled, bench) = (at.travelled, bench as u32);
-                self.best[j] = Some(ObstacleClearance { value, travelled, bench });
-            }
-        }
-        if self.goal == Goal::Touch {
-            for (j, best) in self.best.iter_mut().enumerate() {
-                if let (Some(ObstacleClearance { travelled, bench, .. }), None) = (best.take(), self.touches[j]) {
-                    let place = self.obstacles[j].shape.nearest_points(&at.boards[bench as usize]).0;
-                    self.touches[j] = Some(Touch { obstacle: j, travelled, bench, place });
-                }
-            }
-        }
-        Ok(())
+    fn all_meetings(&self, benches: usize) -> Vec<Meeting> {
+        (0..benches).flat_map(|bench| (0..self.obstacles.len()).map(move |j| (bench, j))).collect()
     }
 
     /// Guesses the least clearances from places of the head at least the shortest link apart, and refines them.
@@ -214,8 +149,8 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
         for k in 1..=count as usize {
             let mut configuration = Configuration::new(self.chain.path, (from + k as f64 * spacing).min(to));
             self.solve(&mut configuration, benches)?;
-            self.consider(&configuration, self.all_meetings(benches))?;
-            self.budget.report(0.3 * k as f64 / count);
+            self.record(&configuration, &self.all_meetings(benches))?;
+            self.state.budget.report(GUESS_SHARE * k as f64 / count);
         }
         for j in 0..self.obstacles.len() {
             let Some(ObstacleClearance { travelled, bench, .. }) = self.best[j] else { continue };
@@ -234,34 +169,9 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
             // A constant clearance is not refined for its last digits.
             let board = &configuration.boards[bench];
             if self.limit(j, board).is_some_and(|limit| self.obstacles[j].clearance(board) < limit) {
-                self.consider(&configuration, [(bench, j)])?;
+                self.record(&configuration, &[(bench, j)])?;
             }
         }
-        Ok(())
-    }
-
-    /// Goes from `start` to `to` in steps, as [`super::search`].
-    fn sweep(&mut self, start: Configuration, to: f64) -> Result<(), Halt> {
-        let (from, shortest) = (start.travelled, self.chain.team.shortest_link());
-        let mut step = 0.25 * shortest;
-        let mut before = start;
-        while before.travelled < to && (self.goal == Goal::Least || self.touches.iter().any(Option::is_none)) {
-            self.searched_until = before.travelled;
-            let share = (before.travelled - from) / (to - from);
-            self.budget.report(if self.goal == Goal::Least { 0.3 + 0.7 * share } else { share });
-            let next = (before.travelled + step).max(before.travelled.next_up());
-            let next = if next >= self.rounding_from { to } else { next.min(to) };
-            let mut after = Configuration::new(self.chain.path, next);
-            let meetings = self.candidates(&mut before, &mut after)?;
-            if meetings.is_empty() {
-                step *= 2.0;
-            } else {
-                self.narrow(&before, &after, meetings)?;
-                step = (0.7 * step).max(1e-3 * shortest);
-            }
-            before = after;
-        }
-        self.searched_until = to;
         Ok(())
     }
 
@@ -285,12 +195,10 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
                 self.extend(before, after, &mut step, benches)?;
             }
         }
-        if !self.budget.spend((benches * self.obstacles.len() / COARSE_TESTS_PER_UNIT) as u64) {
-            return Err(Halt::Spent);
-        }
+        self.state.budget.spend((benches * self.obstacles.len() / COARSE_TESTS_PER_UNIT) as u64)?;
         let near = |meeting: &Meeting| self.coarse_limit(&step, (before, after), *meeting).is_some();
-        let mut meetings: Vec<Meeting> = self.all_meetings(benches).filter(near).collect();
-        self.retain_uncertain(&step, (before, after), &mut meetings)?;
+        let mut meetings: Vec<Meeting> = self.all_meetings(benches).into_iter().filter(near).collect();
+        self.retain_uncertain_in(&step, (before, after), &mut meetings)?;
         Ok(meetings)
     }
 
@@ -303,7 +211,7 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
     ) -> Result<(), Halt> {
         self.solve(before, benches)?;
         self.solve(after, benches)?;
-        step.extend_to(benches + 1, self.chain, (before, after), self.budget)
+        step.extend_to(benches + 1, self.chain, (before, after), self.state.budget)
     }
 
     /// Returns the limit of a meeting, and the greatest sum of the clearances at both ends of a step with which it may
@@ -323,7 +231,7 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
     }
 
     /// Keeps the boards that may come to the limit of an obstacle somewhere in a step.
-    fn retain_uncertain(
+    fn retain_uncertain_in(
         &mut self,
         step: &Displacements,
         ends: (&Configuration, &Configuration),
@@ -346,7 +254,7 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
             }
             first + last <= most && !self.is_far_on_one_curve(step, ends, (bench, j), limit)
         });
-        if self.budget.spend(tested) { Ok(()) } else { Err(Halt::Spent) }
+        Ok(self.state.budget.spend(tested)?)
     }
 
     /// Returns true if a board that stays on one line or circle is proved to stay above the limit, which its clearance
@@ -383,52 +291,107 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
         let most = 2.0 * limit + turned * (obstacle.shape.points()[0] - centre).norm();
         obstacle.clearance(before) + obstacle.clearance(after) > most
     }
+}
 
-    /// Halves a step until its uncertain meetings are certain or the doubles are exhausted.
-    fn narrow(&mut self, before: &Configuration, after: &Configuration, meetings: Vec<Meeting>) -> Result<(), Halt> {
-        let meetings: Vec<Meeting> =
-            meetings.into_iter().filter(|(bench, j)| self.limit(*j, &before.boards[*bench]).is_some()).collect();
-        let Some(benches) = meetings.iter().map(|&(bench, _)| bench + 1).max() else { return Ok(()) };
-        let Some(middle) = middle(self.chain, self.budget, (before, after), benches, self.rounding_from)? else {
-            return self.consider(after, meetings.iter().copied());
-        };
-        if self.goal == Goal::Least {
-            self.consider(&middle, meetings.iter().copied())?;
-        }
-        for ends in [(before, &middle), (&middle, after)] {
-            self.searched_until = self.searched_until.max(ends.0.travelled);
-            let mut uncertain = meetings.clone();
-            if self.goal == Goal::Least {
-                self.retain_possible_minima(ends, [before, &middle, after], &mut uncertain);
-            }
-            let mut step = Displacements::default();
-            step.extend_to(benches + 1, self.chain, ends, self.budget)?;
-            self.retain_uncertain(&step, ends, &mut uncertain)?;
-            self.narrow(ends.0, ends.1, uncertain)?;
-        }
-        if self.goal == Goal::Least {
-            self.consider(after, meetings.iter().copied())?;
-        }
-        Ok(())
+impl<'s, 'b: 's> SteppedSearch<'s, 'b> for GroundSearch<'s, '_, 'b> {
+    type Bodies = Configuration;
+    type Pair = Meeting;
+
+    fn state(&mut self) -> &mut SearchState<'s, 'b> {
+        &mut self.state
     }
 
-    /// Drops the meetings whose minimum is in the other half, if the step is so short that each clearance has one
-    /// minimum.
-    fn retain_possible_minima(
-        &self,
-        half: (&Configuration, &Configuration),
-        [before, middle, after]: [&Configuration; 3],
+    fn coordinate(at: &Configuration) -> f64 {
+        at.travelled
+    }
+
+    fn step_unit(&self) -> f64 {
+        self.chain.team.shortest_link()
+    }
+
+    fn search(&mut self, from: f64, to: f64) -> Result<(), Halt> {
+        let mut start = Configuration::new(self.chain.path, from);
+        let benches = self.chain.team.benches;
+        self.solve(&mut start, benches)?;
+        self.second_handle = start.places[1];
+        if self.record(&start, &self.all_meetings(benches))? {
+            return Ok(());
+        }
+        let (to, rounding_from) = last_solvable(self.chain, self.state.budget, from, to)?;
+        self.rounding_from = rounding_from;
+        if self.state.goal == Goal::Least {
+            self.guess(from, to)?;
+        }
+        self.advance(start, to)
+    }
+
+    fn step(
+        &mut self,
+        before: &mut Configuration,
+        length: f64,
+        to: f64,
+    ) -> Result<(Configuration, Vec<Meeting>), Halt> {
+        let next = (before.travelled + length).max(before.travelled.next_up());
+        let next = if next >= self.rounding_from { to } else { next.min(to) };
+        let mut after = Configuration::new(self.chain.path, next);
+        let meetings = self.candidates(before, &mut after)?;
+        Ok((after, meetings))
+    }
+
+    fn solve_within(
+        &mut self,
+        _: &Configuration,
+        travelled: f64,
+        meetings: &[Meeting],
+    ) -> Result<Option<Configuration>, Halt> {
+        within(self.chain, self.state.budget, travelled, benches_of(meetings), self.rounding_from)
+    }
+
+    fn retain_uncertain(
+        &mut self,
+        ends: (&Configuration, &Configuration),
         meetings: &mut Vec<Meeting>,
-    ) {
-        if after.travelled - before.travelled > UNIMODAL_SHARE * self.chain.team.shortest_link() {
-            return;
-        }
-        let first_half = half.0.travelled == before.travelled;
-        meetings.retain(|&(bench, j)| {
-            let [first, least, last] = [before, middle, after].map(|at| self.obstacles[j].clearance(&at.boards[bench]));
-            (least < first && least < last) || first_half == (first <= last)
-        });
+    ) -> Result<(), Halt> {
+        let mut step = Displacements::default();
+        step.extend_to(benches_of(meetings) + 1, self.chain, ends, self.state.budget)?;
+        self.retain_uncertain_in(&step, ends, meetings)
     }
+
+    fn clearance(&self, at: &Configuration, (bench, j): Meeting) -> f64 {
+        self.obstacles[j].clearance(&at.boards[bench])
+    }
+
+    fn record(&mut self, at: &Configuration, meetings: &[Meeting]) -> Result<bool, Halt> {
+        let contact = self.state.goal == Goal::Contact;
+        for &(bench, j) in meetings {
+            let (board, obstacle) = (&at.boards[bench], &self.obstacles[j]);
+            let least = self.best[j].map_or(f64::INFINITY, |best| best.value);
+            let limit = if contact { least.min(0.0) } else { least };
+            if obstacle.coarse_clearance(board) > limit {
+                continue;
+            }
+            self.state.budget.spend(1)?;
+            let value = obstacle.clearance(board);
+            if value < least && (!contact || value <= 0.0) {
+                let (travelled, bench) = (at.travelled, bench as u32);
+                self.best[j] = Some(ObstacleClearance { value, travelled, bench });
+            }
+        }
+        if contact {
+            for (j, best) in self.best.iter_mut().enumerate() {
+                if let (Some(ObstacleClearance { travelled, bench, .. }), None) = (best.take(), self.touches[j]) {
+                    let place = self.obstacles[j].shape.nearest_points(&at.boards[bench as usize]).0;
+                    self.touches[j] = Some(Touch { obstacle: j, travelled, bench, place });
+                }
+            }
+        }
+        Ok(contact && self.touches.iter().all(Option::is_some))
+    }
+}
+
+/// Returns how many of the foremost benches the meetings have.
+fn benches_of(meetings: &[Meeting]) -> usize {
+    meetings.iter().map(|&(bench, _)| bench + 1).max().unwrap_or(0)
 }
 
 /// Returns a lower bound of a convex function of the share of a way, given at both ends the distance and the points that

@@ -30,7 +30,8 @@ impl Reach {
         let ring = self.outermost + limit + 0.5 * team.width;
         let about_origin = hypot(ring, half).max(ring + team.hole_inset);
         let disc = ReachedDisc { centre: self.centre, radius: disc, about_origin };
-        (0..path.segments()).find_map(|segment| {
+        let near = |segment: &usize| path.can_meet(*segment, disc.centre, disc.radius);
+        (0..path.segments()).filter(near).find_map(|segment| {
             let begin = (segment > 0).then(|| path.first(segment));
             let at = path.segment_at(segment).first_within(&disc, begin, path.last(segment))?;
             Some(Param { segment, at })

@@ -3,8 +3,9 @@ use std::f64::consts::TAU;
 use proptest::prelude::*;
 
 use super::*;
-use crate::model::Point;
 use crate::model::curve::Side;
+use crate::model::{Point, Vector};
+use crate::placement::Placement;
 use crate::singularities::Singularities;
 
 mod ground;
@@ -104,6 +105,27 @@ fn a_straight_procession_is_one_step() {
         let least = searches.least_clearance(0.0, 1e6, &mut budget).unwrap();
         assert!(contact == Found { value: None, searched_until: 1e6 } && least.searched_until == 1e6);
         assert!((least.value.unwrap().value - 1.1).abs() < 1e-10);
+    }
+}
+
+/// Dragons that wait and then go side by side, and dragons that part: the guess is the least clearance.
+#[test]
+fn two_dragons_that_are_nearest_at_the_start_take_few_steps() {
+    let (path, team) = (Path::route(0.0).line(1e4).build().unwrap(), Team { benches: 20, ..PAPER });
+    let behind = 2.0 * (team.length() + team.hole_inset) + 1.5;
+    for (delay, origin, turns) in [(50.0, Vector::new(0.3, 1.8), 0.0), (0.0, Vector::new(-behind, 0.0), 0.5)] {
+        let moving = [(Vector::zeros(), 0.0), (origin, turns)].map(|(origin, turns)| {
+            let chain = ConservativeAdvancement::new(&path, &team, &[], &[]);
+            between::MovingDragon::new(chain, Placement::new(origin, turns, false), (delay, 1.0, 1e4)).unwrap()
+        });
+        let (moving, mut unreported) = ([&moving[0], &moving[1]], |_| {});
+        let mut budget = Budget::new(1_000_000, &mut unreported);
+        let guess = between::guess_least_clearance(moving, (0.0, 1e3), &mut budget).unwrap();
+        assert!((guess.unwrap().value - 1.5).abs() < 1e-12, "{guess:?}");
+        let mut unreported = |_| {};
+        let mut budget = Budget::new(100_000, &mut unreported);
+        let found = between::least_clearance(moving, (0.0, 1e3), guess, &mut budget).unwrap();
+        assert_eq!(found, Found { value: None, searched_until: 1e3 }, "{origin}");
     }
 }
 

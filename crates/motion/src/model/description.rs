@@ -2,6 +2,7 @@
 //! more digits.
 
 use super::curve::Side;
+use super::double_double::DoubleDouble;
 use super::path::{Disjoint, Path};
 use super::spiral::Direction;
 
@@ -56,7 +57,7 @@ pub enum RouteStep {
         /// Metres.
         radius: f64,
         /// Change of direction, in turns (90 degrees are a quarter).
-        turns: f64,
+        turns: DoubleDouble,
     },
     /// Along an Archimedean spiral.
     Spiral {
@@ -69,7 +70,7 @@ pub enum RouteStep {
         /// Metres from the centre to its beginning.
         radius: f64,
         /// Turns around the centre: its end is `pitch` times as many metres nearer to the centre, or further away.
-        turns: f64,
+        turns: DoubleDouble,
     },
 }
 

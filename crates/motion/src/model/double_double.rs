@@ -28,6 +28,12 @@ fn two_sum(x: f64, y: f64) -> (f64, f64) {
     (sum, (x - (sum - y_part)) + (y - y_part))
 }
 
+impl From<f64> for DoubleDouble {
+    fn from(number: f64) -> Self {
+        Self { high: number, low: 0.0 }
+    }
+}
+
 impl DoubleDouble {
     /// Zero.
     pub const ZERO: Self = Self { high: 0.0, low: 0.0 };
@@ -39,9 +45,10 @@ impl DoubleDouble {
     }
 
     /// Returns the angle of a number of turns, radians.
-    pub fn from_turns(turns: f64) -> Self {
+    pub fn from_turns(turns: impl Into<Self>) -> Self {
+        let Self { high: turns, low } = turns.into();
         let high = TAU * turns;
-        Self::sum(high, TAU.mul_add(turns, -high) + TAU_LOW * turns)
+        Self::sum(high, TAU.mul_add(turns, -high) + (TAU_LOW * turns + TAU * low))
     }
 
     /// Returns the quotient of two doubles.

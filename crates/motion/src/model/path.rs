@@ -72,12 +72,26 @@ impl Placed {
     fn at(&self, travelled: f64) -> Coordinate {
         self.segment.advance(self.anchor, travelled - self.anchor_travelled)
     }
+
+    /// Returns the centre and the radius, metres, of a circle that holds the segment: no point is farther from the
+    /// middle than half the length. The first segment has no end behind.
+    fn circle(&self) -> (Point, f64) {
+        if self.begin == f64::NEG_INFINITY {
+            return (Point::origin(), f64::INFINITY);
+        }
+        let half = 0.5 * (self.end - self.begin);
+        let middle = self.segment.point(self.segment.advance(self.anchor, half));
+        // Coordinates have a relative error of 4 eps at most.
+        (middle, half + 1e-9 * (1.0 + half + middle.coords.norm()))
+    }
 }
 
 /// A smooth path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     segments: Vec<Placed>,
+    /// By segment: the centre and the radius of a circle that holds it; none for a path of one segment.
+    circles: Vec<(Point, f64)>,
 }
 
 /// The outline of a segment, for drawings.
@@ -135,6 +149,7 @@ impl Path {
                 anchor_travelled: 0.0,
                 last: Coordinate::ZERO,
             }],
+            circles: Vec::new(),
         }
     }
 
@@ -177,7 +192,7 @@ impl Path {
             anchor_travelled: lead_in,
             last: anchor,
         };
-        let mut path = Self { segments: vec![approach] };
+        let mut path = Self { segments: vec![approach], circles: Vec::new() };
         path.push(Segment::Arc(first), Coordinate::ZERO, last, first_radius * angle);
         path.push(Segment::Arc(second), Coordinate::ZERO, last, second_radius * angle);
         let outward = Spiral::new(pitch, Direction::Outward);
@@ -194,7 +209,8 @@ impl Path {
         let zero = Coordinate::ZERO;
         let behind =
             Placed { segment, begin: f64::NEG_INFINITY, end: 0.0, anchor: zero, anchor_travelled: 0.0, last: zero };
-        Route { path: Self { segments: vec![behind] }, end: start, heading_turns, remainders: None }
+        let path = Self { segments: vec![behind], circles: Vec::new() };
+        Route { path, end: start, heading_turns, remainders: None }
     }
 
     fn push(&mut self, segment: Segment, anchor: Coordinate, last: Coordinate, length: f64) {
@@ -203,7 +219,7 @@ impl Path {
     }
 
     /// Returns the path if every segment continues the one before it.
-    fn joined(self) -> Result<Self, Disjoint> {
+    fn joined(mut self) -> Result<Self, Disjoint> {
         for (index, pair) in self.segments.windows(2).enumerate() {
             let (before, after) = (&pair[0].segment, &pair[1].segment);
             let (last, first) = (self.last(index), pair[1].anchor);
@@ -218,6 +234,7 @@ impl Path {
                 return Err(Disjoint { segment: index + 1, gap, corner });
             }
         }
+        self.circles = self.segments.iter().map(Placed::circle).collect();
         Ok(self)
     }
 
@@ -352,6 +369,14 @@ impl Path {
         &self.segments[index].segment
     }
 
+    /// Returns false only if no point of a segment is within `radius` metres of `centre`.
+    pub(crate) fn can_meet(&self, segment: usize, centre: Point, radius: f64) -> bool {
+        let Some((middle, half)) = self.circles.get(segment) else { return true };
+        let is_apart = (*middle - centre).norm_squared() > (half + radius) * (half + radius);
+        // NaN is not apart.
+        !is_apart
+    }
+
     /// Returns the coordinate with which a segment begins; for the first segment, of the place from which it is
     /// measured.
     pub(crate) fn first(&self, segment: usize) -> Coordinate {
@@ -400,10 +425,12 @@ impl Route {
     }
 
     /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
-    pub fn arc(self, side: Side, radius: f64, turns: f64) -> Self {
+    pub fn arc(self, side: Side, radius: f64, turns: impl Into<DoubleDouble>) -> Self {
+        let around = turns.into();
+        let turns = around.high;
         let arc = Arc::new(self.end, self.direction(), side, radius);
         let turned = if side == Side::Left { turns } else { -turns };
-        let last = DoubleDouble::from_turns(turns);
+        let last = DoubleDouble::from_turns(around);
         self.continued(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
     }
 
@@ -411,7 +438,15 @@ impl Route {
     /// one side, and leads `turns` turns around it.
     ///
     /// The tangent has the polar angle theta + atan(theta), but for a constant.
-    pub fn spiral(self, side: Side, direction: Direction, pitch: f64, radius: f64, turns: f64) -> Self {
+    pub fn spiral(
+        self,
+        side: Side,
+        direction: Direction,
+        pitch: f64,
+        radius: f64,
+        turns: impl Into<DoubleDouble>,
+    ) -> Self {
+        let turns = turns.into();
         let spiral = Spiral::new(pitch, direction);
         let DoubleDouble { high, low } = DoubleDouble::quotient(radius, pitch);
         let first = DoubleDouble::from_turns(high).plus(TAU * low);
@@ -419,7 +454,8 @@ impl Route {
         let last = first.plus(spiral.sign() * around.high).plus(spiral.sign() * around.low);
         let placed = PlacedSpiral::new(self.end, self.direction(), side, spiral, first);
         let inclined = atan(around.high / (1.0 + first.high * last.high)) / TAU;
-        let turned = if side == Side::Left { turns + inclined } else { -turns - inclined };
+        let turned = turns.high + inclined;
+        let turned = if side == Side::Left { turned } else { -turned };
         self.continued(Segment::PlacedSpiral(placed), first, last, spiral.arc_length(first, last), turned)
     }
 

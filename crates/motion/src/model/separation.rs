@@ -159,17 +159,19 @@ fn deepest(relative: &Relative, own: &Board, other: &Board) -> (Point, Point) {
     }
 }
 
+/// Returns the middle of the [closest points](closest_points_board_board) of two boards.
+pub fn middle_between(a: &Board, b: &Board) -> Point {
+    let (on_a, on_b) = closest_points_board_board(a, b);
+    nalgebra::center(&on_a, &on_b)
+}
+
 /// Returns the centre of area of the overlap of two boards; without overlap, the middle of their closest points.
 ///
 /// One board is clipped by the other's four edges (Sutherland and Hodgman, 1974); the result is the centroid of the
 /// polygon, or the middle of the touching points if the boards only touch.
 pub fn overlap_centre(a: &Board, b: &Board) -> Point {
-    let middle = || {
-        let (on_a, on_b) = closest_points_board_board(a, b);
-        nalgebra::center(&on_a, &on_b)
-    };
     if separation_board_board(a, b) > 0.0 {
-        return middle();
+        return middle_between(a, b);
     }
     // Each of the four half-planes can add one corner.
     let mut polygon = [Vector::zeros(); 8];
@@ -189,7 +191,7 @@ pub fn overlap_centre(a: &Board, b: &Board) -> Point {
     }
     if count == 0 {
         // The boards touch to the last digit, and rounding removed the polygon.
-        return middle();
+        return middle_between(a, b);
     }
     let centre = centroid(&polygon[..count]);
     in_stage(a, centre.x, centre.y)

@@ -42,6 +42,8 @@ pub struct Shape {
     radius: f64,
     /// Of a convex shape: 1 if its corners stand counter-clockwise, -1 if clockwise, 0 of a circle or a segment.
     convex: Option<f64>,
+    /// Of a polygon or a boundary: 1 if the free side of each of its sides is on the right, -1 if on the left.
+    outside: f64,
     /// A circle about the outline.
     bounding_centre: Point,
     bounding_radius: f64,
@@ -57,7 +59,8 @@ impl Shape {
     /// Creates a circle; its radius, metres, must be positive.
     pub fn circle(centre: Point, radius: f64) -> Self {
         let (kind, points) = (ShapeKind::Circle, vec![centre]);
-        Self { kind, points, radius, convex: Some(0.0), bounding_centre: centre, bounding_radius: radius }
+        let convex = Some(0.0);
+        Self { kind, points, radius, convex, outside: 0.0, bounding_centre: centre, bounding_radius: radius }
     }
 
     /// Creates a polygon from at least three corners; its sides must not meet except at their corners.
@@ -87,7 +90,9 @@ impl Shape {
             ShapeKind::Line => (points.len() == 2).then_some(0.0),
             ShapeKind::Circle | ShapeKind::Boundary => None,
         };
-        Self { kind, points, radius: 0.0, convex, bounding_centre, bounding_radius }
+        let area = doubled_area(&points);
+        let outside = if kind == ShapeKind::Boundary { -area } else { area }.signum();
+        Self { kind, points, radius: 0.0, convex, outside, bounding_centre, bounding_radius }
     }
 
     /// Returns the kind.
@@ -215,6 +220,11 @@ impl Shape {
         // Every constructor gives a shape at least one side.
         nearest.map_or((board.centre, board.centre), |(_, on_board, on_side)| (on_board, on_side))
     }
+}
+
+/// Returns twice the area of a simple polygon, negative if its corners stand clockwise.
+fn doubled_area(corners: &[Point]) -> f64 {
+    corners[1..].windows(2).map(|pair| (pair[0] - corners[0]).perp(&(pair[1] - corners[0]))).sum()
 }
 
 /// Returns the sense in which the corners of a simple polygon stand, 1 if it is counter-clockwise, -1 if clockwise;

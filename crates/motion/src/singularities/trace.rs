@@ -109,7 +109,7 @@ impl<'a> LinkTrace<'a> {
         } else if self.try_step().is_err() {
             self.end = Some(TraceEnd::Undecided);
         }
-        budget.spend(std::mem::take(&mut self.work))
+        budget.spend(std::mem::take(&mut self.work)).is_ok()
     }
 
     fn try_step(&mut self) -> Result<(), NoFollower> {

@@ -2,7 +2,7 @@
 //!
 //! It is right wherever there is a solution, and every faster solver falls back to it.
 
-use super::{Chain, Solver, Velocities};
+use super::{Chain, ChainMut, Solver, Velocities};
 use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::Vector;
 use crate::model::elementary;
@@ -32,6 +32,10 @@ impl Newton {
     /// # Errors
     /// [`NoFollower`] if a link is locked; `chain` is then unspecified.
     pub fn solve_at(&self, travelled: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+        self.solve_at_in(travelled, &mut chain.all_mut())
+    }
+
+    pub(super) fn solve_at_in(&self, travelled: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
         let mut front = self.path.param_at(travelled);
         let mut speed = self.head_speed;
         let last = self.team.benches;
@@ -49,7 +53,7 @@ impl Newton {
         Ok(())
     }
 
-    fn write(&self, chain: &mut Chain, handle: usize, param: Param, direction: Vector, speed: f64) {
+    fn write(&self, chain: &mut ChainMut, handle: usize, param: Param, direction: Vector, speed: f64) {
         let point = self.path.point(param);
         chain.x[handle] = point.x;
         chain.y[handle] = point.y;
@@ -74,7 +78,7 @@ impl Solver for Newton {
         "newton"
     }
 
-    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
-        self.solve_at(self.head_speed * time, chain)
+    fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        self.solve_at_in(self.head_speed * time, chain)
     }
 }

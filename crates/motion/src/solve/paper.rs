@@ -9,7 +9,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Chain, Solver, Velocities};
+use super::{Chain, ChainMut, Solver, Velocities};
 use crate::linkage::NoFollower;
 use crate::model::elementary::{atan2, cos, hypot, sin};
 use crate::model::spiral::Spiral;
@@ -126,7 +126,13 @@ fn bisected_follower_angle(spiral: &Spiral, theta: f64, link: f64, tolerance: f6
 }
 
 /// Writes positions and headings of the chain whose head is at `theta`.
-fn place_chain(spiral: &Spiral, team: &Team, tolerance: f64, theta: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+fn place_chain(
+    spiral: &Spiral,
+    team: &Team,
+    tolerance: f64,
+    theta: f64,
+    chain: &mut ChainMut,
+) -> Result<(), NoFollower> {
     let a = spiral.radius_per_radian();
     let mut angle = theta;
     for handle in 0..team.handles() {
@@ -149,14 +155,14 @@ impl Solver for Paper {
         "paper"
     }
 
-    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+    fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
         let Self { spiral, team, rules, velocities, head, earlier_head, earlier } = self;
         place_chain(spiral, team, rules.bisection_tolerance, head.theta_at(time), chain)?;
         if *velocities == Velocities::Omitted {
             return Ok(());
         }
         let before = earlier_head.theta_at((time - rules.difference_interval).max(0.0));
-        place_chain(spiral, team, rules.bisection_tolerance, before, earlier)?;
+        place_chain(spiral, team, rules.bisection_tolerance, before, &mut earlier.all_mut())?;
         for handle in 0..team.handles() {
             let vx = (chain.x[handle] - earlier.x[handle]) / rules.difference_interval;
             let vy = (chain.y[handle] - earlier.y[handle]) / rules.difference_interval;

@@ -3,7 +3,7 @@
 //! In: a path by the numbers of the scene, a team and a time. Out: every handle as sums of two doubles. Points are
 //! Cartesian, and the condition on a follower is the plain distance of two points; no formula is rearranged to save
 //! digits. It shares only names with the path, the linkage and the solvers in doubles. It takes some milliseconds per
-//! frame. `trade` and tests call it.
+//! frame. `trade` and tests call it; a scene asks it for the turns of a spiral whose length is given.
 
 mod path;
 mod real;
@@ -18,6 +18,7 @@ use self::walk::Walk;
 use crate::linkage::NoFollower;
 use crate::model::description::PathDescription;
 use crate::model::double_double::DoubleDouble;
+use crate::model::spiral::Direction;
 use crate::model::team::Team;
 
 /// One handle of the reference.
@@ -29,6 +30,28 @@ pub struct ReferenceHandle {
     pub y: DoubleDouble,
     /// Signed speed along the path, metres per second.
     pub speed: f64,
+}
+
+/// A spiral piece of a route, without its end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piece {
+    /// Towards the centre or away from it.
+    pub direction: Direction,
+    /// Metres per turn.
+    pub pitch: f64,
+    /// Metres from the centre to its beginning.
+    pub radius: f64,
+}
+
+impl Piece {
+    /// Returns the turns around the centre of the first `metres`, to 30 digits. `rough` is the double nearest to them
+    /// that is known.
+    ///
+    /// # Errors
+    /// A sentence if there is no memory for the constants pi and ln 2.
+    pub fn turns_of_metres(self, metres: f64, rough: f64) -> Result<DoubleDouble, String> {
+        path::turns_of_metres(self, metres, rough)
+    }
 }
 
 /// The exact motion of one team on one path.

@@ -30,7 +30,7 @@ use rows::{Alpha, Rows};
 use track::Track;
 
 use super::newton::Newton;
-use super::{Chain, Solver, Velocities};
+use super::{ChainMut, Solver, Velocities};
 use crate::linkage::NoFollower;
 use crate::model::path::Path;
 use crate::model::team::Team;
@@ -263,7 +263,7 @@ impl FollowerTable {
     }
 
     /// Fills the chain for `travelled` metres of the head, within the table.
-    fn interpolate(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate(&self, travelled: f64, chain: &mut ChainMut) {
         debug_assert!(self.instructions.is_available(), "{}", self.instructions.name());
         match self.instructions {
             // SAFETY: a solver is only made with instructions that this processor has.
@@ -278,18 +278,18 @@ impl FollowerTable {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-    fn interpolate_with_avx512(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate_with_avx512(&self, travelled: f64, chain: &mut ChainMut) {
         self.interpolate_with::<true>(travelled, chain);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
-    fn interpolate_with_avx2(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate_with_avx2(&self, travelled: f64, chain: &mut ChainMut) {
         self.interpolate_with::<true>(travelled, chain);
     }
 
     #[inline(always)]
-    fn interpolate_with<const FUSED: bool>(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate_with<const FUSED: bool>(&self, travelled: f64, chain: &mut ChainMut) {
         match self.velocities {
             Velocities::Computed => self.interpolate_wanted::<FUSED, true>(travelled, chain),
             Velocities::Omitted => self.interpolate_wanted::<FUSED, false>(travelled, chain),
@@ -297,7 +297,7 @@ impl FollowerTable {
     }
 
     #[inline(always)]
-    fn interpolate_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut Chain) {
+    fn interpolate_wanted<const FUSED: bool, const VELOCITIES: bool>(&self, travelled: f64, chain: &mut ChainMut) {
         let sample = self.head.at(travelled);
         let input = FrameInput { alpha: sample.alpha, alpha_per_second: sample.alpha_per_metre * self.head_speed };
         match &self.packed {
@@ -322,13 +322,13 @@ impl Solver for FollowerTable {
         "follower_table"
     }
 
-    fn solve(&mut self, time: f64, chain: &mut Chain) -> Result<(), NoFollower> {
+    fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
         let travelled = self.head_speed * time;
         if (0.0..=self.head.valid_until()).contains(&travelled) {
             self.interpolate(travelled, chain);
             return Ok(());
         }
         self.fallbacks += 1;
-        self.newton.solve_at(travelled, chain)
+        self.newton.solve_at_in(travelled, chain)
     }
 }

@@ -1,4 +1,5 @@
-// The boards as rectangles: their places, and the nearest two. Metres of the stage; knows no canvas and no page.
+// The boards as rectangles: their places, the nearest two, and the nearest obstacle. Metres of the stage; knows no
+// canvas and no page.
 
 import { STRIDE } from "./hermite.js";
 
@@ -122,12 +123,110 @@ export function overlapping(dragons, tolerance) {
   return deepest && { ...deepest, place: nearest(dragons, ...deepest.pair) };
 }
 
-/** Returns the nearest two boards that share no handle, and their place; null if none are within `most` metres. */
-export function nearestPair(dragons, most) {
-  let best = null;
-  eachWithin(dragons, most, (pair) => {
+/**
+ * Returns the nearest two boards that share no handle, and their place; null for teams without two such boards. The
+ * search is within the distance of `before`, the nearest two at an earlier moment, or of any two.
+ */
+export function nearestPair(dragons, before) {
+  const start = before ?? anyPair(dragons);
+  let best = start && { pair: start, place: nearest(dragons, ...start) };
+  if (!best?.place.away) return best;
+  eachWithin(dragons, best.place.away, (pair, apart) => {
+    if (apart >= best.place.away) return;
     const place = nearest(dragons, ...pair);
-    if (place.away < (best?.place.away ?? Infinity)) best = { pair, place };
+    if (place.away < best.place.away) best = { pair, place };
   });
+  return best;
+}
+
+/** Returns the first two boards that share no handle; null if there are none. */
+function anyPair(dragons) {
+  const long = dragons.find((dragon) => countOf(dragon) > 2);
+  if (long) return [long.first, long.first + 2];
+  return dragons.length > 1 ? [dragons[0].first, dragons[1].first] : null;
+}
+
+/**
+ * The sides of an obstacle of a stage message, each as its two ends; the distance `keep` that boards have to stay away
+ * from them; and a circle around them. A circle has one side, its centre.
+ */
+export function sidesOf({ kind, keep_out, outline }) {
+  const { x, y, heading, curvature } = outline[0];
+  if (kind === "circle") {
+    const centre = { x: x - Math.sin(heading) / curvature, y: y + Math.cos(heading) / curvature };
+    return { keep: keep_out + 1 / curvature, sides: [[centre, centre]], middle: centre, radius: 0 };
+  }
+  const sides = outline.map(({ x, y, heading, length }) => [{ x, y },
+    { x: x + length * Math.cos(heading), y: y + length * Math.sin(heading) }]);
+  const middle = { x: 0, y: 0 };
+  for (const [from] of sides) {
+    middle.x += from.x / sides.length;
+    middle.y += from.y / sides.length;
+  }
+  const radius = Math.max(...sides.flat().map((end) => Math.hypot(end.x - middle.x, end.y - middle.y)));
+  return { keep: keep_out, sides, middle, radius };
+}
+
+/** Returns the distance of a point from a side, m. */
+function awayFrom({ x, y }, [from, to]) {
+  const dx = to.x - from.x, dy = to.y - from.y, square = dx * dx + dy * dy || 1;
+  const part = Math.max(0, Math.min(1, ((x - from.x) * dx + (y - from.y) * dy) / square));
+  return Math.hypot(x - from.x - part * dx, y - from.y - part * dy);
+}
+
+/** Returns the nearest points of a board and of a side that does not cross it, as `ends`; and their distance, m. */
+function fromSide(board, side) {
+  const { x, y, c, s, l, w } = board;
+  const onBoard = (end) => [(end.x - x) * c + (end.y - y) * s, (end.y - y) * c - (end.x - x) * s];
+  const onStage = (u, v) => ({ x: x + u * c - v * s, y: y + u * s + v * c });
+  const [[fu, fv], [tu, tv]] = side.map(onBoard), du = tu - fu, dv = tv - fv, square = du * du + dv * dv || 1;
+  const within = (at, most) => Math.max(-most, Math.min(most, at));
+  let best = null;
+  const take = (...points) => {
+    const [u, v, a, b] = points, away = Math.hypot(u - a, v - b);
+    if (!(away >= best?.away)) best = { away, points };
+  };
+  for (const [a, b] of [[fu, fv], [tu, tv]]) take(within(a, l), within(b, w), a, b);
+  for (const [u, v] of [[l, w], [l, -w], [-l, w], [-l, -w]]) {
+    const part = Math.max(0, Math.min(1, ((u - fu) * du + (v - fv) * dv) / square));
+    take(u, v, fu + part * du, fv + part * dv);
+  }
+  const [u, v, a, b] = best.points;
+  return { ends: [onStage(u, v), onStage(a, b)], away: best.away };
+}
+
+/** Returns the place between a board and the distance that it has to keep from a side. */
+function placeBetween({ ends: [on, off], away }, keep) {
+  const share = away > 0 ? (away - keep) / away : 0;
+  const x = on.x + share * (off.x - on.x), y = on.y + share * (off.y - on.y);
+  return { x: (on.x + x) / 2, y: (on.y + y) / 2, ends: [on, { x, y }], away: away - keep };
+}
+
+/** Returns the place between a bench and an obstacle (see `sidesOf`): from the board to the edge of the keep-out. */
+export function nearObstacle(dragons, number, { sides, keep }) {
+  const board = boardOf(dragons, number);
+  return placeBetween(sides.map((side) => fromSide(board, side)).reduce((a, b) => (b.away < a.away ? b : a)), keep);
+}
+
+/** Returns the board and the obstacle, by its number in the list, with the least clearance, and its place. */
+export function nearestObstacle(dragons, obstacles) {
+  let best = null, least = Infinity;
+  for (const dragon of dragons) {
+    for (let bench = 0; bench < countOf(dragon); bench++) {
+      const board = rectangle(dragon.stage, dragon.places, bench), reach = Math.hypot(board.l, board.w);
+      obstacles.forEach(({ sides, keep, middle, radius }, obstacle) => {
+        // The outline of a boundary is around the boards: its circle says nothing.
+        const beyond = Math.hypot(board.x - middle.x, board.y - middle.y) - radius - reach - keep;
+        if (beyond >= least) return;
+        for (const side of sides) {
+          if (awayFrom(board, side) - reach - keep >= least) continue;
+          const found = fromSide(board, side);
+          if (found.away - keep >= least) continue;
+          least = found.away - keep;
+          best = { number: dragon.first + bench, obstacle, place: placeBetween(found, keep) };
+        }
+      });
+    }
+  }
   return best;
 }

@@ -104,6 +104,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
   let sought = null, wanted = null, soughtAt = -Infinity;
   /** The last answer to a seek: frames from before it are still on their way. */
   let landed = null;
+  /** Commands without an answer: each with its number, stream and connection. */
+  const unanswered = new Set();
   /**
    * The run of each stream whose rate is known, and that rate: from its frames, or as commanded while the show stands
    * still.
@@ -138,10 +140,24 @@ export function conduct(publishers, keysConduct, keySwitch) {
     const unsent = to.filter((stream) => {
       // A show that is shorter than another one stays at its end.
       const within = name === "seek" && stream.stage ? Math.min(value, stream.stage.freeze_time) : value;
-      return !stream.send({ command: name, value: within, id });
+      if (!stream.send({ command: name, value: within, id })) return true;
+      unanswered.add({ id, stream, socket: stream.socket });
+      return false;
     });
     for (const stream of unsent) refuse(id, stream, say("nothingSent"));
     return id;
+  }
+  /**
+   * Says that a command on a connection that has broken gets no answer. A seek is not sent again: nobody expects the
+   * jump later.
+   */
+  function showLost() {
+    for (const one of unanswered) {
+      if (one.socket.readyState <= WebSocket.OPEN) continue;
+      unanswered.delete(one);
+      if (one.id === sought?.id && one.stream === sought.stream) sought = null;
+      refuse(one.id, one.stream, say("noAnswer"));
+    }
   }
   function toggle() {
     command(targets().length === 1 ? "toggle" : canPause(there()) ? "pause" : "resume");
@@ -227,14 +243,17 @@ export function conduct(publishers, keysConduct, keySwitch) {
     if (at - sentenceAt > SENTENCE_TIME) put(part("answer"), "");
     if (bar.hidden) return;
     main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
+    // A browser ends the drag of a control that is disabled, and tells nobody.
     for (const control of bar.querySelectorAll("button, input, select:not(#conduct-whom)")) control.disabled =
-        !all.length;
+        !all.length && !(control === line && dragged);
     // All shows can be held while the selected one is gone.
     part("hold").disabled = !streams.some(isThere);
     showHold();
+    showLost();
+    // Also while no publisher is there: a seek that waits is refused with a sentence.
+    sendSeek();
     if (!all.length) return;
     const { playback } = isThere(lead()) ? lead() : all[0], { newest } = playback;
-    sendSeek();
     showStages(all);
     for (const stream of streams.filter(isThere)) if (stream.playback.newest.scale > 0) keepRate(stream,
         stream.playback.newest.scale);
@@ -260,6 +279,7 @@ export function conduct(publishers, keysConduct, keySwitch) {
       show();
     }
     if (message.type === "answer") {
+      for (const one of unanswered) if (one.id === message.id && one.stream === stream) unanswered.delete(one);
       if (message.sentence && message.command === "rate") known.delete(stream);
       if (message.id === sought?.id && stream === sought.stream) {
         landed = message.code ? { stream, run: stream.playback.newest?.run, tick: message.tick,
@@ -303,6 +323,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
     dragged = true;
     seek(Number(line.value));
   };
+  // A drag that ends where it began changes nothing.
+  line.onpointerup = () => (dragged = false);
   line.onchange = () => {
     dragged = false;
     // The last place counts, however soon it follows the one before.

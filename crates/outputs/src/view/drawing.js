@@ -336,8 +336,12 @@ function wordsOf(dragons, palette, isNarrow) {
     for (const { place } of marks) if (place) rings.push(place);
   });
   each(({ marks }, _) => {
-    for (const { kind, place, ink, text } of marks) if (place && text) items.push({ key: `${kind} ${items.length}`,
-        text: isNarrow ? halved(text) : text, ink: palette[ink], large: 1.25, ...place });
+    for (const { kind, place, ink, text } of marks) {
+      if (!place || !text) continue;
+      const isEvent = kind !== "nearest";
+      items.push({ key: `${kind} ${items.length}`, text: isNarrow && isEvent ? halved(text) : text, ink: palette[ink],
+          large: isEvent ? 1.25 : 1, hasRing: isEvent, ...place });
+    }
   });
   each((dragon, count) => {
     for (const { pair, ink, names } of dragon.marks) {

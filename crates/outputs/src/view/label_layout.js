@@ -15,8 +15,13 @@ const COVERING = 90, ON_RING = 200;
 const MOVING = 0.25, MOST_MOVING = 60;
 /** Units within which a box stands at its own board, so that it needs no line. */
 const AT_BOARD = 8;
+/** The least length of a line to a place without a board, in units. */
+const LEAST_LINE = 6;
 /** The radius of the sign at an event's place, in units: its line ends there. */
 export const RING = 27;
+
+/** Returns how far before its place the line of an item without a board ends, in units. */
+export const shortOf = ({ hasRing }) => (hasRing ? RING : 4);
 
 /** Returns the distance from a point to a board. */
 export function toBoard({ x, y, c, s, l, w }, px, py) {
@@ -101,7 +106,8 @@ class BoardMap {
  */
 export function layout({ boards, items, rings, marked, keep, width, height, unit, last }) {
   const map = new BoardMap(boards, width, height), boxes = [...keep], lines = [], placed = [];
-  // Words cover no board that other words need for the end of their line.
+  // Words cover no place and no board that other words need for the end of their line.
+  const places = items.filter(({ board }) => board === undefined).map((item) => ({ ...item, item, half: 0, tall: 0 }));
   const uncovered = [...new Set([...marked, ...items.flatMap(({ board }) => board ?? [])])];
   const spine = (board) => ({ from: along(board, 1), to: along(board, -1) });
   for (const item of items) {
@@ -118,9 +124,11 @@ export function layout({ boards, items, rings, marked, keep, width, height, unit
           half, tall };
       if (box.x - half < 2 || box.y - tall < 2 || box.x + half > width - 2 || box.y + tall > height - 2) return;
       if (boxes.some((one) => !areApart(box, one, 3 * unit))) return;
+      if (places.some((one) => one.item !== item && !areApart(box, one, 4 * unit))) return;
       const dx = end.x - box.x, dy = end.y - box.y, away = Math.hypot(dx, dy) || 1,
           out = Math.min(1, half / Math.abs(dx || 1e-9), tall / Math.abs(dy || 1e-9));
-      const short = own ? 0 : (RING * unit) / away, line = { from: { x: box.x + dx * out, y: box.y + dy * out },
+      if (!own && (1 - out) * away < (shortOf(item) + LEAST_LINE) * unit) return;
+      const short = own ? 0 : (shortOf(item) * unit) / away, line = { from: { x: box.x + dx * out, y: box.y + dy * out },
           to: { x: end.x - dx * short, y: end.y - dy * short } };
       const length = Math.hypot(line.from.x - line.to.x, line.from.y - line.to.y) / unit;
       if (best && length >= best.cost) return;

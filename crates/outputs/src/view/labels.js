@@ -3,7 +3,7 @@
 
 import { rectangle } from "./boards.js";
 import { STRIDE } from "./hermite.js";
-import { RING, along, beyond, layout, standsAtOwn } from "./label_layout.js";
+import { RING, along, beyond, layout, shortOf, standsAtOwn } from "./label_layout.js";
 
 /** The least time between two layouts of the same labels, and the time in which words move to a new place (ms). */
 const INTERVAL = 250, EASING = 200;
@@ -97,7 +97,7 @@ export class Labels {
       kept.set(key, { ...offset, share });
       const at = { x: end.x + offset.x, y: end.y + offset.y, half: item.half, tall: item.tall };
       const isBare = !line || (item.own && standsAtOwn(item.own, boardsNear(dragons, camera, at, unit), at, unit));
-      return [{ item, box: at, line: isBare ? null : lineOf(at, end, item.own ? 0 : RING * unit), isBadge }];
+      return [{ item, box: at, line: isBare ? null : lineOf(at, end, item.own ? 0 : shortOf(item) * unit), isBadge }];
     });
     this.shown = kept;
     return labels;

@@ -3,13 +3,15 @@
 // the light is other than black.
 //
 // Light is drawn small and enlarged: pools on the ground at an eighth of the size, halos at a quarter. The ground is
-// paving times light, and is made again in every third picture, or for another camera; so are the halos.
+// paving times light, and is made again in every fourth picture, or for another camera; so are the halos.
 
 import { headPicture, tailPicture } from "./dragon_head.js";
 import { STRIDE } from "./hermite.js";
 import { OfLight } from "./lantern_light.js";
 import { behindHead, boardsOf, viewOf } from "./lantern_view.js";
-import { CLOTHES, POOL_RADIUS, barrel, blank, box, dancer, halo, hash, paving, pool, turned } from "./sprites.js";
+import {
+  CLOTHES, POOL_RADIUS, barrel, blank, box, dancer, halo, hash, paving, pool, shrunk, turned,
+} from "./sprites.js";
 
 /** The enlargement of the light on the ground, and of the halos. */
 const GROUND = 8, AIR = 4;
@@ -20,7 +22,7 @@ const ON_BODY = [-0.41, 0, 0.41], ON_HEAD = [-0.7, -0.44, -0.18, 0.09];
 /** The reach of halos from the middle of a board. */
 const HALO_REACH = 1.6;
 /** Pictures from one ground to the next, and from one picture of the halos to the next, which is made between. */
-const LIGHT_EVERY = 3;
+const LIGHT_EVERY = 4;
 /** The step of the sizes in which sprites are cut. */
 const SIZES = 1.06;
 /** Handles of a line of light that is drawn at once. */
@@ -66,7 +68,7 @@ export class Lanterns {
     const view = viewOf(context.canvas, camera),
         teams = dragons.map((dragon) => ({ ...boardsOf(view, dragon), kit: this.kits.of(dragon.identity) }));
     const isOther = this.lighted !== view.key, isNew = isOther || this.picture % LIGHT_EVERY === 0;
-    const isAir = isOther || this.picture % LIGHT_EVERY === 1;
+    const isAir = isOther || this.picture % LIGHT_EVERY === 2;
     this.lighted = view.key;
     this.picture++;
     view.fine = view.pixels >= FINE;
@@ -140,7 +142,7 @@ export class Lanterns {
     this.renewed = this.filled === view.key ? union(this.part, part) : whole;
     [this.part, this.filled] = [part, view.key];
     context.fillStyle = "#000";
-    context.fillRect(...this.renewed);
+    if (this.renewed.some((one, k) => one !== part[k])) context.fillRect(...this.renewed);
     this.enlarge(context, this.floor[0], 1, part);
     this.blend(context, "multiply", () => this.enlarge(context, this.light[0], GROUND, part));
   }
@@ -210,9 +212,12 @@ export class Lanterns {
             if (!lit) continue;
             const flicker = 1 + 0.1 * Math.sin(4.1 * flames + 2.4 * bench) * Math.sin(1.7 * flames + bench),
                 radius = usual * (1 + 1.2 * burn);
-            (bench ? ON_BODY : ON_HEAD).forEach((at, k) => this.spot(context,
-                burn > 0.05 ? this.white : k === 1 ? this.gold : kit.halo, (x + at * dx) / AIR, (y + at * dy) / AIR,
-                radius, 0.62 * flicker * lit * (1 + burn)));
+            const alpha = 0.62 * flicker * lit * (1 + burn);
+            (bench ? ON_BODY : ON_HEAD).forEach((at, k) => {
+              const place = [(x + at * dx) / AIR, (y + at * dy) / AIR, radius];
+              if (burn < 1) this.spot(context, k === 1 ? this.gold : kit.halo, ...place, alpha * (1 - burn));
+              if (burn > 0) this.spot(context, this.white, ...place, alpha * burn);
+            });
           }
         }
         if (!head) continue;
@@ -299,7 +304,7 @@ export class Lanterns {
         const one = k === 1 ? boxes[step(Math.atan2(s, c), 16, Math.PI / 2)] : round;
         context.globalAlpha = lit;
         context.drawImage(one, Math.round(x + at * dx - one.width / 2), Math.round(y + at * dy - one.width / 2));
-        if (burn > 0.05) this.blend(context, "lighter", () => this.spot(context, this.white, x + at * dx, y + at * dy,
+        if (burn > 0) this.blend(context, "lighter", () => this.spot(context, this.white, x + at * dx, y + at * dy,
             1.7 * radius, burn * lit));
       });
     }
@@ -309,16 +314,17 @@ export class Lanterns {
   /** The head behind its pearl, and the tail. */
   crown(context, view, { head, tail, pearl, show }) {
     const size = Math.max(1.3 * view.pixels, 26);
-    const place = (board, end, turn, { canvas, long, wide, front }) => {
+    const place = (name, board, end, turn, picture) => {
+      const { long, wide, front } = picture, one = this.sprites(name, size, (pixels) => shrunk(picture, pixels));
       const c = board.c * Math.cos(turn) - board.s * Math.sin(turn), s = board.s * Math.cos(turn) + board.c *
           Math.sin(turn);
       context.setTransform(c, s, -s, c, board.x + end * board.dx, board.y + end * board.dy);
       context.globalAlpha = board.lit;
-      context.drawImage(canvas, -front * size, (-wide / 2) * size, long * size, wide * size);
+      context.drawImage(one, -front * size, (-wide / 2) * size, long * size, wide * size);
     };
-    if (tail) place(tail, -1, 0, this.tail);
+    if (tail) place("tail", tail, -1, 0, this.tail);
     if (head) {
-      place(head, 1, show.still ? 0 : 0.03 * Math.sin(2.6 * show.time), this.head);
+      place("head", head, 1, show.still ? 0 : 0.03 * Math.sin(2.6 * show.time), this.head);
       Object.assign(context, { strokeStyle: "#ffcf6a", lineWidth: 0.026 * size, lineCap: "round" });
       for (const side of [1, -1]) {
         const sway = show.still ? 0 : 0.07 * Math.sin(2.2 * show.time + side),

@@ -1,6 +1,6 @@
 // The marks on the picture: the next event and its place, the nearest boards now, and the overlap after a contact.
 
-import { nearest, nearestPair, overlapping, ownerOf } from "./boards.js";
+import { nearObstacle, nearest, nearestObstacle, nearestPair, overlapping, ownerOf, sidesOf } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 
 /** The greatest error of a gap by the rounding of places to 32 bits, metres for each metre from the centre. */
@@ -8,10 +8,8 @@ const ROUNDING = 1e-6;
 /** The interval of searches for overlapping boards in a team of more benches than `SMALL`, ms. */
 const SEARCH_INTERVAL = 200;
 const SMALL = 500;
-/**
- * The clearance up to which the nearest two boards of a show that stands are searched, m: beyond it nothing is near.
- */
-const FAR = 5;
+/** The interval of searches for the nearest boards while a show plays, ms; in a team of more benches than `SMALL`. */
+const NEAREST_INTERVAL = 200, NEAREST_OF_MANY = 1000;
 
 /** The benches among these numbers, which count through all handles: those of obstacles follow the handles. */
 const benchesAmong = (dragons, ...numbers) => numbers.filter((number) => number != null && ownerOf(dragons, number));
@@ -32,30 +30,47 @@ export class Overlap {
   }
 }
 
-/** The nearest two boards of a show that stands: searched once for each frame that is shown. */
+/**
+ * The nearest two boards, and the board nearest to an obstacle. They are searched a few times a second; their places
+ * are those of each picture.
+ */
 export class Nearest {
   constructor() {
-    this.found = null;
-    this.key = null;
+    this.stage = this.pair = this.met = this.key = null;
+    this.at = -Infinity;
   }
 
-  look(dragons, newest) {
-    const key = [newest.run, newest.sequence, newest.time].join();
-    if (!(newest.clearance > 0 && newest.clearance < FAR)) return null;
-    if (this.key !== key) [this.key, this.found] = [key, nearestPair(dragons, newest.clearance + 1e-3)];
-    return this.found;
+  /** Returns the lines, at most one of each kind; none without a clearance, and none where boards or obstacles meet. */
+  look(dragons, newest, { stage, shown, now }) {
+    if (this.stage !== stage) {
+      const obstacles = stage.obstacles.filter(({ outline }) => outline.length);
+      Object.assign(this, { stage, obstacles, shapes: obstacles.map(sidesOf), pair: null, met: null, key: null,
+          at: -Infinity });
+    }
+    if (!(newest.clearance > 0)) return [];
+    const key = [newest.run, shown.from.epoch, shown.time].join();
+    const interval = newest.handles.length / STRIDE > SMALL ? NEAREST_OF_MANY : NEAREST_INTERVAL;
+    if (this.key !== key && now - this.at >= interval) {
+      [this.key, this.at] = [key, now];
+      this.pair = nearestPair(dragons, this.pair)?.pair ?? null;
+      this.met = nearestObstacle(dragons, this.shapes);
+    }
+    const lines = [], { pair, met } = this;
+    if (pair) lines.push({ benches: pair, place: nearest(dragons, ...pair) });
+    if (met) lines.push({ benches: [met.number], obstacle: this.obstacles[met.obstacle],
+        place: nearObstacle(dragons, met.number, this.shapes[met.obstacle]) });
+    return lines.filter(({ place }) => place.away > 0);
   }
 }
 
 /**
  * The marks of a state: each with the benches it concerns (`pair`, numbers through all handles), a place, a colour of
  * the palette, whether the place is a ghost (in the future), whether the outlines are dashed, and a `line` between the
- * two. The caller, which knows the language, sets `text` and `names`. `near` are the nearest two boards of a show that
- * stands, or null.
+ * two. The caller, which knows the language, sets `text` and `names`. `near` are the lines of `Nearest`.
  */
 export function marksOf({ state, alert, dragons, overlap, near }) {
-  const still = near && !overlap
-      ? [{ kind: "nearest", pair: [], place: near.place, line: near.place.ends, ink: "ink" }] : [];
+  const still = overlap ? [] : near.map(({ place, benches, obstacle }) => ({ kind: "nearest", pair: [], benches,
+      obstacle, place, line: place.ends, ink: "ink" }));
   if (state.severity === "ok" || !alert) return still;
   if (!state.happened) {
     const event = benchesAmong(dragons, alert.event_bench_a, alert.event_bench_b),
@@ -68,7 +83,7 @@ export function marksOf({ state, alert, dragons, overlap, near }) {
     }
     if (alert.event_x !== null) marks.push({ kind: "coming", pair: event,
         place: { x: alert.event_x, y: alert.event_y }, ink: "danger", ghost: true });
-    return marks.reverse();
+    return [...marks.reverse(), ...still.filter(({ obstacle }) => obstacle || now.length < 2)];
   }
   const marks = [];
   if (overlap) marks.push({ kind: "overlap", pair: overlap.pair, place: overlap.place, ink: "danger" });

@@ -140,7 +140,8 @@ export class Publisher {
     const { newest, dragons } = this, { alert } = this.stream, reach = Math.max(...dragons.map((one) => one.reach));
     const isBad = known.happened && known.severity !== "ok";
     const deepest = isBad ? this.overlap.look(dragons, newest, reach, now) : null;
-    const near = newest.playing || this.look.show ? null : this.nearest.look(dragons, newest);
+    const { stage, shown } = this;
+    const near = this.look.show ? [] : this.nearest.look(dragons, newest, { stage, shown, now });
     this.sight.now = deepest && !this.sight.trouble ? this.overlapWords(deepest) : "";
     // Marks are for the crew; an audience sees lanterns that burn white.
     const all = this.look.show ? [] : this.named(marksOf({ state: known, alert, dragons, overlap: deepest, near }),
@@ -164,7 +165,7 @@ export class Publisher {
     for (const mark of marks) {
       mark.names = mark.pair.map((number) => this.own(benchIn(stage, number)));
       if (mark.kind === "coming") mark.text = this.own(this.comingWords(alert, time));
-      if (mark.line) mark.text = this.own(say("distance", { metres: mark.place.away.toFixed(3) }));
+      if (mark.line) mark.text = this.own(this.distanceWords(mark));
       if (mark.kind === "overlap") mark.text = this.own(this.overlapWords(deepest));
     }
     return marks;
@@ -175,6 +176,15 @@ export class Publisher {
     const numbers = [event_bench_a, event_bench_b].filter((number) => number !== null);
     const values = { kind: say(event), benches: numbers.length ? benchesIn(this.stage, numbers) : "", time };
     return say(time === null ? "comingStill" : "coming", values);
+  }
+
+  /** The length of a line; with the names of its dragons if there are several, and of its obstacle. */
+  distanceWords({ place, benches = [], obstacle }) {
+    const parts = [...new Set(benches.map((number) => ownerOf(this.dragons, number).part))].filter(Boolean);
+    const of = parts.length > 1 ? say("both", { a: parts[0], b: parts[1] }) : parts[0] ?? "";
+    const metres = say("distance", { metres: place.away.toFixed(3) });
+    const to = obstacle ? say("distanceTo", { metres, to: say("theObstacle", obstacle) }) : metres;
+    return of ? say("distanceOf", { distance: to, of }) : to;
   }
 
   overlapWords({ pair, depth }) {

@@ -205,6 +205,15 @@ export function paving() {
   return { canvas, perMetre: PER_METRE };
 }
 
+/** A copy of a picture at `pixels` a metre, whose edges stay smooth; the picture itself if it has no more. */
+export function shrunk({ canvas, long, wide }, pixels) {
+  if (pixels * long >= canvas.width) return canvas;
+  const [copy, context] = blank(Math.ceil(pixels * long), Math.ceil(pixels * wide));
+  context.imageSmoothingQuality = "high";
+  context.drawImage(canvas, 0, 0, copy.width, copy.height);
+  return copy;
+}
+
 /** Copies of a picture `radius` pixels large, turned by equal steps through `span` radians. */
 export function turned(picture, radius, count, span) {
   const side = Math.ceil(2 * radius * 1.42) + 2;

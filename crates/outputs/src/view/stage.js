@@ -163,8 +163,10 @@ function paint(there) {
     const { stage, places, colours, path, obstacles, marks, sight, identity } = dragon,
         own = dragon === whose ? chosen : -1;
     const named = { chosen: own, chosenName: dragon.benchName(own), endNames: dragon.endNames() };
-    return { stage, places, colours, path: path.lines, obstacles, marks, ...named, stale: sight.stale && !allStale,
-        identity };
+    // Without words a line between boards says nothing.
+    const drawn = labels ? marks : marks.filter(({ kind }) => kind !== "nearest");
+    return { stage, places, colours, path: path.lines, obstacles, marks: drawn, ...named, identity,
+        stale: sight.stale && !allStale };
   });
   const written = draw(context, camera, palette, { ground, dragons: scene, labels, measure, hasFocus });
   picture.drawn++;

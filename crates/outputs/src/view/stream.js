@@ -13,7 +13,7 @@ const KEPT_FRAMES = 64;
 const MOST_FRAMES = 125;
 /** The gap above which frames (ms) are shown without interpolation: the motion between them is not known. */
 const LONGEST_GAP = 1000;
-/** The interval of requests for the clock (ms); a server that has not answered by the next request is gone. */
+/** The interval of requests for the clock (ms); a server that owes an answer and has sent nothing for as long is gone. */
 const CLOCK_INTERVAL = 5000;
 /** The window of the past (ms) from which the jitter of the frames is estimated. */
 const JITTER_WINDOW = 2000;
@@ -135,7 +135,7 @@ export class Stream {
     const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}${whose}`);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
-    let requested = null, nearest = Infinity;
+    let requested = null, checked = 0, heard = 0, nearest = Infinity;
     const again = () => {
       clearInterval(requests);
       socket.onopen = socket.onmessage = socket.onclose = null;
@@ -146,8 +146,11 @@ export class Stream {
     };
     const requestClock = () => {
       // Do not wait for the socket to close: a machine that was switched off never closes it.
-      if (requested !== null || socket.readyState !== WebSocket.OPEN) return again();
-      requested = performance.now();
+      const isSilent = requested !== null && heard < checked;
+      if (isSilent || socket.readyState !== WebSocket.OPEN) return again();
+      checked = performance.now();
+      if (requested !== null) return;
+      requested = checked;
       socket.send("clock");
     };
     let requests = setInterval(requestClock, CLOCK_INTERVAL);
@@ -158,6 +161,7 @@ export class Stream {
       requestClock();
     };
     socket.onmessage = ({ data }) => {
+      heard = performance.now();
       if (typeof data !== "string") return this.receive(data);
       const message = JSON.parse(data);
       if (message.type === "clock") {

@@ -67,6 +67,8 @@ const WORDS = {
   chase_paused: ["", "等待：演出被暂停，继续后恢复"],
   chase_sought: ["", "等待：演出被跳转，暂停并继续后恢复"],
   distance: ["{metres}\u00a0m", "{metres}\u00a0m"],
+  distanceTo: ["{metres} to {to}", "距{to} {metres}"],
+  distanceOf: ["{of}: {distance}", "{of}：{distance}"],
   spokenNow: ["Head at {x}, {y} metres. Speed {speed}. Clearance {clearance}.",
       "龙头位于 {x}、{y} 米。速度 {speed}。间距 {clearance}。"],
 
@@ -156,6 +158,7 @@ const WORDS = {
   cueMark: ["cue \"{name}\", {time} s{waits}", "提示点“{name}”，{time} 秒{waits}"],
   waitsThere: [", waits there", "，在此等待"],
   between: ["; ", "；"],
+  noAnswer: ["The connection broke: no answer came.", "连接中断：未收到答复。"],
   nothingSent: ["The server is not there: nothing was sent.", "服务器不在：命令未发送。"],
   playing: ["playing", "播放中"],
   paused: ["paused", "已暂停"],

@@ -114,6 +114,7 @@ fn a_clearance_that_does_not_follow_is_refused() {
     refused(3, "no step has come there", &|lines| drop(lines.drain(2..LAST)));
     refused(NEAR, "before the start", &|lines| lines[NEAR - 1] = near(-0.1, 1.6));
     refused(NEAR, "share a handle", &|lines| lines[NEAR - 1]["benches"] = json!([0, 1]));
+    refused(NEAR, "share a handle", &|lines| lines[NEAR - 1]["benches"] = json!([u64::MAX, 2]));
     refused(NEAR + 1, "a second line", &|lines| lines.insert(NEAR, near(3.1, 1.6)));
     // Results of another question.
     refused(RESULT, "another question", &|lines| lines[0]["about"] = json!("events"));

@@ -258,14 +258,15 @@ impl Publisher for SharedMemoryPublisher {
 
     fn maintain(&mut self) {
         // A late subscriber gets the history only when the publisher updates its connections.
+        // The stage names what is in alerts and cues.
+        self.stage.maintain();
+        self.scene.maintain();
         if let Some(alerts) = &mut self.alerts {
             alerts.maintain();
         }
         if let Some(cues) = &mut self.cues {
             cues.maintain();
         }
-        self.stage.maintain();
-        self.scene.maintain();
         self.poses.update_connections();
         if let Some((port, _)) = &self.poses_32 {
             port.update_connections();

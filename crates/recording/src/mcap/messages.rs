@@ -20,9 +20,9 @@ pub(super) struct Messages {
     pub batch: Batch,
     handles: HandlePoses,
     poses: PoseArray,
-    /// The markers, after the first stage.
+    /// Markers and transforms, after the first stage.
     markers: Option<MarkerArray>,
-    transforms: TfMessage,
+    transforms: Option<TfMessage>,
 }
 
 impl Messages {
@@ -35,7 +35,7 @@ impl Messages {
             handles: HandlePoses::of(0),
             poses: PoseArray::of(0),
             markers: None,
-            transforms: TfMessage::of(name, &Stage::default()),
+            transforms: None,
         }
     }
 
@@ -62,8 +62,10 @@ impl Messages {
                 }
                 Topic::Clock => batch.push(topic, stamp_ns, sequence, &Clock::of(frame)),
                 Topic::Tf => {
-                    self.transforms.update(frame, handles);
-                    batch.push(topic, stamp_ns, sequence, &self.transforms);
+                    if let (Some(transforms), Some(_)) = (&mut self.transforms, stage) {
+                        transforms.update(frame, handles);
+                        batch.push(topic, stamp_ns, sequence, transforms);
+                    }
                 }
                 Topic::Markers => {
                     if let (Some(markers), Some(stage)) = (&mut self.markers, stage) {
@@ -81,7 +83,7 @@ impl Messages {
         let stage = &message.stage;
         self.batch.clear();
         self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(message));
-        self.transforms = TfMessage::of(&self.name, stage);
+        self.transforms = self.topics.contains(&Topic::Tf).then(|| TfMessage::of(&self.name, stage));
         self.batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(message.clone()));
         if self.topics.contains(&Topic::Path) {
             self.batch.push(Topic::Path, stage.stamp_ns, sequence, &Path::of(message));

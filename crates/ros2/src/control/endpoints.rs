@@ -75,6 +75,8 @@ pub(super) struct ServiceEndpoint {
     pub(super) requests_guid: GUID,
     pub(super) responses_guid: GUID,
     responses: DataWriter<Vec<u8>, AsTheyAre>,
+    /// Answers that RustDDS has taken.
+    pub(super) answers: u32,
     /// The warnings already reported.
     reported: Reported,
 }
@@ -119,6 +121,7 @@ impl Endpoints {
                 requests_guid,
                 responses_guid,
                 responses,
+                answers: 0,
                 reported: Reported::default(),
             })
         };
@@ -160,11 +163,14 @@ impl ServiceEndpoint {
         let Ok(body) = CDRSerializerAdapter::<Response>::to_bytes(response) else { return true };
         bytes.extend_from_slice(&body);
         let options = || WriteOptionsBuilder::new().related_sample_identity(client.identity);
+        let mut write = |options| {
+            let is_taken = self.responses.write_with_options(bytes.clone(), options).is_ok();
+            self.answers += u32::from(is_taken);
+            is_taken
+        };
         match readers {
-            [] => self.responses.write_with_options(bytes, options().build()).is_ok(),
-            _ => readers.iter().all(|reader| {
-                self.responses.write_with_options(bytes.clone(), options().to_single_reader(*reader).build()).is_ok()
-            }),
+            [] => write(options().build()),
+            _ => readers.iter().all(|reader| write(options().to_single_reader(*reader).build())),
         }
     }
 

@@ -19,6 +19,7 @@ use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::spiral::{Direction, Spiral};
 use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::solve::reference::Piece;
 
 /// The greatest number of pieces of a route.
 pub(crate) const MOST_STEPS: usize = 4096;
@@ -273,10 +274,11 @@ impl RawStep {
         };
         let radius = checked(source, "radius", radius, Accepted::LENGTH)?;
         let turns = match extent {
-            Extent::Turns(turns) => checked(source, "turns", turns, Accepted::ARC_TURNS)?,
+            Extent::Turns(turns) => checked(source, "turns", turns, Accepted::ARC_TURNS)?.into(),
             Extent::Length(length) => {
-                let turns = checked(source, "length", length, Accepted::LEG)? / (TAU * radius);
-                as_turns(source, length, turns)?
+                let metres = checked(source, "length", length, Accepted::LEG)?;
+                as_turns(source, length, metres / (TAU * radius))?;
+                turns_of_arc(metres, radius)
             }
         };
         Ok(RouteStep::Arc { side: side.side(), turns, radius })
@@ -319,7 +321,14 @@ impl RawStep {
             );
             return Err(source.field_error(given, &sentence));
         }
-        let turns = if let Extent::Length(length) = extent { as_turns(source, length, turns)? } else { turns };
+        let turns = match extent {
+            Extent::Turns(_) => turns.into(),
+            Extent::Length(length) => {
+                let rough = as_turns(source, length, turns)?;
+                let turns = Piece { direction, pitch, radius }.turns_of_metres(*length.get_ref(), rough);
+                turns.map_err(|sentence| source.field_error(length, &sentence))?
+            }
+        };
         Ok(RouteStep::Spiral { side: side.side(), direction, pitch, radius, turns })
     }
 
@@ -347,6 +356,15 @@ fn checked(source: &Source, field: &str, value: &Spanned<f64>, accepted: Accepte
 fn as_turns(source: &Source, length: &Spanned<f64>, turns: f64) -> Result<f64, SceneError> {
     let checked = Accepted::ARC_TURNS.check("path.pieces.length in turns", turns);
     checked.map_err(|sentence| source.field_error(length, &sentence))
+}
+
+/// Returns the turns of an arc of some metres, to 30 digits.
+fn turns_of_arc(metres: f64, radius: f64) -> DoubleDouble {
+    let rough = metres / (TAU * radius);
+    let DoubleDouble { high, low } = DoubleDouble::from_turns(rough);
+    let product = high * radius;
+    let rest = (metres - product) - high.mul_add(radius, -product) - low * radius;
+    DoubleDouble::sum(rough, rest / (TAU * radius))
 }
 
 /// Returns true if one Euler step of the paper's rules, `metres` long, ends where a bench is folded back on itself, or

@@ -10,7 +10,7 @@ pub(crate) fn any_spiral() -> impl Strategy<Value = RouteStep> {
     let directions = prop_oneof![Just(Direction::Inward), Just(Direction::Outward)];
     (sides, directions, 0.3..2.0f64, 1.0..6.0f64, 0.01..0.95f64).prop_map(|(side, direction, pitch, radius, share)| {
         let turns = (share * radius / pitch).min(3.0);
-        RouteStep::Spiral { side, direction, pitch, radius, turns }
+        RouteStep::Spiral { side, direction, pitch, radius, turns: turns.into() }
     })
 }
 
@@ -24,7 +24,11 @@ pub(crate) fn any_path() -> impl Strategy<Value = Path> {
     });
     let step = (0.5..8.0f64, 0.05..0.7f64, any::<bool>(), any::<bool>()).prop_map(|(size, turns, left, line)| {
         let side = if left { Side::Left } else { Side::Right };
-        if line { RouteStep::Line { length: size } } else { RouteStep::Arc { side, radius: 0.5 * size, turns } }
+        if line {
+            RouteStep::Line { length: size }
+        } else {
+            RouteStep::Arc { side, radius: 0.5 * size, turns: turns.into() }
+        }
     });
     let route = prop::collection::vec(prop_oneof![2 => step, 1 => any_spiral()], 2..8)
         .prop_map(|steps| PathDescription::Route { heading_turns: 0.3, steps });
@@ -103,5 +107,18 @@ fn the_way_out_mirrors_the_way_in() {
         let (inward, outward) = (path.param_at(begins[0] - distance), path.param_at(begins[2] + distance));
         assert!((path.point(inward).coords + path.point(outward).coords).norm() < 1e-13);
         assert!((path.tangent(inward) - path.tangent(outward)).norm() < 1e-13);
+    }
+}
+
+proptest! {
+    /// A disc about a point of a segment can be met, and one farther away than the path is long cannot.
+    #[test]
+    fn circles_hold_their_segments(path in any_path(), share in 0.0..1.0f64, angle in 0.0..6.3f64, away in 0.0..9.0f64) {
+        let at = path.param_at(share * path.length());
+        let off = Vector::new(angle.cos(), angle.sin());
+        prop_assert!(path.can_meet(at.segment, path.point(at) + away * off, away));
+        let far = path.point(at) + (path.length() + away) * 2.0 * off;
+        let later = (1..path.segments()).any(|segment| path.can_meet(segment, far, away));
+        prop_assert!(!later, "a disc that no segment reaches");
     }
 }

@@ -8,12 +8,19 @@
 //! translation leads to the nearest point of a hexagon's outline that is inside no other hexagon and not inside the
 //! shape.
 
-use super::{MOST_CORNERS, Rectangle, Shape, in_frame, nearest_of_segment};
+use super::{MOST_CORNERS, Rectangle, Shape, ShapeKind, in_frame, nearest_of_segment};
 use crate::model::Vector;
 use crate::model::board::Board;
 
 /// Depth within a hexagon, as a share of the board and the translation, up to which a point counts as outside.
 const ROUNDING: f64 = 1e-12;
+
+/// The greatest number of segments of an outline: of a line, two along each side and three round each corner.
+const MOST_SEGMENTS: usize = 5 * MOST_CORNERS;
+
+/// As many corners as most shapes have, and their segments.
+const FEW_CORNERS: usize = 16;
+const FEW_SEGMENTS: usize = 5 * FEW_CORNERS;
 
 /// The places at which the rectangle meets a side.
 #[derive(Debug, Clone, Copy, Default)]
@@ -25,11 +32,10 @@ struct Hexagon {
 }
 
 impl Hexagon {
-    fn new(rectangle: &Rectangle, from: Vector, to: Vector) -> Self {
+    fn new(half: Vector, from: Vector, to: Vector) -> Self {
         let along = to - from;
         let length = along.norm();
         let normal = if length > 0.0 { Vector::new(-along.y, along.x) / length } else { Vector::x() };
-        let half = rectangle.half;
         Self {
             middle: 0.5 * (from + to),
             reach: half + 0.5 * along.abs(),
@@ -38,27 +44,92 @@ impl Hexagon {
         }
     }
 
-    /// Returns the part of the segment from `from` to `to` that is inside by more than `depth`, as shares of it.
-    fn covers(&self, from: Vector, to: Vector, depth: f64) -> Option<(f64, f64)> {
-        let (offset, along) = (from - self.middle, to - from);
-        let slabs = [
-            (offset.x, along.x, self.reach.x),
-            (offset.y, along.y, self.reach.y),
-            (self.normal.dot(&offset), self.normal.dot(&along), self.reach_along_normal),
-        ];
+    /// Returns the part of a segment that is inside by more than `depth`, as shares of it.
+    #[inline]
+    fn covers(&self, segment: &Segment, depth: f64) -> Option<(f64, f64)> {
+        let (offset, along) = (segment.from - self.middle, segment.to - segment.from);
+        let reach = self.reach.map(|reach| reach - depth);
         let (mut low, mut high) = (0.0f64, 1.0f64);
-        for (at, rate, reach) in slabs {
-            let reach = reach - depth;
-            if rate == 0.0 {
-                if at.abs() >= reach {
-                    return None;
-                }
-                continue;
+        for (at, rate, reach) in [
+            (offset.x, along.x, reach.x),
+            (offset.y, along.y, reach.y),
+            (self.normal.dot(&offset), self.normal.dot(&along), self.reach_along_normal - depth),
+        ] {
+            if at.min(at + rate) >= reach || at.max(at + rate) <= -reach {
+                return None;
             }
-            let ends = [(-reach - at) / rate, (reach - at) / rate];
-            (low, high) = (low.max(ends[0].min(ends[1])), high.min(ends[0].max(ends[1])));
+            // Most segments pass through a hexagon from end to end, or beside it.
+            if at.abs().max((at + rate).abs()) > reach {
+                let (one, other) = ((-reach - at) / rate, (reach - at) / rate);
+                (low, high) = (low.max(one.min(other)), high.min(one.max(other)));
+            }
         }
         (low < high).then_some((low, high))
+    }
+}
+
+/// A segment of places to which the board can be moved, with the squared distance from the origin to it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Segment {
+    from: Vector,
+    to: Vector,
+    squared: f64,
+}
+
+/// The segments of which the outline of the places to avoid consists.
+struct Outline<'s> {
+    segments: &'s mut [Segment],
+    count: usize,
+}
+
+impl Outline<'_> {
+    fn add(&mut self, from: Vector, to: Vector) {
+        let squared = nearest_of_segment(Vector::zeros(), from, to).norm_squared();
+        self.segments[self.count] = Segment { from, to, squared };
+        self.count += 1;
+    }
+
+    /// Adds the places at which the board slides along a side, on the left of it or on the right.
+    fn add_along(&mut self, half: Vector, from: Vector, to: Vector, sense: f64) {
+        let outward = sense * Vector::new(to.y - from.y, from.x - to.x);
+        let corner = half.zip_map(&outward, f64::copysign);
+        self.add(from + corner, to + corner);
+    }
+
+    /// Adds the places at which an edge of the board slides over a corner, from which the sides lead to `neighbours`.
+    /// Beyond an edge towards which one of the sides leads, the board meets that side.
+    fn add_round(&mut self, half: Vector, at: Vector, neighbours: &[Vector]) {
+        let (low, high) = (at - half, at + half);
+        let leads = |towards: fn(&Vector, &Vector) -> bool| neighbours.iter().any(|next| towards(next, &at));
+        let corner = |x, y| Vector::new(x, y);
+        if !leads(|next, at| next.x > at.x) {
+            self.add(corner(high.x, low.y), high);
+        }
+        if !leads(|next, at| next.y > at.y) {
+            self.add(high, corner(low.x, high.y));
+        }
+        if !leads(|next, at| next.x < at.x) {
+            self.add(corner(low.x, high.y), low);
+        }
+        if !leads(|next, at| next.y < at.y) {
+            self.add(low, corner(high.x, low.y));
+        }
+    }
+
+    /// Takes out the segment that is nearest to the origin, if the square of its distance is below `limit`.
+    fn take_nearest(&mut self, limit: f64) -> Option<Segment> {
+        let segments = &self.segments[..self.count];
+        let mut nearest = (limit, None);
+        for (number, segment) in segments.iter().enumerate() {
+            if segment.squared < nearest.0 {
+                nearest = (segment.squared, Some(number));
+            }
+        }
+        let number = nearest.1?;
+        let taken = segments[number];
+        self.count -= 1;
+        self.segments[number] = self.segments[self.count];
+        Some(taken)
     }
 }
 
@@ -68,7 +139,9 @@ impl Shape {
     pub(super) fn least_escape(&self, board: &Board) -> f64 {
         match self.convex {
             Some(sense) => self.convex_escape(board, sense),
-            None => self.nearest_free(board),
+            // Smaller arrays take less time to prepare.
+            None if self.points.len() <= FEW_CORNERS => self.nearest_free::<FEW_CORNERS, FEW_SEGMENTS>(board),
+            None => self.nearest_free::<MOST_CORNERS, MOST_SEGMENTS>(board),
         }
     }
 
@@ -95,48 +168,85 @@ impl Shape {
     }
 
     /// Returns the distance from the origin to the nearest free translation.
-    fn nearest_free(&self, board: &Board) -> f64 {
-        let rectangle = Rectangle::of(board);
-        let mut hexagons = [Hexagon::default(); MOST_CORNERS];
-        let mut count = 0;
-        for ((from, to), hexagon) in self.sides().zip(&mut hexagons) {
-            *hexagon = Hexagon::new(&rectangle, in_frame(board, from), in_frame(board, to));
-            count += 1;
+    fn nearest_free<const CORNERS: usize, const SEGMENTS: usize>(&self, board: &Board) -> f64 {
+        let half = Rectangle::of(board).half;
+        let mut corners = [Vector::zeros(); CORNERS];
+        for (corner, point) in corners.iter_mut().zip(&self.points) {
+            *corner = in_frame(board, *point);
         }
+        let corners = &corners[..self.points.len()];
+        let mut segments = [Segment::default(); SEGMENTS];
+        let mut outline = Outline { segments: &mut segments, count: 0 };
+        let sides = self.add_outline(&mut outline, half, corners);
+        let mut hexagons = [Hexagon::default(); CORNERS];
+        let hexagons = &mut hexagons[..sides];
+        for (number, hexagon) in hexagons.iter_mut().enumerate() {
+            *hexagon = Hexagon::new(half, corners[number], corners[(number + 1) % corners.len()]);
+        }
+        let mut covered = [(0.0, 0.0); CORNERS];
         let mut best = f64::INFINITY;
-        for (number, (from, to)) in self.sides().take(count).enumerate() {
-            let corners = hexagon_corners(&rectangle, in_frame(board, from), in_frame(board, to));
-            for k in 0..6 {
-                let (begin, end) = (corners[k], corners[(k + 1) % 6]);
-                if nearest_of_segment(Vector::zeros(), begin, end).norm() < best {
-                    best = best.min(self.nearest_free_of(board, (&hexagons[..count], number), begin, end));
-                }
-            }
+        while let Some(segment) = outline.take_nearest(best * best) {
+            best = best.min(self.nearest_free_of(board, hexagons, &segment, &mut covered));
         }
         best
     }
 
-    /// Returns the distance from the origin to the nearest free translation on one side of the hexagon with this
-    /// number; infinite if none is free.
-    fn nearest_free_of(&self, board: &Board, (hexagons, own): (&[Hexagon], usize), begin: Vector, end: Vector) -> f64 {
-        let rectangle = Rectangle::of(board);
-        let depth = ROUNDING * (rectangle.half.norm() + begin.norm().max(end.norm()));
-        let mut covered = [(0.0, 0.0); MOST_CORNERS];
+    /// Adds the outline of the places to avoid, and what else of the outlines of the hexagons may be part of it.
+    /// Returns the number of sides.
+    fn add_outline(&self, outline: &mut Outline, half: Vector, corners: &[Vector]) -> usize {
+        let count = corners.len();
+        if self.kind == ShapeKind::Line {
+            for ends in corners.windows(2) {
+                outline.add_along(half, ends[0], ends[1], 1.0);
+                outline.add_along(half, ends[0], ends[1], -1.0);
+            }
+            outline.add_round(half, corners[0], &corners[1..2]);
+            for three in corners.windows(3) {
+                outline.add_round(half, three[1], &[three[0], three[2]]);
+            }
+            outline.add_round(half, corners[count - 1], &corners[count - 2..count - 1]);
+            return count - 1;
+        }
+        for k in 0..count {
+            let [before, at, after] = [corners[(k + count - 1) % count], corners[k], corners[(k + 1) % count]];
+            outline.add_along(half, at, after, self.outside);
+            // Round a corner that points inward the board meets a side on all ways.
+            if self.outside * (at - before).perp(&(after - at)) >= 0.0 {
+                outline.add_round(half, at, &[before, after]);
+            }
+        }
+        count
+    }
+
+    /// Returns the distance from the origin to the nearest free translation on a segment; infinite if none is free. A
+    /// hexagon that covers the whole segment becomes the first one, because it often covers the next segment too.
+    fn nearest_free_of(
+        &self,
+        board: &Board,
+        hexagons: &mut [Hexagon],
+        segment: &Segment,
+        covered: &mut [(f64, f64)],
+    ) -> f64 {
+        let Segment { from: begin, to: end, .. } = *segment;
+        let size = board.half_length + board.half_width;
+        let depth = ROUNDING * (size + begin.abs().sup(&end.abs()).sum());
         let mut count = 0;
-        for (_, hexagon) in hexagons.iter().enumerate().filter(|(number, _)| *number != own) {
-            if let Some(part) = hexagon.covers(begin, end, depth) {
+        for number in 0..hexagons.len() {
+            if let Some(part) = hexagons[number].covers(segment, depth) {
                 if part == (0.0, 1.0) {
+                    hexagons.swap(0, number);
                     return f64::INFINITY;
                 }
                 covered[count] = part;
                 count += 1;
             }
         }
-        covered[..count].sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+        let covered = &mut covered[..count];
+        covered.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
         let at = |share: f64| begin + share * (end - begin);
         let mut best = f64::INFINITY;
         let mut from = 0.0f64;
-        for (low, high) in covered[..count].iter().copied().chain([(1.0, 1.0)]) {
+        for (low, high) in covered.iter().copied().chain([(1.0, 1.0)]) {
             if low > from {
                 let translation = nearest_of_segment(Vector::zeros(), at(from), at(low));
                 let place = board.centre + translation.x * board.axis + translation.y * board.across();
@@ -148,18 +258,4 @@ impl Shape {
         }
         best
     }
-}
-
-/// Returns the corners of the Minkowski sum of a segment and the rectangle, in order.
-fn hexagon_corners(rectangle: &Rectangle, from: Vector, to: Vector) -> [Vector; 6] {
-    let along = to - from;
-    let (x, y) = (rectangle.half.x.copysign(along.x), rectangle.half.y.copysign(along.y));
-    [
-        from + Vector::new(-x, -y),
-        from + Vector::new(x, -y),
-        to + Vector::new(x, -y),
-        to + Vector::new(x, y),
-        to + Vector::new(-x, y),
-        from + Vector::new(-x, y),
-    ]
 }

@@ -3,9 +3,11 @@
 //! In: a [`PathDescription`]. Out: a path that gives places by metres of travel and by a curve's own coordinate. Only
 //! the reference calls it.
 
+use super::Piece;
 use super::real::{Functions, Real, RealVector};
 use crate::model::curve::Side;
 use crate::model::description::{PathDescription, RouteStep};
+use crate::model::double_double::DoubleDouble;
 use crate::model::spiral::Direction;
 
 /// A curve. Its coordinate is metres on a line, radians turned on an arc, the polar angle on a spiral.
@@ -130,6 +132,27 @@ fn spiral_length(radius_per_radian: &Real, theta: &Real, functions: &mut Functio
     radius_per_radian / Real::from(2.0) * (theta * w + logarithm)
 }
 
+/// Returns the turns around its centre of the first `metres` of a spiral that begins `radius` metres from it, by two
+/// steps of Newton's method from `rough` turns.
+pub(super) fn turns_of_metres(
+    Piece { direction, pitch, radius }: Piece,
+    metres: f64,
+    rough: f64,
+) -> Result<DoubleDouble, String> {
+    let mut functions = Functions::new()?;
+    let turn = functions.turn();
+    let radius_per_radian = Real::from(pitch) / &turn;
+    let first = &turn * Real::from(radius) / Real::from(pitch);
+    let sense = Real::from(if direction == Direction::Inward { -1.0 } else { 1.0 });
+    let target = spiral_length(&radius_per_radian, &first, &mut functions) + &sense * Real::from(metres);
+    let mut last = &first + &sense * (&turn * Real::from(rough));
+    for _ in 0..2 {
+        let excess = spiral_length(&radius_per_radian, &last, &mut functions) - &target;
+        last = last.clone() - excess / (&radius_per_radian * (Real::from(1.0) + last.square()).sqrt());
+    }
+    Ok((sense * (last - first) / turn).split())
+}
+
 /// Returns the polar angle at `metres` of the spiral from its centre.
 ///
 /// s is convex and neither below a theta nor below a theta^2 / 2: Newton's method begins outside and cannot overshoot.
@@ -248,13 +271,13 @@ impl RealPath {
                 self.push(line, Real::from(0.0), &Real::from(length));
             }
             RouteStep::Arc { side, radius, turns } => {
-                let angle = self.functions.turn() * Real::from(turns);
+                let angle = self.functions.turn() * Real::of_sum(turns);
                 self.arc(side, Real::from(radius), &angle);
             }
             RouteStep::Spiral { side, direction, pitch, radius, turns } => {
                 let turn = self.functions.turn();
                 let first = &turn * Real::from(radius) / Real::from(pitch);
-                let around = &turn * Real::from(turns);
+                let around = &turn * Real::of_sum(turns);
                 let last = if direction == Direction::Inward { &first - around } else { &first + around };
                 self.piece_of_spiral(side, direction, Real::from(pitch) / turn, first, &last);
             }

@@ -37,6 +37,11 @@ impl Real {
         if sign == Sign::Neg { -size } else { size }
     }
 
+    /// Returns the number that is a sum of two doubles.
+    pub fn of_sum(DoubleDouble { high, low }: DoubleDouble) -> Self {
+        Self::from(high) + Self::from(low)
+    }
+
     /// Returns the number to 106 bits.
     pub fn split(&self) -> DoubleDouble {
         let high = self.rounded();

@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::rows::{Alpha, Band, LANES, Lanes, Lengths, Piece, Rows};
-use crate::solve::Chain;
+use crate::solve::ChainMut;
 
 /// The input of a frame besides the table.
 #[derive(Debug, Clone, Copy)]
@@ -58,7 +58,7 @@ pub(super) trait Blocks: Copy {
 ///
 /// The heading of the last handle is invalid and written by the caller.
 #[inline(always)]
-pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &Rows, input: &FrameInput, chain: &mut Chain) {
+pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(rows: &Rows, input: &FrameInput, chain: &mut ChainMut) {
     let Alpha { row, phase } = input.alpha;
     let end = row + chain.handles() - 1;
     let mut next = row;
@@ -88,7 +88,7 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
     local: &Local,
     rows: std::ops::Range<usize>,
     second: usize,
-    chain: &mut Chain,
+    chain: &mut ChainMut,
 ) {
     let first_block = (rows.start - band_row) / LANES;
     let blocks = (rows.end - band_row).div_ceil(LANES) - first_block;
@@ -106,7 +106,7 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
     // Whole blocks are stored directly from registers.
     if whole.start < whole.end {
         let handle = first_row + whole.start * LANES + 1 - second;
-        let Chain { x, y, heading, speed, vx, vy } = &mut *chain;
+        let ChainMut { x, y, heading, speed, vx, vy } = &mut *chain;
         let number = whole.end - whole.start;
         let [x, y, heading, speed, vx, vy] =
             [x, y, heading, speed, vx, vy].map(|list| &mut list[handle..].as_chunks_mut::<LANES>().0[..number]);
@@ -131,7 +131,7 @@ pub(super) fn write_band<B: Blocks, const FUSED: bool, const VELOCITIES: bool>(
 fn store_some<const VELOCITIES: bool>(
     outputs: &Outputs,
     lanes: std::ops::Range<usize>,
-    chain: &mut Chain,
+    chain: &mut ChainMut,
     after_row: usize,
     second: usize,
 ) {

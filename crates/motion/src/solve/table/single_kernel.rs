@@ -7,14 +7,14 @@ use std::f64::consts::TAU;
 use super::kernel::{Blocks, FrameInput, Local, Outputs, write_band};
 use super::packed::{PackedBand, PackedRows, Precision, Singles};
 use super::rows::{Alpha, LANES, Lanes};
-use crate::solve::Chain;
+use crate::solve::ChainMut;
 
 /// Writes all handles but the head from a packed table, as [`super::kernel::write`].
 #[inline(always)]
 pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(
     rows: &PackedRows,
     input: &FrameInput,
-    chain: &mut Chain,
+    chain: &mut ChainMut,
 ) {
     // The formats of `PackedRows::FORMATS`.
     match (rows.format.precision, rows.format.lengths.coordinate) {
@@ -28,7 +28,7 @@ pub(super) fn write<const FUSED: bool, const VELOCITIES: bool>(
 fn write_bands<'a, B: PackedBlocks<'a>, const FUSED: bool, const VELOCITIES: bool>(
     rows: &'a PackedRows,
     input: &FrameInput,
-    chain: &mut Chain,
+    chain: &mut ChainMut,
 ) {
     let Alpha { row, phase } = input.alpha;
     let end = row + chain.handles() - 1;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::model::curve::Side;
+use crate::solve::Chain;
 
 const TEAM: Team = Team { benches: 60, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
 

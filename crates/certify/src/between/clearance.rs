@@ -1,0 +1,276 @@
+//! The least clearances of a show of several dragons: those of each alone, and then, of each two, stretches of time in
+//! which their boards are further apart than a number of metres, and a time at which two are no further apart. Lemma 12
+//! of `docs/proofs.md`.
+
+use super::side::{Extent, Side};
+use super::{Aim, PairSearch, Write};
+use crate::clearance::{ClearanceEnclosures, ClearanceHints, Part, certify_part, clearance_first_line};
+use crate::first_order::When;
+use crate::lines::{CertificateLine, CertifiedClearance, Until};
+use crate::{CertifyError, Span};
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
+use bench_dragon_motion::event::Event;
+use bench_dragon_motion::timeline::TimedEvent;
+
+/// Width of an enclosure in metres, with room for the rounding of both ends.
+pub(super) const WIDTH: f64 = 0.9e-9;
+
+/// Metres by which a new upper bound must be lower than the one before.
+const LOWER: f64 = 1e-3 * WIDTH;
+
+/// Metres that are added to an upper bound for the rounding of the checker.
+const SPARE: f64 = 1e-12;
+
+/// Metres of travel of the faster head before a lock at which the steps stop.
+const BEFORE_LOCK: f64 = 1e-9;
+
+/// Rounding of the time of a path's end, as a share.
+const ENDING: f64 = 1e-12;
+
+/// Seconds of the first step of a show that ends at its start or at a contact.
+const FIRST: f64 = 1e-6;
+
+/// An upper bound of the clearance of a board of each of two dragons, and its time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct UpperBetween {
+    pub value: f64,
+    time: f64,
+    benches: [usize; 2],
+}
+
+/// The enclosures of a show of several dragons.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeveralClearances {
+    /// Those of each dragon alone, at its own travel.
+    pub own: Vec<ClearanceEnclosures>,
+    /// Those of each two, in the order of [`pairs`].
+    pub between: Vec<BetweenEnclosure>,
+}
+
+/// An enclosure of the least clearance of two dragons, from the start of a show on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BetweenEnclosure {
+    /// The dragons.
+    pub dragons: [usize; 2],
+    /// Lower bound in metres for all boards of the two; `None` if nothing is proved.
+    pub lo: Option<f64>,
+    /// Upper bound in metres.
+    pub hi: Option<f64>,
+    /// Seconds of the show at which two boards are that near.
+    pub time: f64,
+    /// A bench of each, counted from 0.
+    pub benches: [usize; 2],
+    /// Seconds of the show up to which `lo` is proved, if not up to the show's end. The end of a show that ends with
+    /// the lock of one of the two counts as reached a nanometre of travel before.
+    pub until: Option<f64>,
+}
+
+/// Encloses the least clearance of each dragon of a show, that of each obstacle and each dragon, and that of each two
+/// dragons, from the start until the show ends at `freeze`, and writes a certificate. `scene` is the text of the scene.
+/// Each search gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
+///
+/// # Errors
+/// [`CertifyError::Write`]
+pub fn certify_several_clearances(
+    ensemble: &Ensemble,
+    freeze: &TimedEvent,
+    scene: &str,
+    most_steps: u64,
+    write: Write<'_>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<SeveralClearances, CertifyError> {
+    clearance_first_line(&mut *write, scene)?;
+    let dragons = ensemble.dragons();
+    let parts = (dragons.len() * (dragons.len() + 1) / 2) as f64;
+    let (mut own, mut between, mut done) = (Vec::new(), Vec::new(), 0.0);
+    for (number, Dragon { delay, motion, .. }) in dragons.iter().enumerate() {
+        write(&CertificateLine::Dragon { dragon: number })?;
+        let end = own_end(ensemble, number, freeze);
+        let least = motion.least_clearance(&motion.timeline_without_contact(), &end, &mut |_| ());
+        let obstacles = motion.obstacle_clearances(&end, &mut |_| ());
+        let least = least.map(|found| found.least);
+        let hints = ClearanceHints { boards: least.as_ref(), obstacles: &obstacles };
+        let part = Part { dragons: vec![number], delay: *delay, show_end: Some(freeze.time) };
+        own.push(certify_part(motion, (part, &end), hints, most_steps, &mut *write, &mut |share| {
+            progress((done + share) / parts);
+        })?);
+        done += 1.0;
+    }
+    for pair in pairs(dragons.len()) {
+        write(&CertificateLine::Pair { dragons: pair })?;
+        let sides = pair.map(|k| {
+            let end = dragons[k].motion.timeline_without_contact().end().event;
+            Side::new(&dragons[k], end, end.kind == EventKind::Lock, None)
+        });
+        let hint = ensemble.nearest_of(pair, freeze.time);
+        let mut search = PairSearch::new(sides, Aim::Links, most_steps, &mut *write);
+        let contact = contact_of(ensemble, pair, freeze);
+        let mut of_pair = |share: f64| progress((done + share) / parts);
+        let enclosure = match contact.filter(|_| freeze.time > 0.0) {
+            Some(benches) => search.until_contact(pair, (freeze.time, benches), &mut of_pair)?,
+            None => search.least(pair, hint, freeze, &mut of_pair)?,
+        };
+        between.push(enclosure);
+        done += 1.0;
+    }
+    Ok(SeveralClearances { own, between })
+}
+
+/// Returns the bench of each of two dragons, counted within it, if the show ends with their contact.
+fn contact_of(ensemble: &Ensemble, pair: [usize; 2], freeze: &TimedEvent) -> Option<[usize; 2]> {
+    let Event { kind, bench_a, bench_b, .. } = freeze.event;
+    let owners = [bench_a?, bench_b?].map(|bench| ensemble.owner(bench as usize));
+    let [(one, a), (other, b)] = [owners[0]?, owners[1]?];
+    (kind == EventKind::Contact && [one, other] == pair).then_some([a, b])
+}
+
+/// Returns the end of a show as an event of one dragon's own motion: with its own benches, at its path's end, or at a
+/// place that the show's end, taken as found, lets it come to.
+fn own_end(ensemble: &Ensemble, dragon: usize, freeze: &TimedEvent) -> TimedEvent {
+    let Dragon { motion, .. } = &ensemble.dragons()[dragon];
+    let Event { kind, bench_a, bench_b, place, .. } = freeze.event;
+    let owned = |bench: Option<u32>| {
+        let (owner, own) = ensemble.owner(bench? as usize)?;
+        (owner == dragon).then_some(own as u32)
+    };
+    let (a, b) = (owned(bench_a), owned(bench_b));
+    let own_time = ensemble.dragons()[dragon].own_time(freeze.time).0;
+    let (travelled, length) = (motion.travelled_at(own_time), motion.path().length());
+    let is_own = match kind {
+        EventKind::Contact => a.is_some() && b.is_some(),
+        EventKind::Lock => a.is_some(),
+        _ => false,
+    };
+    let event = if is_own {
+        Event { kind, travelled: freeze.event.travelled, bench_a: a, bench_b: b, place }
+    } else if travelled >= length * (1.0 - 1e-12) - 1e-12 {
+        Event { kind: EventKind::PathEnd, travelled: length, bench_a: None, bench_b: None, place: None }
+    } else {
+        Event { kind: EventKind::Obstacle, travelled, bench_a: None, bench_b: None, place: None }
+    };
+    TimedEvent { event, time: own_time }
+}
+
+impl PairSearch<'_, '_> {
+    /// Encloses the least clearance of a show that does not end with a contact of the two.
+    fn least(
+        &mut self,
+        dragons: [usize; 2],
+        hint: Option<(f64, [usize; 2])>,
+        freeze: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<BetweenEnclosure, CertifyError> {
+        let locks = self.sides.iter().filter(|side| side.locks);
+        let latest = locks.map(|side| side.end - side.seconds(BEFORE_LOCK)).fold(f64::INFINITY, f64::min);
+        let end = freeze.time.min(latest).max(0.0);
+        // A show that ends with the last path end goes on until both surely stand.
+        let stands = self.sides.iter().map(|side| side.end).fold(0.0, f64::max);
+        let end = if latest.is_infinite() && end >= stands - ENDING * (1.0 + stands) { end.max(stands) } else { end };
+        self.upper = hint.and_then(|(time, benches)| self.upper_at(time.min(end), benches));
+        let Some(upper) = self.upper else {
+            let nothing =
+                BetweenEnclosure { dragons, lo: None, hi: None, time: 0.0, benches: [0, 0], until: Some(0.0) };
+            self.write_result(&nothing)?;
+            return Ok(nothing);
+        };
+        self.aim = Aim::Apart(upper.value - WIDTH);
+        // A show that ends at its start has a stretch, too.
+        let stuck = self.go_to(end.max(1e-3 * FIRST), progress)?;
+        let until = if stuck.is_some() { Some(self.time.min(end)) } else { None };
+        let upper = self.upper.unwrap_or(upper);
+        let hi = if upper.time <= self.time { self.write_near(upper)? } else { None };
+        let UpperBetween { time, benches, .. } = upper;
+        let enclosure = BetweenEnclosure { dragons, lo: self.shown, hi, time, benches, until };
+        let is_whole = stuck.is_none() && self.sides.iter().all(|side| self.time >= side.end);
+        self.write_line(&enclosure, if is_whole { Until::PathEnd } else { Until::Time }, self.time.min(end))?;
+        Ok(enclosure)
+    }
+
+    /// Encloses the least clearance of a show that ends with a contact of the two: it is 0.
+    fn until_contact(
+        &mut self,
+        dragons: [usize; 2],
+        (time, benches): (f64, [usize; 2]),
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<BetweenEnclosure, CertifyError> {
+        let touched = BetweenEnclosure { dragons, lo: Some(0.0), hi: Some(0.0), time, benches, until: None };
+        self.aim = Aim::Apart(0.0);
+        let stuck = self.go_to(FIRST.min(0.5 * time), &mut |_| ())?;
+        let found = self.found_meeting(time, benches);
+        if let (None, Some((far, line))) = (stuck, found) {
+            self.aim = Aim::Links;
+            if self.go_to(time + far, progress)?.is_none() {
+                (self.write)(&line)?;
+                self.write_line(&touched, Until::Contact, time)?;
+                return Ok(touched);
+            }
+        }
+        let enclosure = BetweenEnclosure { lo: self.shown, hi: None, until: Some(0.0), ..touched };
+        self.write_result(&enclosure)?;
+        Ok(enclosure)
+    }
+
+    /// Returns an upper bound of the clearance of two boards at a time.
+    fn upper_at(&self, time: f64, benches: [usize; 2]) -> Option<UpperBetween> {
+        let boards = [0, 1].map(|k| self.sides[k].first_order(time, time, Extent::UpTo(benches[k])).ok());
+        let [one, other] = boards.map(|stretch| stretch.map(|stretch| stretch.first_order));
+        let value = one?[benches[0]].at_most(&other?[benches[1]], When::Always);
+        value.is_finite().then_some(UpperBetween { value, time, benches })
+    }
+
+    /// Lowers the upper bound to that of two boards at a time, if it is lower. A number beyond the listed boards is
+    /// that of the boards on a line; the nearest of them is found.
+    pub(super) fn lower(&mut self, time: f64, boards: [usize; 2]) -> bool {
+        let Some(upper) = self.upper else { return false };
+        let Some(benches) = self.nearest_benches(time, boards) else { return false };
+        let lower = self.upper_at(time, benches).filter(|lower| lower.value < upper.value - LOWER);
+        if let Some(lower) = lower {
+            self.upper = Some(lower);
+            self.aim = Aim::Apart(lower.value - WIDTH);
+        }
+        lower.is_some()
+    }
+
+    fn nearest_benches(&self, time: f64, boards: [usize; 2]) -> Option<[usize; 2]> {
+        let listed = |k: usize, extent: Extent| self.sides[k].stretch(time, time, extent).ok();
+        let all = [0, 1].map(|k| {
+            let count = listed(k, Extent::Whole)?.spans.len();
+            let last = if boards[k] < count { boards[k] } else { self.sides[k].chain.team.benches - 1 };
+            Some((boards[k]..=last, listed(k, Extent::UpTo(last))?))
+        });
+        let [one, other] = all;
+        let ((a, one), (b, other)) = (one?, other?);
+        let pairs = a.flat_map(|a| b.clone().map(move |b| [a, b]));
+        let distance = |[a, b]: [usize; 2]| {
+            let [a, b] = [one.boards[a].in_doubles(), other.boards[b].in_doubles()];
+            bench_dragon_motion::model::separation::signed_distance_board_board(&a, &b)
+        };
+        pairs.min_by(|one, other| distance(*one).total_cmp(&distance(*other)))
+    }
+
+    /// Writes that two boards are near at a time that the stretches have come to. Returns the upper bound.
+    fn write_near(&mut self, UpperBetween { time, benches, .. }: UpperBetween) -> Result<Option<f64>, CertifyError> {
+        let stretches = [0, 1].map(|k| self.sides[k].first_order(time, time, Extent::UpTo(benches[k])).ok());
+        let [Some(one), Some(other)] = stretches else { return Ok(None) };
+        let most = one.first_order[benches[0]].at_most(&other.first_order[benches[1]], When::Always) + SPARE;
+        let (heads, at): ([Span; 2], _) = ([one.head, other.head], [one.at, other.at]);
+        let spans = [one.spans, other.spans];
+        (self.write)(&CertificateLine::NearBoth { benches, time, heads, spans, at, most })?;
+        Ok(Some(most))
+    }
+
+    /// Writes the result of a search that came to no end.
+    fn write_result(&mut self, enclosure: &BetweenEnclosure) -> Result<(), CertifyError> {
+        self.write_line(enclosure, Until::Time, enclosure.until.unwrap_or(0.0))
+    }
+
+    fn write_line(&mut self, enclosure: &BetweenEnclosure, until: Until, time: f64) -> Result<(), CertifyError> {
+        let BetweenEnclosure { dragons, lo, hi, benches, .. } = *enclosure;
+        let [bench_a, bench_b] = benches.map(|bench| hi.map(|_| bench));
+        let time_until = (until == Until::Time).then_some(time);
+        let dragons = dragons.to_vec();
+        let result = CertifiedClearance { lo, hi, until, time_until, bench_a, bench_b, dragons };
+        Ok((self.write)(&CertificateLine::LeastClearance(result))?)
+    }
+}

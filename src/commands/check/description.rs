@@ -1,0 +1,176 @@
+//! What `check` says of a scene without its motion: teams, paths, placements, solvers, alerts and outputs.
+
+use bench_dragon::motion::ensemble::{Dragon, Ensemble};
+use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon::motion::model::spiral::Direction;
+use bench_dragon::motion::placement::Placement;
+use bench_dragon::motion::solve::Velocities;
+use bench_dragon::motion::{Choice, Motion};
+use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
+
+use super::super::{CommandError, Output, figure, number};
+
+/// Prints what a scene is.
+pub(super) fn describe(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
+    output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
+    dragons(scene, output)?;
+    if !scene.ground().is_empty() {
+        output.line(&format!("  Stage: {}.", ground(scene)))?;
+    }
+    let choice = scene.ensemble.is_none().then(|| scene.motion.solver(scene.velocities));
+    solvers(scene, choice.as_ref(), output)?;
+    alerts(scene, choice.as_ref(), output)?;
+    publishing(scene, output)
+}
+
+/// Prints each dragon, with its place among several.
+fn dragons(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
+    let Some(ensemble) = &scene.ensemble else {
+        return dragon(&scene.motion, scene.placement.as_ref(), output);
+    };
+    for (k, Dragon { name, delay, motion }) in ensemble.dragons().iter().enumerate() {
+        let handles = ensemble.handles_of(k);
+        let (first, last) = (handles.start, handles.end - 1);
+        output.line(&format!("  Dragon {}, {name}: handles {first} to {last}, counting from 0.", k + 1))?;
+        dragon(motion, Some(motion.placement()), output)?;
+        if *delay > 0.0 {
+            output.line(&format!("  It stands at its start for {} s.", number(*delay)))?;
+        }
+    }
+    Ok(())
+}
+
+/// Prints the solver of each dragon, of which `choice` is that of a dragon alone, and whether velocities are computed.
+fn solvers(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Result<(), CommandError> {
+    if let Some(choice) = choice {
+        output.line(&format!("  Solver: {}.", choice.reason))?;
+    }
+    for Dragon { name, motion, .. } in scene.ensemble.iter().flat_map(Ensemble::dragons) {
+        output.line(&format!("  Solver of {name}: {}.", motion.solver(scene.velocities).reason))?;
+    }
+    output.line(match scene.velocities {
+        Velocities::Computed => "  Velocities: computed for every handle.",
+        Velocities::Omitted => "  Velocities: not computed; vx and vy are NaN.",
+    })
+}
+
+/// Prints the rules of alerts, and what the show does at a contact and at its end.
+fn alerts(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Result<(), CommandError> {
+    match scene.alerts {
+        Some(rules) => {
+            output.line(&format!(
+                "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
+                rules.approach_time, rules.approach_clearance
+            ))?;
+            if let Some(choice) = choice {
+                let monitor = scene.motion.clearance_monitor(choice);
+                output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
+            }
+        }
+        None => output.line(
+            "  Alerts: none. `run` computes no rectangle, no clearance, no contact and no stall, and has no alerts \
+             service: add an [alerts] table for those.",
+        )?,
+    }
+    output.line(&format!(
+        "  At a contact the show {}; at its end it {}.",
+        match (scene.alerts, scene.on_contact) {
+            (Some(_), OnContact::Stop) => "freezes",
+            (Some(_), OnContact::Continue) => "continues",
+            (None, _) => "continues, unnoticed",
+        },
+        match scene.at_end {
+            AtEnd::Hold => "holds the last frame",
+            AtEnd::Loop => "begins again",
+        }
+    ))
+}
+
+/// Prints where the frames go.
+fn publishing(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
+    let single = scene.single_precision.map_or(String::new(), |single| format!("; poses32 has {single}"));
+    output.line(&format!("  Publishing: {} frames per second to shared memory{single}.", number(scene.rate)))?;
+    output.line(&match &scene.ros2 {
+        Some(settings) => format!(
+            "  ROS 2: {} at {} frames per second.",
+            settings
+                .offered(scene.alerts.is_some(), !scene.cues.is_empty())
+                .map(|topic| topic.name())
+                .collect::<Vec<_>>()
+                .join(", "),
+            number(settings.rate_of(scene.rate))
+        ),
+        None => "  ROS 2: nothing and no network socket, unless `run --ros2` requests it.".to_owned(),
+    })
+}
+
+/// Prints the team, the path and the placement of a dragon.
+fn dragon(motion: &Motion, placement: Option<&Placement>, output: &mut Output) -> Result<(), CommandError> {
+    let team = motion.team();
+    output.line(&format!(
+        "  Team: {} benches, {} handles; head board {} m, the others {} m, {} m wide, holes {} m from the ends.",
+        team.benches,
+        team.handles(),
+        team.head_length,
+        team.body_length,
+        team.width,
+        team.hole_inset
+    ))?;
+    output.line(&format!("  Path: {}; the head moves at {} m/s.", path(motion), motion.head_speed()))?;
+    match placement.and_then(placed) {
+        Some(sentence) => output.line(&format!("  {sentence}")),
+        None => Ok(()),
+    }
+}
+
+/// Returns a sentence for people on a placement, without the parts that change nothing; `None` if none does.
+fn placed(placement: &Placement) -> Option<String> {
+    let (origin, turns) = (placement.origin(), placement.rotation_turns());
+    let mirrored = placement.is_mirrored().then(|| "mirrored".to_owned());
+    let turned = (turns != 0.0).then(|| format!("turned by {} turns", number(turns)));
+    let is_moved = (origin.x, origin.y) != (0.0, 0.0);
+    let moved = is_moved.then(|| format!("moved by ({}, {}) m", number(origin.x), number(origin.y)));
+    let parts: Vec<String> = [mirrored, turned, moved].into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("Placement: the path's coordinates {}.", parts.join(", then ")))
+}
+
+/// Describes the obstacles in words.
+fn ground(scene: &Scene) -> String {
+    let ground = scene.ground();
+    let obstacles = ground.obstacles().len() - usize::from(ground.has_boundary());
+    let counted = match obstacles {
+        0 => "no obstacle".to_owned(),
+        1 => "1 obstacle".to_owned(),
+        count => format!("{count} obstacles"),
+    };
+    if ground.has_boundary() { format!("{counted} and a boundary") } else { counted }
+}
+
+/// Describes the path in words.
+fn path(motion: &Motion) -> String {
+    let outline = motion.path().outline();
+    if let [SegmentOutline { kind: OutlineKind::Spiral { pitch, first, .. }, .. }] = outline.as_slice() {
+        let turn = first / std::f64::consts::TAU;
+        return format!("inward spiral, {pitch} m per turn, the head starting on turn {}", figure(turn));
+    }
+    let segments: Vec<String> = outline.iter().map(segment).collect();
+    format!("{:.3} m: {}", motion.path().length(), segments.join(", "))
+}
+
+fn segment(outline: &SegmentOutline) -> String {
+    let length = outline.length;
+    match outline.kind {
+        OutlineKind::Line => format!("{length:.3} m straight on"),
+        OutlineKind::Arc { curvature } => {
+            let side = if curvature > 0.0 { "left" } else { "right" };
+            format!("{length:.3} m to the {side} at radius {:.6} m", 1.0 / curvature.abs())
+        }
+        OutlineKind::Spiral { direction, pitch, .. } => {
+            let way = match direction {
+                Direction::Inward => "inward",
+                Direction::Outward => "outward",
+            };
+            format!("{length:.3} m {way} along a spiral of {pitch} m per turn")
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! `check --prove` of several dragons: the least clearance of each alone, of each two, and of each obstacle.
+
+use std::path::Path;
+
+use bench_dragon::certify::{
+    BetweenEnclosure, CertificateLine, CertifyError, ClearanceEnclosure, MOST_CLEARANCE_STEPS, ObstacleEnclosure,
+    SeveralClearances, certify_several_clearances,
+};
+use bench_dragon::motion::ensemble::{Dragon, Ensemble};
+use bench_dragon::motion::timeline::TimedEvent;
+use bench_dragon::show::scene::{Scene, printable};
+use serde::Serialize;
+
+use super::super::{CommandError, Common, Output, progress_bar};
+use super::{CertificateFile, proved_sentence, status};
+
+/// What is proved of one dragon, of one and an obstacle, or of two: a line of `check --prove --json`.
+#[derive(Serialize)]
+pub(super) struct Part {
+    dragons: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    obstacle: Option<String>,
+    least_clearance_lo: Option<f64>,
+    least_clearance_hi: Option<f64>,
+    least_clearance_status: &'static str,
+    /// Simulated seconds up to which that is proved, unless to the end of the show.
+    proved_until: Option<f64>,
+    time: Option<f64>,
+    bench_a: Option<usize>,
+    bench_b: Option<usize>,
+    /// True for a dragon of which no two benches could meet.
+    #[serde(skip)]
+    is_empty: bool,
+}
+
+/// Encloses the least clearances of a show of several dragons. Writes the certificate to `file`.
+pub(super) fn enclosed(
+    (scene, ensemble, text): (&Scene, &Ensemble, &str),
+    freeze: &TimedEvent,
+    file: Option<&Path>,
+    common: &Common,
+) -> Result<Vec<Part>, CommandError> {
+    let mut certificate = file.map(CertificateFile::create).transpose()?;
+    let bar = progress_bar(1000, common).with_message("proving the least clearances");
+    let mut write = |line: &CertificateLine| certificate.as_mut().map_or(Ok(()), |certificate| certificate.write(line));
+    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let found = certify_several_clearances(ensemble, freeze, text, MOST_CLEARANCE_STEPS, &mut write, &mut progress);
+    bar.finish_and_clear();
+    let found = found.map_err(|CertifyError::Write(error)| error)?;
+    if let Some(certificate) = certificate {
+        certificate.finish()?;
+    }
+    Ok(parts(scene, ensemble, &found))
+}
+
+/// Returns what is proved, in the order of the certificate.
+fn parts(scene: &Scene, ensemble: &Ensemble, found: &SeveralClearances) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for (k, own) in found.own.iter().enumerate() {
+        parts.push(own_part(ensemble, k, own.boards));
+        let obstacles = scene.ground().obstacles().iter().zip(&own.obstacles);
+        parts.extend(obstacles.map(|(obstacle, found)| obstacle_part(ensemble, k, &obstacle.name, *found)));
+    }
+    parts.extend(found.between.iter().map(|between| between_part(ensemble, between)));
+    parts
+}
+
+fn own_part(ensemble: &Ensemble, k: usize, found: Option<ClearanceEnclosure>) -> Part {
+    let Dragon { name, motion, .. } = &ensemble.dragons()[k];
+    let (time_at, first) = (times_of(ensemble, k), ensemble.handles_of(k).start);
+    let until = found.and_then(|found| found.until);
+    Part {
+        dragons: vec![name.clone()],
+        obstacle: None,
+        least_clearance_lo: found.map(|found| found.lo),
+        least_clearance_hi: found.map(|found| found.hi),
+        least_clearance_status: status(found.is_some(), until.is_none()),
+        proved_until: until.map(&time_at),
+        time: found.map(|found| time_at(found.travelled)),
+        bench_a: found.map(|found| first + found.bench_a),
+        bench_b: found.map(|found| first + found.bench_b),
+        is_empty: motion.team().benches < 3,
+    }
+}
+
+fn obstacle_part(ensemble: &Ensemble, k: usize, obstacle: &str, found: Option<ObstacleEnclosure>) -> Part {
+    let (time_at, first) = (times_of(ensemble, k), ensemble.handles_of(k).start);
+    let until = found.and_then(|found| found.until);
+    Part {
+        dragons: vec![ensemble.dragons()[k].name.clone()],
+        obstacle: Some(obstacle.to_owned()),
+        least_clearance_lo: found.map(|found| found.lo),
+        least_clearance_hi: found.map(|found| found.hi),
+        least_clearance_status: status(found.is_some(), until.is_none()),
+        proved_until: until.map(&time_at),
+        time: found.map(|found| time_at(found.travelled)),
+        bench_a: found.map(|found| first + found.bench),
+        bench_b: None,
+        is_empty: false,
+    }
+}
+
+fn between_part(ensemble: &Ensemble, found: &BetweenEnclosure) -> Part {
+    let BetweenEnclosure { dragons, lo, hi, time, benches, until } = *found;
+    let number = |k: usize| hi.map(|_| ensemble.handles_of(dragons[k]).start + benches[k]);
+    Part {
+        dragons: dragons.map(|dragon| ensemble.dragons()[dragon].name.clone()).to_vec(),
+        obstacle: None,
+        least_clearance_lo: lo,
+        least_clearance_hi: hi,
+        least_clearance_status: status(lo.is_some() && hi.is_some(), until.is_none()),
+        proved_until: until,
+        time: hi.map(|_| time),
+        bench_a: number(0),
+        bench_b: number(1),
+        is_empty: false,
+    }
+}
+
+/// Returns the time of the show at some metres of a dragon's own travel.
+fn times_of(ensemble: &Ensemble, k: usize) -> impl Fn(f64) -> f64 {
+    let Dragon { delay, motion, .. } = &ensemble.dragons()[k];
+    // A dragon stands at its start from the beginning on.
+    move |travelled| if travelled <= 0.0 { 0.0 } else { delay + motion.time_at(travelled) }
+}
+
+/// Returns the bounds of the least clearance of any two boards, and whether it is proved to the end of the show.
+pub(super) fn of_boards(parts: &[Part]) -> (Option<f64>, Option<f64>, bool) {
+    let of_boards = || parts.iter().filter(|part| part.obstacle.is_none() && !part.is_empty);
+    let least = |of: fn(&Part) -> Option<f64>| of_boards().filter_map(of).reduce(f64::min);
+    let is_whole = of_boards().all(|part| part.least_clearance_status == "proved");
+    let lo = least(|part| part.least_clearance_lo).filter(|_| is_whole);
+    (lo, least(|part| part.least_clearance_hi), is_whole)
+}
+
+/// Prints what is proved.
+pub(super) fn print(parts: &[Part], output: &mut Output) -> Result<(), CommandError> {
+    if let (Some(lo), Some(hi), true) = of_boards(parts) {
+        output.line(&format!("  {}", proved_sentence((lo, hi), None, 0.0)))?;
+    }
+    for part in parts.iter().filter(|part| !part.is_empty) {
+        let with = part.obstacle.iter().map(|name| format!("the {}", printable(name)));
+        let names: Vec<String> = part.dragons.iter().cloned().chain(with).collect();
+        let bounds = part.least_clearance_lo.zip(part.least_clearance_hi).zip(part.time);
+        let sentence = match bounds {
+            Some((bounds, time)) => proved_sentence(bounds, part.proved_until, time),
+            None => "Nothing of it could be proved.".to_owned(),
+        };
+        output.line(&format!("  The least clearance of {}: {sentence}", names.join(" and ")))?;
+    }
+    Ok(())
+}
