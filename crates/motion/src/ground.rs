@@ -28,6 +28,11 @@ impl Obstacle {
         self.shape.signed_distance(board) - self.keep_out
     }
 
+    /// Returns the clearance of a board if it is below `limit`, else a value that is not, at less cost.
+    pub fn clearance_below(&self, board: &Board, limit: f64) -> f64 {
+        self.shape.signed_distance_below(board, limit + self.keep_out) - self.keep_out
+    }
+
     /// Returns a lower bound of [`clearance`](Self::clearance) at less cost.
     pub fn coarse_clearance(&self, board: &Board) -> f64 {
         self.shape.coarse_bound(board) - self.keep_out

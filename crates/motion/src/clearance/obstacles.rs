@@ -6,12 +6,12 @@
 //! Obstacles stand still. So the clearance of a body bench depends on the place of its front handle alone, which a
 //! follower table gives as a row and a phase: see [`super::bounds`]. Each row is divided into [`CELLS`] equal cells. For
 //! each row and cell a table has a lower bound of the clearance of all obstacles: that in the middle of the cell, less
-//! the way of the board's points from there. A frame tests the head, and the benches that the bounds do not exclude.
+//! the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the benches that the bounds do not exclude.
 
 use super::cells::handles;
 use super::moving::MovingBoard;
 use super::{PairClearance, board, corner_reach};
-use crate::ground::Ground;
+use crate::ground::{Ground, Obstacle};
 use crate::model::board::Board;
 use crate::model::team::Team;
 use crate::solve::Positions;
@@ -56,9 +56,9 @@ impl ObstacleTable {
             for (bound, pair) in bounds[first.min(rows)..].iter_mut().zip(handles.windows(2)) {
                 let moving = MovingBoard::new(&pair[0], &pair[1], team, 1);
                 let at = moving.middle();
-                let clearances = ground.obstacles().iter().map(|obstacle| obstacle.clearance(&at));
+                let bounds = ground.obstacles().iter().map(|obstacle| lower_bound(obstacle, &at, moving.travel));
                 let margin = handle_error + ROUNDING.0 + ROUNDING.1 * at.centre.coords.norm();
-                let value = clearances.fold(f64::INFINITY, f64::min) - moving.travel - margin;
+                let value = bounds.fold(f64::INFINITY, f64::min) - margin;
                 *bound = if value.is_nan() { f32::NEG_INFINITY } else { (value as f32).next_down() };
             }
         }
@@ -76,6 +76,17 @@ impl ObstacleTable {
         let cell = ((phase * CELLS as f64) as usize).min(CELLS - 1);
         (row + benches <= self.rows).then_some((row, cell))
     }
+}
+
+/// Returns a lower bound of the clearance of a board whose points move by at most `travel` metres.
+fn lower_bound(obstacle: &Obstacle, board: &Board, travel: f64) -> f64 {
+    let bound = obstacle.clearance(board) - travel;
+    if bound + obstacle.keep_out >= 0.0 || obstacle.shape.is_convex() {
+        return bound;
+    }
+    // The depth of an overlap can jump where the board turns. A translation that frees the grown board frees all boards
+    // within it.
+    obstacle.clearance(&board.grown(travel))
 }
 
 /// Finds the bench of each frame that is nearest to an obstacle. All memory is reserved by the constructor.
@@ -101,7 +112,7 @@ impl NearestObstacle<'_> {
         let board = board(self.chain, &self.monitor.team, bench);
         for (number, obstacle) in self.monitor.ground.obstacles().iter().enumerate() {
             if obstacle.coarse_clearance(&board) < self.value {
-                let value = obstacle.clearance(&board);
+                let value = obstacle.clearance_below(&board, self.value);
                 if value < self.value {
                     (self.value, self.found) = (value, Some((bench, number, board)));
                 }
@@ -171,7 +182,6 @@ impl ObstacleMonitor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ground::Obstacle;
     use crate::model::Point;
     use crate::model::path::Path;
     use crate::model::shape::Shape;
@@ -204,5 +214,39 @@ mod tests {
             }
             assert!(slack < 0.12, "{slack} at {time}");
         }
+    }
+
+    /// The depth of an overlap with a bent line jumps where the board turns.
+    #[test]
+    fn bounds_hold_for_boards_that_overlap_a_shape_that_is_not_convex() {
+        const RADII: [f64; 12] = [2.615, 1.616, 1.802, 1.221, 0.711, 0.904, 1.775, 2.495, 1.747, 2.667, 0.606, 1.719];
+        let path = Path::spiral(0.55, 16.0);
+        let mut table = FollowerTable::new(&path, PAPER, 1.0, Velocities::Omitted).unwrap();
+        let corner = |(number, radius): (usize, &f64)| {
+            let angle = number as f64 * std::f64::consts::TAU / 12.0;
+            Point::new(3.231 + radius * angle.cos(), -0.132 + radius * angle.sin())
+        };
+        let line = Shape::line(RADII.iter().enumerate().map(corner).collect());
+        let line = Obstacle { name: String::new(), shape: line, keep_out: 0.1 };
+        let mut monitor = ObstacleMonitor::new(PAPER, Ground::new(vec![line]), Some(&table));
+        let bounds = monitor.table.clone().unwrap();
+        let mut chain = Chain::new(224);
+        let mut overlaps = 0;
+        for tick in 0..1200 {
+            let time = f64::from(tick) / 3.0 + 0.37;
+            table.solve(time, &mut chain).unwrap();
+            let (row, cell) = bounds.locate(time, 223).unwrap();
+            let clearance = |bench| monitor.ground.obstacles()[0].clearance(&board(&chain, &PAPER, bench));
+            let clearances: Vec<f64> = (0..223).map(clearance).collect();
+            for (bench, value) in clearances.iter().enumerate().skip(1) {
+                let bound = f64::from(bounds.bounds[cell * bounds.rows + row + bench - 1]);
+                assert!(bound <= *value, "bench {bench} at {time}: {bound} {value}");
+            }
+            overlaps += clearances.iter().filter(|value| **value < -0.1).count();
+            let least = clearances.into_iter().fold(f64::INFINITY, f64::min);
+            let nearest = monitor.nearest(&chain, time, 10.0).unwrap().value;
+            assert!((nearest - least).abs() < 1e-12, "{nearest} {least} at {time}");
+        }
+        assert!(overlaps > 1000, "{overlaps}");
     }
 }

@@ -63,12 +63,12 @@ impl Shape {
         Self { kind, points, radius, convex, outside: 0.0, bounding_centre: centre, bounding_radius: radius }
     }
 
-    /// Creates a polygon from at least three corners; its sides must not meet except at their corners.
+    /// Creates a polygon from three to [`MOST_CORNERS`] corners; its sides must not meet except at their corners.
     pub fn polygon(corners: Vec<Point>) -> Self {
         Self::of_corners(ShapeKind::Polygon, corners)
     }
 
-    /// Creates an open line from at least two corners, no two of them in succession equal.
+    /// Creates an open line from two to [`MOST_CORNERS`] corners, no two of them in succession equal.
     pub fn line(corners: Vec<Point>) -> Self {
         Self::of_corners(ShapeKind::Line, corners)
     }
@@ -171,6 +171,11 @@ impl Shape {
     /// Returns the signed distance of a board, metres; negative infinity if no translation frees the board from the
     /// plane outside a boundary.
     pub fn signed_distance(&self, board: &Board) -> f64 {
+        self.signed_distance_below(board, f64::INFINITY)
+    }
+
+    /// Returns the signed distance of a board if it is below `limit`, else a value that is not, at less cost.
+    pub fn signed_distance_below(&self, board: &Board, limit: f64) -> f64 {
         let rectangle = Rectangle::of(board);
         if self.kind == ShapeKind::Circle {
             return rectangle.signed_distance(in_frame(board, self.points[0])) - self.radius;
@@ -180,45 +185,53 @@ impl Shape {
             let (from, to) = (in_frame(board, from), in_frame(board, to));
             let separation = rectangle.separation(from, to);
             if separation <= 0.0 {
-                return -self.least_escape(board);
+                return -self.least_escape(board, -limit);
             }
-            if separation < least {
+            if separation < least && separation < limit {
                 // Rounding must not make the distance less than its lower bound, nor a gap a touch.
                 least = least.min(rectangle.distance(from, to).max(separation));
             }
         }
-        if self.holds(board.centre) { -self.least_escape(board) } else { least }
+        if self.holds(board.centre) { -self.least_escape(board, -limit) } else { least }
     }
 
     /// Returns the signed distances of a board to each side, metres, with the point of the board and the point of the
     /// side that are nearest; of a circle, to the circle. A side ignores the interior of its polygon.
     pub fn side_distances<'a>(&'a self, board: &'a Board) -> impl Iterator<Item = (f64, Point, Point)> + 'a {
+        self.sides().map(move |side| self.side_distance(board, (in_frame(board, side.0), in_frame(board, side.1))))
+    }
+
+    /// Returns the same for one side, whose corners are in the board's frame.
+    fn side_distance(&self, board: &Board, (from, to): (Vector, Vector)) -> (f64, Point, Point) {
         let rectangle = Rectangle::of(board);
         let on_stage = |local: Vector| board.centre + local.x * board.axis + local.y * board.across();
-        self.sides().map(move |(from, to)| {
-            let (from, to) = (in_frame(board, from), in_frame(board, to));
-            let separation = rectangle.separation(from, to);
-            let (distance, on_board, on_side) = rectangle.nearest(from, to);
-            let value = if separation > 0.0 { distance.max(separation) } else { separation };
-            let outward = on_board - on_side;
-            let length = outward.norm();
-            let on_circle = if length > 0.0 { on_side + outward * (self.radius / length) } else { on_side };
-            (value - self.radius, on_stage(on_board), on_stage(on_circle))
-        })
+        let separation = rectangle.separation(from, to);
+        let (distance, on_board, on_side) = rectangle.nearest(from, to);
+        let value = if separation > 0.0 { distance.max(separation) } else { separation };
+        let outward = on_board - on_side;
+        let length = outward.norm();
+        let on_circle = if length > 0.0 { on_side + outward * (self.radius / length) } else { on_side };
+        (value - self.radius, on_stage(on_board), on_stage(on_circle))
     }
 
     /// Returns the point of a board and the point of the shape's outline that are nearest to each other; where they
     /// overlap, two points near the place at which the outline meets the board.
     pub fn nearest_points(&self, board: &Board) -> (Point, Point) {
-        let sides = self.side_distances(board);
-        let nearest = sides.min_by(|one, other| {
-            let gap = |(value, on_board, on_side): &(f64, Point, Point)| {
-                if *value > 0.0 { *value } else { (on_board - on_side).norm() }
-            };
-            gap(one).total_cmp(&gap(other))
-        });
+        let rectangle = Rectangle::of(board);
+        let mut nearest = None;
+        let mut least = f64::INFINITY;
+        for side in self.sides() {
+            let (from, to) = (in_frame(board, side.0), in_frame(board, side.1));
+            if (rectangle.separation_of_box(from, to) - self.radius).max(0.0) < least {
+                let (value, on_board, on_side) = self.side_distance(board, (from, to));
+                let gap = if value > 0.0 { value } else { (on_board - on_side).norm() };
+                if gap < least {
+                    (least, nearest) = (gap, Some((on_board, on_side)));
+                }
+            }
+        }
         // Every constructor gives a shape at least one side.
-        nearest.map_or((board.centre, board.centre), |(_, on_board, on_side)| (on_board, on_side))
+        nearest.unwrap_or((board.centre, board.centre))
     }
 }
 
@@ -279,11 +292,16 @@ impl Rectangle {
         hypot(beyond.x.max(0.0), beyond.y.max(0.0))
     }
 
+    /// Returns the signed separation of the box about a segment, metres: never more than that of the segment.
+    fn separation_of_box(&self, from: Vector, to: Vector) -> f64 {
+        let gap = |one: f64, other: f64, half: f64| one.min(other).max(-one.max(other)) - half;
+        gap(from.x, to.x, self.half.x).max(gap(from.y, to.y, self.half.y))
+    }
+
     /// Returns the signed separation of a segment by the separating axis theorem, metres: never more than the distance,
     /// and minus the least translation where they overlap.
     fn separation(&self, from: Vector, to: Vector) -> f64 {
-        let gap = |one: f64, other: f64, half: f64| one.min(other).max(-one.max(other)) - half;
-        let sides = gap(from.x, to.x, self.half.x).max(gap(from.y, to.y, self.half.y));
+        let sides = self.separation_of_box(from, to);
         let along = to - from;
         let length = along.norm();
         if length == 0.0 {

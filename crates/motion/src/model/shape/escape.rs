@@ -8,7 +8,9 @@
 //! translation leads to the nearest point of a hexagon's outline that is inside no other hexagon and not inside the
 //! shape.
 
-use super::{MOST_CORNERS, Rectangle, Shape, ShapeKind, in_frame, nearest_of_segment};
+use arrayvec::ArrayVec;
+
+use super::{MOST_CORNERS, Rectangle, Shape, ShapeKind, in_frame};
 use crate::model::Vector;
 use crate::model::board::Board;
 
@@ -18,12 +20,7 @@ const ROUNDING: f64 = 1e-12;
 /// The greatest number of segments of an outline: of a line, two along each side and three round each corner.
 const MOST_SEGMENTS: usize = 5 * MOST_CORNERS;
 
-/// As many corners as most shapes have, and their segments.
-const FEW_CORNERS: usize = 16;
-const FEW_SEGMENTS: usize = 5 * FEW_CORNERS;
-
 /// The places at which the rectangle meets a side.
-#[derive(Debug, Clone, Copy, Default)]
 struct Hexagon {
     middle: Vector,
     reach: Vector,
@@ -44,15 +41,21 @@ impl Hexagon {
         }
     }
 
+    /// Returns true if a place is inside by more than `depth`.
+    fn covers(&self, place: Vector, depth: f64) -> bool {
+        let offset = place - self.middle;
+        offset.x.abs() < self.reach.x - depth
+            && offset.y.abs() < self.reach.y - depth
+            && self.normal.dot(&offset).abs() < self.reach_along_normal - depth
+    }
+
     /// Returns the part of a segment that is inside by more than `depth`, as shares of it.
-    #[inline]
-    fn covers(&self, segment: &Segment, depth: f64) -> Option<(f64, f64)> {
-        let (offset, along) = (segment.from - self.middle, segment.to - segment.from);
-        let reach = self.reach.map(|reach| reach - depth);
+    fn part(&self, segment: &Segment, depth: f64) -> Option<(f64, f64)> {
+        let (offset, along) = (segment.from - self.middle, segment.along);
         let (mut low, mut high) = (0.0f64, 1.0f64);
         for (at, rate, reach) in [
-            (offset.x, along.x, reach.x),
-            (offset.y, along.y, reach.y),
+            (offset.x, along.x, self.reach.x - depth),
+            (offset.y, along.y, self.reach.y - depth),
             (self.normal.dot(&offset), self.normal.dot(&along), self.reach_along_normal - depth),
         ] {
             if at.min(at + rate) >= reach || at.max(at + rate) <= -reach {
@@ -68,80 +71,174 @@ impl Hexagon {
     }
 }
 
-/// A segment of places to which the board can be moved, with the squared distance from the origin to it.
-#[derive(Debug, Clone, Copy, Default)]
+/// A segment of places to which the board can be moved. All places between the shares `low` and `high` are covered;
+/// where both are the same, none has been tested.
 struct Segment {
     from: Vector,
-    to: Vector,
-    squared: f64,
+    along: Vector,
+    low: f64,
+    high: f64,
+    /// True if the nearest place that is not known to be covered is at `low`, false if it is at `high`.
+    is_before: bool,
 }
 
-/// The segments of which the outline of the places to avoid consists.
-struct Outline<'s> {
-    segments: &'s mut [Segment],
-    count: usize,
+impl Segment {
+    fn at(&self, share: f64) -> Vector {
+        self.from + share * self.along
+    }
+
+    /// Returns the squared distances of the places before `low` and after `high`.
+    fn ends(&self) -> [f64; 2] {
+        let squared = |share: f64, is_left: bool| if is_left { self.at(share).norm_squared() } else { f64::INFINITY };
+        [squared(self.low, self.low > 0.0), squared(self.high, self.high < 1.0)]
+    }
 }
 
-impl Outline<'_> {
-    fn add(&mut self, from: Vector, to: Vector) {
-        let squared = nearest_of_segment(Vector::zeros(), from, to).norm_squared();
-        self.segments[self.count] = Segment { from, to, squared };
-        self.count += 1;
+/// The segments of which the outline of the places to avoid consists, those nearer to the origin than a free place.
+struct Outline {
+    segments: ArrayVec<Segment, MOST_SEGMENTS>,
+    /// For each segment the squared distance from the origin to its nearest place that is not known to be covered, and its
+    /// number: a heap whose root is nearest (Cormen et al., Introduction to Algorithms, chapter 6).
+    heap: ArrayVec<(f64, u16), MOST_SEGMENTS>,
+    /// The square of the distance of the free place.
+    limit: f64,
+}
+
+impl Outline {
+    /// Adds a segment, whose place nearest to the origin is at `share` of it.
+    fn add(&mut self, from: Vector, along: Vector, share: f64) {
+        let segment = Segment { from, along, low: share, high: share, is_before: share > 0.0 };
+        let squared = segment.at(share).norm_squared();
+        if squared < self.limit {
+            self.heap.push((squared, self.segments.len() as u16));
+            self.segments.push(segment);
+        }
+    }
+
+    /// Moves an entry of the heap down to its place.
+    fn sift_down(&mut self, mut place: usize) {
+        let entry = self.heap[place];
+        loop {
+            let mut child = 2 * place + 1;
+            if child + 1 < self.heap.len() && self.heap[child + 1].0 < self.heap[child].0 {
+                child += 1;
+            }
+            match self.heap.get(child) {
+                Some(nearer) if nearer.0 < entry.0 => self.heap[place] = *nearer,
+                _ => break,
+            }
+            place = child;
+        }
+        self.heap[place] = entry;
     }
 
     /// Adds the places at which the board slides along a side, on the left of it or on the right.
     fn add_along(&mut self, half: Vector, from: Vector, to: Vector, sense: f64) {
-        let outward = sense * Vector::new(to.y - from.y, from.x - to.x);
-        let corner = half.zip_map(&outward, f64::copysign);
-        self.add(from + corner, to + corner);
+        let along = to - from;
+        let outward = sense * Vector::new(along.y, -along.x);
+        let from = from + half.zip_map(&outward, f64::copysign);
+        let square = along.norm_squared();
+        let share = if square > 0.0 { (-from.dot(&along) / square).clamp(0.0, 1.0) } else { 0.0 };
+        self.add(from, along, share);
     }
 
     /// Adds the places at which an edge of the board slides over a corner, from which the sides lead to `neighbours`.
     /// Beyond an edge towards which one of the sides leads, the board meets that side.
     fn add_round(&mut self, half: Vector, at: Vector, neighbours: &[Vector]) {
-        let (low, high) = (at - half, at + half);
+        let beyond = (at.abs() - half).map(|beyond| beyond.max(0.0));
+        if beyond.norm_squared() >= self.limit {
+            return;
+        }
+        let low = at - half;
+        let (width, height) = (Vector::new(2.0 * half.x, 0.0), Vector::new(0.0, 2.0 * half.y));
+        let share = low.zip_map(&half, |low, half| (-0.5 * low / half).clamp(0.0, 1.0));
         let leads = |towards: fn(&Vector, &Vector) -> bool| neighbours.iter().any(|next| towards(next, &at));
-        let corner = |x, y| Vector::new(x, y);
         if !leads(|next, at| next.x > at.x) {
-            self.add(corner(high.x, low.y), high);
+            self.add(low + width, height, share.y);
         }
         if !leads(|next, at| next.y > at.y) {
-            self.add(high, corner(low.x, high.y));
+            self.add(low + height, width, share.x);
         }
         if !leads(|next, at| next.x < at.x) {
-            self.add(corner(low.x, high.y), low);
+            self.add(low, height, share.y);
         }
         if !leads(|next, at| next.y < at.y) {
-            self.add(low, corner(high.x, low.y));
+            self.add(low, width, share.x);
         }
     }
 
-    /// Takes out the segment that is nearest to the origin, if the square of its distance is below `limit`.
-    fn take_nearest(&mut self, limit: f64) -> Option<Segment> {
-        let segments = &self.segments[..self.count];
-        let mut nearest = (limit, None);
-        for (number, segment) in segments.iter().enumerate() {
-            if segment.squared < nearest.0 {
-                nearest = (segment.squared, Some(number));
+    /// Returns the distance of the nearest free place, if there is one.
+    fn nearest_free(&mut self, avoided: &mut Avoided) -> Option<f64> {
+        (0..self.heap.len() / 2).rev().for_each(|place| self.sift_down(place));
+        while let Some(&(squared, number)) = self.heap.first()
+            && squared < self.limit
+        {
+            let segment = &mut self.segments[usize::from(number)];
+            let is_before = segment.is_before;
+            let share = if is_before { segment.low } else { segment.high };
+            let place = segment.at(share);
+            // Less for the part, so that each step comes further.
+            let depth = 0.5 * avoided.rounding(place);
+            let part = if avoided.covers(place) {
+                avoided.hexagons[0].part(segment, depth)
+            } else if avoided.is_within(place) {
+                let parts = avoided.hexagons.iter().filter_map(|hexagon| hexagon.part(segment, depth));
+                if is_before {
+                    parts.filter(|part| part.0 < share).max_by(|one, other| one.1.total_cmp(&other.1))
+                } else {
+                    parts.filter(|part| part.1 > share).min_by(|one, other| one.0.total_cmp(&other.0))
+                }
+            } else {
+                return Some(squared.sqrt());
+            };
+            // Nothing between the place and the part is free, and nothing at all without a part.
+            match (part, is_before) {
+                (Some((low, high)), _) => (segment.low, segment.high) = (segment.low.min(low), segment.high.max(high)),
+                (None, true) => segment.low = 0.0,
+                (None, false) => segment.high = 1.0,
             }
+            let [before, after] = segment.ends();
+            segment.is_before = before < after;
+            self.heap[0].0 = before.min(after);
+            self.sift_down(0);
         }
-        let number = nearest.1?;
-        let taken = segments[number];
-        self.count -= 1;
-        self.segments[number] = self.segments[self.count];
-        Some(taken)
+        None
+    }
+}
+
+/// The places to avoid: those that a hexagon covers, and those at which the board is within the shape.
+struct Avoided<'s> {
+    shape: &'s Shape,
+    board: &'s Board,
+    hexagons: ArrayVec<Hexagon, MOST_CORNERS>,
+}
+
+impl Avoided<'_> {
+    /// Returns the depth within a hexagon up to which a place counts as outside.
+    fn rounding(&self, place: Vector) -> f64 {
+        ROUNDING * (self.board.half_length + self.board.half_width + place.abs().sum())
+    }
+
+    /// Returns true if a hexagon covers a place, and makes that hexagon the first: it often covers the next place, too.
+    fn covers(&mut self, place: Vector) -> bool {
+        let depth = self.rounding(place);
+        let number = self.hexagons.iter().position(|hexagon| hexagon.covers(place, depth));
+        number.inspect(|number| self.hexagons.swap(0, *number)).is_some()
+    }
+
+    /// Returns true if the board, moved to a place that no hexagon covers, is within the shape.
+    fn is_within(&self, place: Vector) -> bool {
+        self.shape.holds(self.board.centre + place.x * self.board.axis + place.y * self.board.across())
     }
 }
 
 impl Shape {
     /// Returns the length of the least translation that frees a board, metres; infinite if there is none. The board and
-    /// the shape overlap.
-    pub(super) fn least_escape(&self, board: &Board) -> f64 {
+    /// the shape overlap. Returns a length of at most `limit` if the least one is.
+    pub(super) fn least_escape(&self, board: &Board, limit: f64) -> f64 {
         match self.convex {
             Some(sense) => self.convex_escape(board, sense),
-            // Smaller arrays take less time to prepare.
-            None if self.points.len() <= FEW_CORNERS => self.nearest_free::<FEW_CORNERS, FEW_SEGMENTS>(board),
-            None => self.nearest_free::<MOST_CORNERS, MOST_SEGMENTS>(board),
+            None => self.nearest_free(board, limit),
         }
     }
 
@@ -167,33 +264,44 @@ impl Shape {
         least.min(beside.x).min(beside.y)
     }
 
-    /// Returns the distance from the origin to the nearest free translation.
-    fn nearest_free<const CORNERS: usize, const SEGMENTS: usize>(&self, board: &Board) -> f64 {
+    /// Returns the distance from the origin to the nearest free place, or to another one if that is at most `limit`.
+    fn nearest_free(&self, board: &Board, limit: f64) -> f64 {
         let half = Rectangle::of(board).half;
-        let mut corners = [Vector::zeros(); CORNERS];
-        for (corner, point) in corners.iter_mut().zip(&self.points) {
-            *corner = in_frame(board, *point);
+        let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
+        let mut corners: ArrayVec<Vector, MOST_CORNERS> = ArrayVec::new();
+        for point in &self.points {
+            let corner = in_frame(board, *point);
+            (low, high) = (low.zip_map(&corner, f64::min), high.zip_map(&corner, f64::max));
+            corners.push(corner);
         }
-        let corners = &corners[..self.points.len()];
-        let mut segments = [Segment::default(); SEGMENTS];
-        let mut outline = Outline { segments: &mut segments, count: 0 };
-        let sides = self.add_outline(&mut outline, half, corners);
-        let mut hexagons = [Hexagon::default(); CORNERS];
-        let hexagons = &mut hexagons[..sides];
-        for (number, hexagon) in hexagons.iter_mut().enumerate() {
-            *hexagon = Hexagon::new(half, corners[number], corners[(number + 1) % corners.len()]);
+        // Beside all corners the board is free, unless the shape is the plane outside them.
+        let beside = (half - low).inf(&(half + high)).min();
+        let free = if self.kind == ShapeKind::Boundary { f64::INFINITY } else { beside };
+        if free <= limit {
+            return free;
         }
-        let mut covered = [(0.0, 0.0); CORNERS];
-        let mut best = f64::INFINITY;
-        while let Some(segment) = outline.take_nearest(best * best) {
-            best = best.min(self.nearest_free_of(board, hexagons, &segment, &mut covered));
+        let mut avoided = Avoided { shape: self, board, hexagons: ArrayVec::new() };
+        for number in 0..self.sides().count() {
+            let hexagon = Hexagon::new(half, corners[number], corners[(number + 1) % corners.len()]);
+            if (hexagon.middle.abs() - hexagon.reach).max() < free {
+                avoided.hexagons.push(hexagon);
+            }
         }
-        best
+        let mut outline = Outline { segments: ArrayVec::new(), heap: ArrayVec::new(), limit: free * free };
+        self.add_outline(&mut outline, half, &corners);
+        if limit > 0.0 {
+            for (segment, (squared, _)) in outline.segments.iter().zip(&outline.heap) {
+                let place = segment.at(segment.low);
+                if *squared <= limit * limit && !avoided.covers(place) && !avoided.is_within(place) {
+                    return squared.sqrt();
+                }
+            }
+        }
+        outline.nearest_free(&mut avoided).unwrap_or(free)
     }
 
     /// Adds the outline of the places to avoid, and what else of the outlines of the hexagons may be part of it.
-    /// Returns the number of sides.
-    fn add_outline(&self, outline: &mut Outline, half: Vector, corners: &[Vector]) -> usize {
+    fn add_outline(&self, outline: &mut Outline, half: Vector, corners: &[Vector]) {
         let count = corners.len();
         if self.kind == ShapeKind::Line {
             for ends in corners.windows(2) {
@@ -205,7 +313,7 @@ impl Shape {
                 outline.add_round(half, three[1], &[three[0], three[2]]);
             }
             outline.add_round(half, corners[count - 1], &corners[count - 2..count - 1]);
-            return count - 1;
+            return;
         }
         for k in 0..count {
             let [before, at, after] = [corners[(k + count - 1) % count], corners[k], corners[(k + 1) % count]];
@@ -215,47 +323,5 @@ impl Shape {
                 outline.add_round(half, at, &[before, after]);
             }
         }
-        count
-    }
-
-    /// Returns the distance from the origin to the nearest free translation on a segment; infinite if none is free. A
-    /// hexagon that covers the whole segment becomes the first one, because it often covers the next segment too.
-    fn nearest_free_of(
-        &self,
-        board: &Board,
-        hexagons: &mut [Hexagon],
-        segment: &Segment,
-        covered: &mut [(f64, f64)],
-    ) -> f64 {
-        let Segment { from: begin, to: end, .. } = *segment;
-        let size = board.half_length + board.half_width;
-        let depth = ROUNDING * (size + begin.abs().sup(&end.abs()).sum());
-        let mut count = 0;
-        for number in 0..hexagons.len() {
-            if let Some(part) = hexagons[number].covers(segment, depth) {
-                if part == (0.0, 1.0) {
-                    hexagons.swap(0, number);
-                    return f64::INFINITY;
-                }
-                covered[count] = part;
-                count += 1;
-            }
-        }
-        let covered = &mut covered[..count];
-        covered.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
-        let at = |share: f64| begin + share * (end - begin);
-        let mut best = f64::INFINITY;
-        let mut from = 0.0f64;
-        for (low, high) in covered.iter().copied().chain([(1.0, 1.0)]) {
-            if low > from {
-                let translation = nearest_of_segment(Vector::zeros(), at(from), at(low));
-                let place = board.centre + translation.x * board.axis + translation.y * board.across();
-                if translation.norm() < best && !self.holds(place) {
-                    best = translation.norm();
-                }
-            }
-            from = from.max(high);
-        }
-        best
     }
 }

@@ -101,6 +101,18 @@ proptest! {
         prop_assert!(shape.coarse_bound(&board) <= signed + 1e-12);
     }
 
+    #[test]
+    fn a_distance_below_a_limit_is_exact(shape in any_shape(), board in any_board(), share in -2.0..2.0f64) {
+        let signed = shape.signed_distance(&board);
+        let limit = if signed.is_finite() { share * signed } else { share };
+        let below = shape.signed_distance_below(&board, limit);
+        if signed < limit - 1e-12 {
+            prop_assert_eq!(below, signed, "limit {}", limit);
+        } else {
+            prop_assert!(below >= limit - 1e-12, "{} of {}, limit {}", below, signed, limit);
+        }
+    }
+
     /// No shorter translation of a fan frees the board; out of a convex shape a little more than that length does.
     #[test]
     fn an_overlap_is_the_least_translation_that_frees(shape in any_shape(), board in any_board()) {
@@ -119,9 +131,7 @@ proptest! {
                 prop_assert!((0..directions).all(|k| !is_free(-share * signed * way(k))), "{} at {}", signed, share);
             }
             // In a pocket the free places may be narrower than the fan.
-            let convex = shape.kind() == ShapeKind::Circle || shape.points().len() == 3;
-            let opens = convex && shape.kind() != ShapeKind::Boundary;
-            prop_assert!(!opens || (0..directions).any(|k| is_free(-1.01 * signed * way(k))), "{}", signed);
+            prop_assert!(!shape.is_convex() || (0..directions).any(|k| is_free(-1.01 * signed * way(k))), "{}", signed);
         } else {
             prop_assert_eq!(shape.kind(), ShapeKind::Boundary);
             prop_assert!((0..directions).all(|k| (1..100).all(|step| !is_free(0.1 * step as f64 * way(k)))));
