@@ -28,8 +28,14 @@ fn a_default_subscription_gets_every_topic_and_discovers_its_quality_of_service(
     let until_second = ["--depth", "10", "--samples", "2", "--linger", "0", "--seconds", "300"];
     let start = |topic: &&str| Process::start(&mut subscriber(name, topic, &until_second));
     let subscribers: Vec<Process> = topics.iter().map(start).collect();
+    let end_of =
+        |subscriber: &mut Process| -> Value { serde_json::from_str(&subscriber.lines().until("\"end\"")).unwrap() };
     for (topic, mut subscriber) in topics.iter().zip(subscribers) {
-        let end: Value = serde_json::from_str(&subscriber.lines().until("\"end\"")).unwrap();
+        let mut end = end_of(&mut subscriber);
+        if end["writers"] == 0 {
+            // A participant of Fast DDS that starts beside many others may discover nothing.
+            end = end_of(&mut start(topic));
+        }
         let durability = if streams.contains(topic) { "volatile" } else { "transient_local" };
         assert!(end["samples"].as_u64() >= Some(2), "{topic}: {end}");
         assert_eq!(end["offered"], format!("reliable {durability}"), "{topic}");
