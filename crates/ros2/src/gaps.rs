@@ -52,6 +52,15 @@ impl OldMessages {
     }
 }
 
+/// Sends `reader` once that the first `last` messages of `writer` are not for it.
+pub(super) fn send_gap(participant: &DomainParticipant, writer: GUID, reader: GUID, last: u64) {
+    // A volatile writer is replaced long before it has written more messages.
+    let last = u32::try_from(last).unwrap_or(u32::MAX);
+    if let Some(addresses) = reader_addresses(participant, reader).filter(|_| last > 0) {
+        send(&datagram(writer.to_bytes(), reader.to_bytes(), last), addresses.into_iter());
+    }
+}
+
 /// Returns the message of `writer` to `reader`: its messages 1 to `last`, at least 1, are not for it.
 fn datagram(writer: [u8; 16], reader: [u8; 16], last: u32) -> Vec<u8> {
     let (mut bytes, [writer, reader]) = addressed(writer, reader);

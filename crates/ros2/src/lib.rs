@@ -4,6 +4,7 @@
 //! In: the feed of a show and the process's environment. Out: a [`bridge`]. Called by `send ros2`, which `run` and
 //! `replay` start as a child process; both call [`describe`] first.
 
+mod acknowledgements;
 pub mod bridge;
 mod commands;
 mod control;

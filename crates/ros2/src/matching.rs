@@ -11,7 +11,8 @@ use ros2_client::Context;
 use rustdds::policy::Durability;
 use rustdds::{DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
 
-use super::gaps::OldMessages;
+use super::acknowledgements::send_to_own;
+use super::gaps::{OldMessages, send_gap};
 use super::heartbeats::send_heartbeat;
 use super::retransmission::FirstMessages;
 
@@ -28,12 +29,21 @@ struct Ends {
     readers: BTreeSet<(GUID, GUID)>,
     /// Pairs of a local reader and a remote writer.
     writers: BTreeSet<(GUID, GUID)>,
-    /// Remote readers that request the history.
-    transient_local: BTreeSet<GUID>,
+    /// The requests of the remote readers.
+    requests: BTreeMap<GUID, Requests>,
     /// New writers whose first messages are requested.
     first_messages: Vec<FirstMessages>,
     /// New readers from which older messages are withheld.
     old_messages: Vec<OldMessages>,
+}
+
+/// The requests of a remote reader.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Requests {
+    /// True if the reader requests the history.
+    pub(super) transient_local: bool,
+    /// True if the reader acknowledges messages.
+    pub(super) reliable: bool,
 }
 
 impl Matches {
@@ -42,9 +52,8 @@ impl Matches {
         let participant = context.domain_participant();
         let events = participant.status_listener();
         let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
-        let (transient_local, first_messages) = (BTreeSet::new(), Vec::new());
-        let old_messages = Vec::new();
-        let ends = Ends { participant, events, readers, writers, transient_local, first_messages, old_messages };
+        let (requests, first_messages, old_messages) = (BTreeMap::new(), Vec::new(), Vec::new());
+        let ends = Ends { participant, events, readers, writers, requests, first_messages, old_messages };
         Self { ends: Arc::new(Mutex::new(ends)) }
     }
 
@@ -60,11 +69,11 @@ impl Matches {
         self.with(|_| ());
     }
 
-    /// Returns the subscribers of a local writer, and for each whether it requests the history.
-    pub(super) fn subscribers(&self, writer: GUID) -> BTreeMap<GUID, bool> {
+    /// Returns the subscribers of a local writer.
+    pub(super) fn subscribers(&self, writer: GUID) -> BTreeMap<GUID, Requests> {
         self.with(|ends| {
             let readers = ends.readers.iter().filter(|(here, _)| *here == writer);
-            readers.map(|(_, reader)| (*reader, ends.transient_local.contains(reader))).collect()
+            readers.map(|(_, reader)| (*reader, ends.requests.get(reader).copied().unwrap_or_default())).collect()
         })
     }
 
@@ -85,6 +94,16 @@ impl Matches {
     /// Tells a remote reader that a local writer has written `written` messages until now.
     pub(super) fn announce(&self, writer: GUID, reader: GUID, written: u32) {
         self.with(|ends| send_heartbeat(&ends.participant, writer, reader, written));
+    }
+
+    /// Tells a remote reader that the first `last` messages of a local writer are not for it.
+    pub(super) fn send_gap(&self, writer: GUID, reader: GUID, last: u64) {
+        self.with(|ends| send_gap(&ends.participant, writer, reader, last));
+    }
+
+    /// Sends RustDDS the datagram of an acknowledgement.
+    pub(super) fn acknowledge(&self, datagram: &[u8]) {
+        self.with(|ends| send_to_own(&ends.participant, datagram));
     }
 
     /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to
@@ -135,13 +154,13 @@ impl Ends {
                 }
                 // RustDDS sends this before the matches of that reader.
                 Event::ReaderDetected { reader } => {
-                    if matches!(reader.qos.durability(), Some(durability) if durability != Durability::Volatile) {
-                        self.transient_local.insert(reader.guid);
-                    }
+                    let transient_local = reader.qos.durability().is_some_and(|of| of != Durability::Volatile);
+                    let reliable = reader.qos.is_reliable();
+                    self.requests.insert(reader.guid, Requests { transient_local, reliable });
                 }
                 Event::ReaderLost { guid, .. } => {
                     self.readers.retain(|(_, reader)| *reader != guid);
-                    self.transient_local.remove(&guid);
+                    self.requests.remove(&guid);
                     self.old_messages.retain(|of| of.reader() != guid);
                 }
                 Event::WriterLost { guid, .. } => {
@@ -150,7 +169,7 @@ impl Ends {
                 }
                 Event::ParticipantLost { id, .. } => {
                     self.readers.retain(|(_, reader)| reader.prefix != id);
-                    self.transient_local.retain(|reader| reader.prefix != id);
+                    self.requests.retain(|reader, _| reader.prefix != id);
                     self.old_messages.retain(|of| of.reader().prefix != id);
                     self.writers.retain(|(_, writer)| writer.prefix != id);
                     self.first_messages.retain(|of| of.writer().prefix != id);

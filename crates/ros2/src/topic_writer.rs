@@ -13,7 +13,8 @@
 //! all subscribers of the topic, of a killed one for its lease: 20 s with Fast DDS. So a refused message is held and
 //! written again, and a writer that refuses for longer than a new subscriber takes is replaced.
 //!
-//! A volatile writer is relieved by a second one before it has written many messages ([`relief`](super::relief)).
+//! A volatile writer is relieved by a second one before it has written many messages ([`relief`](super::relief)), and
+//! keeps the messages of some seconds only ([`acknowledgements`](super::acknowledgements)).
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -24,6 +25,7 @@ use rustdds::policy::{self, ResourceLimits};
 use rustdds::{GUID, QosPolicies, QosPolicyBuilder, TopicKind};
 use serde::Serialize;
 
+use super::acknowledgements::Acknowledgements;
 use super::matching::Matches;
 use super::relief::Relief;
 use super::{Ros2Config, Ros2Error};
@@ -58,6 +60,7 @@ pub(super) struct TopicWriter<Message: Serialize> {
     /// The held message of a transient-local topic.
     latched: Option<Latched<Message>>,
     relief: Relief<Publisher<Arc<Message>>>,
+    acknowledgements: Acknowledgements,
 }
 
 /// A message that RustDDS has refused, with the time of the first refusal.
@@ -134,6 +137,7 @@ impl<Message: Serialize> TopicWriter<Message> {
         let is_written = self.publisher.publish(message).is_ok();
         if is_written {
             self.relief.count();
+            self.acknowledgements.count();
             if let Some(latched) = &mut self.latched {
                 latched.written += 1;
                 latched.is_written = true;
@@ -153,9 +157,10 @@ impl<Message: Serialize> TopicWriter<Message> {
             (latched.written, latched.is_written) = (0, false);
         }
         self.relief = Relief::default();
+        self.acknowledgements.restart();
     }
 
-    /// Relieves a volatile publisher when it is due.
+    /// Relieves a volatile publisher when it is due, and acknowledges its old messages.
     fn relieve(&mut self, matches: &Matches, node: &mut Node) {
         let (dds, topic) = (&self.dds, &self.topic);
         let create = || match node.create_publisher(dds, None) {
@@ -169,9 +174,14 @@ impl<Message: Serialize> TopicWriter<Message> {
             let matched = matches.subscribers(second.guid());
             matches.subscribers(first.guid()).keys().all(|reader| matched.contains_key(reader))
         };
-        if let Some(ended) = self.relief.serve(&mut self.publisher, Instant::now(), create, is_matched) {
+        let (writer, now) = (self.publisher.guid(), Instant::now());
+        if let Some(ended) = self.relief.serve(&mut self.publisher, now, create, is_matched) {
             matches.forget(ended.guid());
         }
+        if self.publisher.guid() != writer {
+            self.acknowledgements.restart();
+        }
+        self.acknowledgements.serve(matches, self.publisher.guid(), now);
     }
 }
 
@@ -202,17 +212,18 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
             }
             return;
         }
-        for (reader, is_transient_local) in &subscribers {
+        for (reader, requests) in &subscribers {
             if latched.known.insert(*reader) {
-                matches.withhold(writer, *reader, latched.written.saturating_sub(u32::from(*is_transient_local)));
+                let last = latched.written.saturating_sub(u32::from(requests.transient_local));
+                matches.withhold(writer, *reader, last);
             }
         }
-        if latched.is_written || !subscribers.values().any(|is_transient_local| *is_transient_local) {
+        if latched.is_written || !subscribers.values().any(|requests| requests.transient_local) {
             return;
         }
         let Some(latest) = latched.latest.clone() else { return };
         // A volatile subscriber would take the held message for a new one: it is withheld as that of a new publisher.
-        if !subscribers.values().all(|is_transient_local| *is_transient_local) {
+        if !subscribers.values().all(|requests| requests.transient_local) {
             latched.known.clear();
             self.replace(node);
         }
@@ -305,6 +316,7 @@ impl WriterFactory<'_> {
             replaced: None,
             latched,
             relief: Relief::default(),
+            acknowledgements: Acknowledgements::new(qos.depth.into()),
         }))
     }
 }
