@@ -17,8 +17,9 @@ use crate::model::board::Board;
 /// Depth within a hexagon, as a share of the board and the translation, up to which a point counts as outside.
 const ROUNDING: f64 = 1e-12;
 
-/// The greatest number of segments of an outline: of a line, two along each side and three round each corner.
-const MOST_SEGMENTS: usize = 5 * MOST_CORNERS;
+/// The greatest number of segments of an outline: of a line, two along each side and, where rounding joins corners, four
+/// round each corner.
+const MOST_SEGMENTS: usize = 6 * MOST_CORNERS;
 
 /// The places at which the rectangle meets a side.
 struct Hexagon {
