@@ -10,8 +10,8 @@
 //! repairs them for every later subscriber.
 //!
 //! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages for
-//! all subscribers of the topic, of a killed one for its lease: 20 s with Fast DDS. So a refused message is held and
-//! written again, and a writer that refuses for longer than a new subscriber takes is replaced.
+//! all subscribers of the topic. So a refused message is held and written again, and a writer that refuses for longer
+//! than a new subscriber takes is replaced.
 //!
 //! A volatile writer is relieved by a second one before it has written many messages ([`relief`](super::relief)), and
 //! keeps the messages of some seconds only ([`acknowledgements`](super::acknowledgements)).

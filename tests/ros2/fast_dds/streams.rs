@@ -1,6 +1,7 @@
 //! Subscriptions of rclpy's default, and the relief of a writer, as Fast DDS sees them.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use super::*;
 
@@ -40,6 +41,34 @@ fn a_default_subscription_gets_every_topic_and_discovers_its_quality_of_service(
         assert!(end["samples"].as_u64() >= Some(2), "{topic}: {end}");
         assert_eq!(end["offered"], format!("reliable {durability}"), "{topic}");
     }
+    stopped(publisher);
+}
+
+/// Of a subscriber that is stopped for longer than messages are kept, older messages are acknowledged in its name.
+#[test]
+fn a_subscriber_that_was_stopped_gets_the_messages_of_now() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "stopped";
+    let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "50", "--duration", "600"]);
+    let mut subscriber = Process::start(&mut subscriber(name, "handles", &["--depth", "10", "--seconds", "300"]));
+    let printed = subscriber.lines();
+    let sequence = |line: &str| -> Option<u64> {
+        let line: Value = serde_json::from_str(line).unwrap();
+        (line["type"] == "sample").then(|| line["sequence"].as_u64().unwrap())
+    };
+    let first = printed.all_until_one(|line| sequence(line).is_some(), "a message");
+    let before = first.last().and_then(|line| sequence(line)).unwrap();
+    subscriber.signal(Signal::SIGSTOP);
+    // RustDDS removes acknowledged messages every six seconds.
+    std::thread::sleep(Duration::from_secs(9));
+    subscriber.signal(Signal::SIGCONT);
+    // 60 a second, but for the time in which the publisher starts to be late on a busy machine.
+    let after = printed.all_until_one(|line| sequence(line).is_some_and(|number| number > before + 480), "one of now");
+    let received: Vec<u64> = after.iter().filter_map(|line| sequence(line)).collect();
+    assert!(received.is_sorted(), "{received:?}");
+    assert!(received.iter().all(|number| *number > before), "{before} {received:?}");
     stopped(publisher);
 }
 
