@@ -84,7 +84,9 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
                topics = [\"handles\", \"poses\", \"alerts\", \"stage\", \"diagnostics\", \"markers\", \"status\"]\n";
     std::fs::write(&scene, format!("{}\n{all}", std::fs::read_to_string(&scene).unwrap())).unwrap();
     let mut run = program("late");
-    let publisher = Process::start(run.args(["--scene", scene.to_str().unwrap(), "run", "--json", "--start", "412"]));
+    // In a domain of its own: the diagnostics of other shows would count as those of this one.
+    run.env("ROS_DOMAIN_ID", "15").args(["--scene", scene.to_str().unwrap(), "run", "--json", "--start", "412"]);
+    let publisher = Process::start(&mut run);
     // The contact is half a second after the start; ten seconds later a subscriber joins.
     wait(10.5);
     let topics = [
@@ -96,7 +98,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
         "handles",
         "poses",
     ];
-    let output = Process::start(peer("late", "300", &topics).arg("--until-each")).output();
+    let output = Process::start(peer("late", "300", &topics).args(["--domain", "15", "--until-each"])).output();
     let lines = json_lines(&output);
     assert!(!lines.is_empty(), "{}", text(&output.stderr));
 
@@ -261,7 +263,7 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
-    // 5,000 benches fill within six seconds the memory that a topic may use.
+    // Unacknowledged, 5,000 benches would fill within six seconds the memory that a topic may use.
     let scene = scene_file(
         "stopped",
         &[("benches = 223", "benches = 5000"), ("start_turn = 16", "start_turn = 60"), ("[alerts]", "#[alerts]")],
@@ -284,8 +286,7 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
     let summary = summary(&output);
     let number = |value: &Value| value.as_u64().unwrap();
     assert_eq!(number(&summary["frames"]) + number(&summary["skipped"]), 1800, "{summary}");
-    assert!(number(&summary["ros2"]["discarded"]) > 0, "{summary}");
-    assert_eq!(printed.matches("discarded").count(), 1, "not printed once: {printed}");
+    assert_eq!(number(&summary["ros2"]["discarded"]), 0, "{summary} {printed}");
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn a_subscriber_that_was_stopped_gets_the_messages_of_now() {
     if !can_run(peer_program().map(drop)) {
         return;
     }
-    let name = "stopped";
+    let name = "stopped_fast";
     let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "50", "--duration", "600"]);
     let mut subscriber = Process::start(&mut subscriber(name, "handles", &["--depth", "10", "--seconds", "300"]));
     let printed = subscriber.lines();

@@ -198,40 +198,42 @@ impl Shape {
     /// Returns the signed distances of a board to each side, metres, with the point of the board and the point of the
     /// side that are nearest; of a circle, to the circle. A side ignores the interior of its polygon.
     pub fn side_distances<'a>(&'a self, board: &'a Board) -> impl Iterator<Item = (f64, Point, Point)> + 'a {
-        self.sides().map(move |side| self.side_distance(board, (in_frame(board, side.0), in_frame(board, side.1))))
+        let rectangle = Rectangle::of(board);
+        self.sides().map(move |(from, to)| {
+            let (from, to) = (in_frame(board, from), in_frame(board, to));
+            let separation = rectangle.separation(from, to);
+            let (distance, on_board, on_side) = rectangle.nearest(from, to);
+            let value = if separation > 0.0 { distance.max(separation) } else { separation };
+            let (on_board, on_side) = self.on_stage(board, on_board, on_side);
+            (value - self.radius, on_board, on_side)
+        })
     }
 
-    /// Returns the same for one side, whose corners are in the board's frame.
-    fn side_distance(&self, board: &Board, (from, to): (Vector, Vector)) -> (f64, Point, Point) {
-        let rectangle = Rectangle::of(board);
+    /// Returns a point of a board, and the point of the shape for a point of a side, both of which are in the board's
+    /// frame.
+    fn on_stage(&self, board: &Board, on_board: Vector, on_side: Vector) -> (Point, Point) {
         let on_stage = |local: Vector| board.centre + local.x * board.axis + local.y * board.across();
-        let separation = rectangle.separation(from, to);
-        let (distance, on_board, on_side) = rectangle.nearest(from, to);
-        let value = if separation > 0.0 { distance.max(separation) } else { separation };
         let outward = on_board - on_side;
         let length = outward.norm();
         let on_circle = if length > 0.0 { on_side + outward * (self.radius / length) } else { on_side };
-        (value - self.radius, on_stage(on_board), on_stage(on_circle))
+        (on_stage(on_board), on_stage(on_circle))
     }
 
     /// Returns the point of a board and the point of the shape's outline that are nearest to each other; where they
     /// overlap, two points near the place at which the outline meets the board.
     pub fn nearest_points(&self, board: &Board) -> (Point, Point) {
         let rectangle = Rectangle::of(board);
-        let mut nearest = None;
-        let mut least = f64::INFINITY;
-        for side in self.sides() {
-            let (from, to) = (in_frame(board, side.0), in_frame(board, side.1));
-            if (rectangle.separation_of_box(from, to) - self.radius).max(0.0) < least {
-                let (value, on_board, on_side) = self.side_distance(board, (from, to));
-                let gap = if value > 0.0 { value } else { (on_board - on_side).norm() };
-                if gap < least {
-                    (least, nearest) = (gap, Some((on_board, on_side)));
+        let (mut least, mut nearest) = (f64::INFINITY, (Vector::zeros(), Vector::zeros()));
+        for (from, to) in self.sides() {
+            let (from, to) = (in_frame(board, from), in_frame(board, to));
+            if rectangle.separation_of_box(from, to).max(0.0) < least {
+                let (distance, on_board, on_side) = rectangle.nearest(from, to);
+                if distance < least {
+                    (least, nearest) = (distance, (on_board, on_side));
                 }
             }
         }
-        // Every constructor gives a shape at least one side.
-        nearest.unwrap_or((board.centre, board.centre))
+        self.on_stage(board, nearest.0, nearest.1)
     }
 }
 
