@@ -7,10 +7,12 @@
 //! subscriber gets old messages first. Called by the matches.
 
 use std::net::SocketAddr;
+use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
 use rustdds::{DomainParticipant, GUID};
 
+use super::UNACKNOWLEDGED_MESSAGES;
 use super::retransmission::{LITTLE_ENDIAN, addressed, reader_addresses, send, submessage};
 
 /// The time for a new subscriber to discover the writer, and the interval of the datagrams.
@@ -32,7 +34,7 @@ impl OldMessages {
     /// Withholds the first `last` messages of `writer` from `reader`.
     pub(super) fn of(participant: &DomainParticipant, writer: GUID, reader: GUID, last: u32) -> Option<Self> {
         let addresses = reader_addresses(participant, reader)?;
-        let datagram = datagram(writer.to_bytes(), reader.to_bytes(), last);
+        let datagram = datagram(writer.to_bytes(), reader.to_bytes(), 1..=last);
         (last > 0).then(|| Self { reader, datagram, addresses, since: Instant::now(), sent: None })
     }
 
@@ -52,20 +54,23 @@ impl OldMessages {
     }
 }
 
-/// Sends `reader` once that the first `last` messages of `writer` are not for it.
+/// Sends `reader` once that the messages of `writer` up to `last` are not for it.
 pub(super) fn send_gap(participant: &DomainParticipant, writer: GUID, reader: GUID, last: u64) {
     // A volatile writer is replaced long before it has written more messages.
     let last = u32::try_from(last).unwrap_or(u32::MAX);
+    // Fast DDS goes through all numbers of a GAP, and earlier ones are withheld by its heartbeats.
+    let first = last.saturating_sub(UNACKNOWLEDGED_MESSAGES).max(1);
     if let Some(addresses) = reader_addresses(participant, reader).filter(|_| last > 0) {
-        send(&datagram(writer.to_bytes(), reader.to_bytes(), last), addresses.into_iter());
+        send(&datagram(writer.to_bytes(), reader.to_bytes(), first..=last), addresses.into_iter());
     }
 }
 
-/// Returns the message of `writer` to `reader`: its messages 1 to `last`, at least 1, are not for it.
-fn datagram(writer: [u8; 16], reader: [u8; 16], last: u32) -> Vec<u8> {
+/// Returns the message of `writer` to `reader`: these messages are not for it.
+fn datagram(writer: [u8; 16], reader: [u8; 16], numbers: RangeInclusive<u32>) -> Vec<u8> {
     let (mut bytes, [writer, reader]) = addressed(writer, reader);
+    let (first, last) = numbers.into_inner();
     // The start (high, low), the end, and a set of one number: the end.
-    bytes.extend(submessage(GAP, LITTLE_ENDIAN, [reader, writer], &[0, 1, 0, last, 1, 1 << 31]));
+    bytes.extend(submessage(GAP, LITTLE_ENDIAN, [reader, writer], &[0, first, 0, last, 1, 1 << 31]));
     bytes
 }
 
@@ -85,6 +90,6 @@ mod tests {
             0x08, 1, 32, 0, 0, 0, 22, 4, 0, 0, 21, 3, 0, 0, 0, 0, 1, 0, 0, 0,
             0, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 128,
         ];
-        assert_eq!(datagram(writer, reader, 7), expected);
+        assert_eq!(datagram(writer, reader, 1..=7), expected);
     }
 }

@@ -30,6 +30,9 @@ use bench_dragon_ros2_messages::settings::Ros2Settings;
 pub use control::mappings_of;
 use environment::{Network, Range, check_name};
 
+/// The most messages that a writer keeps for its subscribers, RustDDS's own limit.
+const UNACKNOWLEDGED_MESSAGES: u32 = 8192;
+
 /// The reason why there are no ROS 2 topics.
 #[derive(Debug, thiserror::Error)]
 pub enum Ros2Error {

@@ -28,7 +28,7 @@ use serde::Serialize;
 use super::acknowledgements::Acknowledgements;
 use super::matching::Matches;
 use super::relief::Relief;
-use super::{Ros2Config, Ros2Error};
+use super::{Ros2Config, Ros2Error, UNACKNOWLEDGED_MESSAGES};
 use bench_dragon_messages::{MOST_CUES, MOST_DRAGONS, MOST_OBSTACLES, QUEUE_BYTES, Stage};
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability, Topic};
 use bench_dragon_ros2_messages::{HasStamp, MessageType, Time};
@@ -37,8 +37,6 @@ use bench_dragon_ros2_messages::{HasStamp, MessageType, Time};
 const REFUSAL_PATIENCE: Duration = Duration::from_millis(500);
 /// The time in which RustDDS matches a new publisher with the subscribers that it knows.
 const MATCHING_TIME: Duration = Duration::from_millis(100);
-/// RustDDS's own limit.
-const UNACKNOWLEDGED_MESSAGES: f64 = 8192.0;
 /// An upper bound of a message's bytes besides its handles.
 pub(super) const HEADER_BYTES: usize = 200;
 /// An upper bound of an event-driven message's bytes; the largest is the stage.
@@ -333,7 +331,7 @@ pub(super) fn policies(qos: Qos, bytes: usize) -> QosPolicies {
         Durability::TransientLocal => policy::Durability::TransientLocal,
     };
     let depth = qos.depth as i32;
-    let affordable = (QUEUE_BYTES as f64 / bytes as f64).min(UNACKNOWLEDGED_MESSAGES);
+    let affordable = (QUEUE_BYTES / bytes).min(UNACKNOWLEDGED_MESSAGES as usize);
     let max_samples = (affordable as i32).max(depth);
     QosPolicyBuilder::new()
         .reliability(reliability)
