@@ -212,7 +212,7 @@ mod tests {
         #[test]
         fn neighbours_are_those_of_the_standard_library(x in proptest::num::f64::ANY) {
             if !x.is_finite() {
-                prop_assert!(!(below(x) < above(x)));
+                prop_assert!(x.is_nan() || below(x).is_nan() || above(x).is_nan());
                 return Ok(());
             }
             let (least, most) = (x.next_down(), x.next_up());
