@@ -4,9 +4,9 @@
 //! best-effort subscriber acknowledges nothing, a killed reliable one nothing until its lease ends, and both count
 //! (`Writer::remove_all_acked_changes_but_keep_depth`). RustDDS has no limit of time. So this file sends the writer, in
 //! our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2): of a best-effort subscriber for all messages, of
-//! a reliable one for those that are older than [`AGE`] and not among the last `depth`. The subscriber gets a GAP for
-//! these, should it still expect one. RustDDS ignores the ACKNACK if the subscriber has acknowledged more. Called by the
-//! volatile writers.
+//! a reliable one for those that are older than [`AGE`] and not among the last `depth`. A reliable subscriber gets a GAP
+//! for these messages. RustDDS ignores the ACKNACK if the subscriber has acknowledged more. Called by the volatile
+//! writers.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::{Ipv4Addr, SocketAddr};
@@ -21,8 +21,8 @@ use super::retransmission::{LITTLE_ENDIAN, addressed, send, submessage};
 const AGE: Duration = Duration::from_secs(2);
 /// The interval of the acknowledgements of a writer. RustDDS removes old messages every six seconds.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// The interval at which new subscribers are looked for.
-const NEW_INTERVAL: Duration = Duration::from_millis(50);
+/// The interval at which the subscribers are read.
+const READ_INTERVAL: Duration = Duration::from_millis(50);
 /// The kind of the submessage, and the flag that no heartbeat is requested.
 const ACKNACK: u8 = 0x06;
 const FINAL: u8 = 2;
@@ -38,9 +38,10 @@ pub(super) struct Acknowledgements {
     written: u64,
     /// Some of the last moments, the oldest first.
     moments: VecDeque<Moment>,
-    /// The subscribers of now, and the time of now.
+    /// The current subscribers.
     known: BTreeMap<GUID, Requests>,
-    looked: Option<Instant>,
+    /// The time at which they were read.
+    read_at: Option<Instant>,
     /// Datagrams that have been sent.
     sent: u32,
 }
@@ -72,10 +73,10 @@ impl Acknowledgements {
 
     /// Acknowledges what is due.
     pub(super) fn serve(&mut self, matches: &Matches, writer: GUID, now: Instant) {
-        if self.looked.is_some_and(|looked| now.duration_since(looked) < NEW_INTERVAL) {
+        if self.read_at.is_some_and(|read_at| now.duration_since(read_at) < READ_INTERVAL) {
             return;
         }
-        self.looked = Some(now);
+        self.read_at = Some(now);
         let before = std::mem::replace(&mut self.known, matches.subscribers(writer));
         let is_due = self.moments.back().is_none_or(|last| now.duration_since(last.at) >= INTERVAL);
         let (reliable, best_effort): (Vec<_>, Vec<_>) = self.known.iter().partition(|(_, requests)| requests.reliable);

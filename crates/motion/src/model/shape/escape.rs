@@ -17,8 +17,8 @@ use crate::model::board::Board;
 /// Depth within a hexagon, as a share of the board and the translation, up to which a point counts as outside.
 const ROUNDING: f64 = 1e-12;
 
-/// The greatest number of segments of an outline: of a line, two along each side and, where rounding joins corners, four
-/// round each corner.
+/// The greatest number of segments of an outline: of a line, two along each side and, where rounding joins corners,
+/// four round each corner.
 const MOST_SEGMENTS: usize = 6 * MOST_CORNERS;
 
 /// The places at which the rectangle meets a side.
@@ -98,8 +98,8 @@ impl Segment {
 /// The segments of which the outline of the places to avoid consists, those nearer to the origin than a free place.
 struct Outline {
     segments: ArrayVec<Segment, MOST_SEGMENTS>,
-    /// For each segment the squared distance from the origin to its nearest place that is not known to be covered, and its
-    /// number: a heap whose root is nearest (Cormen et al., Introduction to Algorithms, chapter 6).
+    /// For each segment the squared distance from the origin to its nearest place that is not known to be covered, and
+    /// its number: a heap whose root is nearest (Cormen et al., Introduction to Algorithms, chapter 6).
     heap: ArrayVec<(f64, u16), MOST_SEGMENTS>,
     /// The square of the distance of the free place.
     limit: f64,
