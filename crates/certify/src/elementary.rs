@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use super::interval::{Interval, above, below};
+use super::interval::Interval;
 
 /// Pi / 2 as a sum of three doubles of 26 bits each: their products with a whole number below 2^27 are exact.
 const HALF_PI: [f64; 3] = [1.5707963109016418, 1.5893254712295857e-8, 6.123233932053594e-17];
@@ -87,9 +87,9 @@ const fn reciprocals<const N: usize>(divisors: [f64; N]) -> [Interval; N] {
 /// 0 to 1. All partial sums are from 0 to 1, so that the ends of products are the products of ends.
 fn alternating(s: Interval, factors: &[Interval]) -> Interval {
     factors.iter().rev().fold(Interval::ONE, |sum, factor| {
-        let least = below(below(s.lo.max(0.0) * factor.lo) * sum.lo);
-        let most = above(above(s.hi * factor.hi) * sum.hi);
-        Interval { lo: below(1.0 - most).max(0.0), hi: above(1.0 - least) }
+        let least = ((s.lo.max(0.0) * factor.lo).next_down() * sum.lo).next_down();
+        let most = ((s.hi * factor.hi).next_up() * sum.hi).next_up();
+        Interval { lo: (1.0 - most).next_down().max(0.0), hi: (1.0 - least).next_up() }
     })
 }
 
