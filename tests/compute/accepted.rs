@@ -372,6 +372,15 @@ fn certificates_that_were_refused_are_accepted() {
     }
 }
 
+/// A search that halts on its way to a contact claims no more than before it: the head's rear handle cannot be enclosed
+/// between the contact and the lock, which are a nanometre apart.
+#[test]
+fn a_certificate_that_ends_on_the_way_to_a_contact_is_accepted() {
+    let text = std::fs::read_to_string("tests/scenes/halt_before_a_contact.toml").unwrap();
+    let results = certified(&text).unwrap();
+    assert_eq!(results[0], Status::Undecided, "{results:?}");
+}
+
 /// The turns of a piece whose length is given are known to more digits than a double has: rounded, they end this spiral
 /// eleven units of the last place beyond its end.
 #[test]

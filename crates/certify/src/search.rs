@@ -484,7 +484,10 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         self.clear = false;
         let found = self.beyond(event, |search, point| search.touch(event, &mut point.clone(), point));
         let status = if let Some((point, (spans, common))) = found {
-            self.go_to_point(&point, None, progress)?;
+            if let Err(halt) = self.go_to_point(&point, None, progress) {
+                self.proofs[EventKind::Contact as usize] = self.undecided(earliest, &halt);
+                return Err(halt);
+            }
             let head = point.head;
             let line = CertificateLine::Contact { benches: benches(event), from: head, to: head, spans, point: common };
             (self.write)(&line)?;
@@ -495,6 +498,13 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         };
         self.proofs[EventKind::Contact as usize] = Some(status);
         Ok(())
+    }
+
+    /// Returns the status of an event for which the search halts on its way from `earliest` to it: the steps of that
+    /// way claim nothing of the event.
+    fn undecided(&self, earliest: Place, halt: &Halt) -> Option<Status> {
+        let Halt::Stuck(because) = halt else { return None };
+        Some(Status::Undecided { time_lo: self.time(earliest).lo, because: because.clone() })
     }
 
     /// Returns the number of an event's obstacle on the stage.
@@ -535,7 +545,10 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let bench = event.bench_a.unwrap_or(0) as usize;
         let found = self.beyond(event, |search, point| search.reach(event, &mut point.clone(), point));
         let status = if let Some((reached, (spans, point))) = found {
-            self.go_to_point(&reached, None, progress)?;
+            if let Err(halt) = self.go_to_point(&reached, None, progress) {
+                self.of_obstacles[obstacle] = self.undecided(earliest, &halt);
+                return Err(halt);
+            }
             let head = reached.head;
             (self.write)(&CertificateLine::Reached { obstacle, bench, from: head, to: head, spans, point })?;
             self.proved(event.kind, earliest, head, [event.bench_a, None])
@@ -563,7 +576,10 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             stalled.then(|| handles[1..].iter().map(|handle| handle.span).collect())
         });
         let status = if let Some((point, spans)) = found {
-            self.go_to_point(&point, None, progress)?;
+            if let Err(halt) = self.go_to_point(&point, None, progress) {
+                self.proofs[EventKind::Stall as usize] = self.undecided(earliest, &halt);
+                return Err(halt);
+            }
             (self.write)(&CertificateLine::Stall { link, from: point.head, to: point.head, spans })?;
             self.proved(event.kind, earliest, point.head, [event.bench_a, None])
         } else {
