@@ -158,8 +158,20 @@ fn a_wide_enclosure_has_a_reason() {
 fn every_scene_of_the_repository_agrees() {
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
     // The search gives up, and reports that: handles at distances that no double can tell from the link's, paths of
-    // 1e10 metres, boards that stay a fraction of a millimetre apart for a kilometre.
-    let given_up = ["bigspeed", "hang_uturn", "midspeed", "plan_pitch_wrong", "ut2", "ut3", "x2", "x4", "x5"];
+    // 1e10 metres, boards that stay a fraction of a millimetre apart for a kilometre, a contact so near a lock that the
+    // rear handle cannot be enclosed between them.
+    let given_up = [
+        "bigspeed",
+        "halt_before_a_contact",
+        "hang_uturn",
+        "midspeed",
+        "plan_pitch_wrong",
+        "ut2",
+        "ut3",
+        "x2",
+        "x4",
+        "x5",
+    ];
     let mut decided = 0;
     for folder in ["config", "tests/scenes"] {
         for entry in std::fs::read_dir(folder).unwrap() {
