@@ -1,7 +1,7 @@
 //! Lemmas 2, 3 and 5 of `docs/proofs.md`: boards that are apart over a step, and boards that have a point in common.
 
 use super::capsule::{Capsule, Frame};
-use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared, plus};
+use super::interval::{Interval, Vector, cross, dot, minus, norm, plus};
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::closest_points_board_board;
@@ -26,8 +26,9 @@ pub(super) struct MovingBoard {
     /// A point near the middle, in doubles. The disc of `radius` metres about it holds the board at every moment.
     centre: [f64; 2],
     radius: f64,
-    /// Unit direction, approximate.
+    /// Unit direction, and half the length in metres, both approximate.
     direction: [f64; 2],
+    half_length: f64,
 }
 
 impl Shape {
@@ -39,16 +40,18 @@ impl Shape {
         let middle = [0, 1].map(|axis| (front.point[axis] + rear.point[axis]) * 0.5);
         let centre = middle.map(Interval::middle);
         let along = minus(front.point, rear.point).map(Interval::middle);
-        let length = along[0].hypot(along[1]);
+        let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
         let share = self.inset.over(link);
         // "Discs" in Lemma 2: half as much again as both handles move.
         let slack = [front, rear]
             .iter()
             .fold(Interval::ZERO, |sum, capsule| sum + Interval::point(capsule.half) + Interval::point(capsule.radius));
-        let off = norm([middle[0] - Interval::point(centre[0]), middle[1] - Interval::point(centre[1])]);
+        let [x, y] = [0, 1].map(|axis| (middle[axis] - Interval::point(centre[axis])).magnitude());
+        let off = Interval::point(x) + Interval::point(y);
         let radius = (link * 0.5 + self.inset + self.half_width + slack * 1.5 + off).hi;
         let direction = along.map(|part| part / length);
-        MovingBoard { front, rear, link, share, half_width: self.half_width, centre, radius, direction }
+        let half_length = (link * 0.5 + self.inset).middle();
+        MovingBoard { front, rear, link, share, half_width: self.half_width, centre, radius, direction, half_length }
     }
 
     /// Returns the greatest distance from the origin of a point of the board.
@@ -75,10 +78,10 @@ impl Shape {
 impl MovingBoard {
     /// Returns true if the circles about two boards prove a distance of more than `metres`, which is at least 0.
     pub fn is_further_than(&self, metres: f64, other: &Self) -> bool {
-        let between = [0, 1].map(|axis| Interval::point(self.centre[axis]) - Interval::point(other.centre[axis]));
-        let apart = norm_squared(between);
-        let reach = Interval::point(self.radius) + Interval::point(other.radius) + Interval::point(metres);
-        reach.square().is_below(apart)
+        let [x, y] = [0, 1].map(|axis| self.centre[axis] - other.centre[axis]);
+        let reach = self.radius + other.radius + metres;
+        // At most six roundings in a row, each by less than 2^-52 of its result.
+        reach * reach * (1.0 + 16.0 * f64::EPSILON) < x * x + y * y
     }
 
     /// Returns true if two boards are proved to be apart.
@@ -92,11 +95,26 @@ impl MovingBoard {
         if self.is_further_than(metres.max(0.0), other) {
             return true;
         }
-        let between = [self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]];
+        let [x, y] = [0, 1].map(|axis| other.centre[axis] - self.centre[axis]);
+        let distance = (x * x + y * y).sqrt();
         let normal = |[x, y]: [f64; 2]| [-y, x];
-        let axes = [between, normal(self.direction), normal(other.direction), self.direction, other.direction];
+        let axes = [[x / distance, y / distance], normal(self.direction), normal(other.direction)];
+        let mut axes = [axes[0], axes[1], axes[2], self.direction, other.direction].map(|axis| {
+            let apart = (axis[0] * x + axis[1] * y).abs() - self.extent(axis) - other.extent(axis);
+            (axis, apart)
+        });
+        // Handles that move take away from that distance, and from each alike: only the greatest promise anything.
+        axes.sort_unstable_by(|one, other| other.1.total_cmp(&one.1));
         let is_separated = |axis: [f64; 2]| self.is_separated(metres, other, axis.map(Interval::point));
-        axes.into_iter().any(is_separated) || metres > 0.0 && is_separated(self.towards(other))
+        axes.into_iter().filter(|(_, apart)| *apart > metres).any(|(axis, _)| is_separated(axis))
+            || metres > 0.0 && is_separated(self.towards(other))
+    }
+
+    /// Returns about half the extent of the board along a unit vector, metres.
+    fn extent(&self, [x, y]: [f64; 2]) -> f64 {
+        let [along, across] =
+            [x * self.direction[0] + y * self.direction[1], x * self.direction[1] - y * self.direction[0]];
+        self.half_length * along.abs() + self.half_width.hi * across.abs()
     }
 
     /// Returns the disc that holds the board at every moment of the step: its middle and its radius.

@@ -21,46 +21,85 @@ pub(super) fn pi() -> Interval {
 
 /// Returns sine and cosine of a double.
 ///
-/// x = k pi / 2 + y with |y| <= 0.79, and y is a kept angle and a rest, whose sines and cosines are summed.
+/// x = q pi / 2 + y with |y| <= 0.79, y = k / 128 + z with |z| <= 0.0040, and with the kept s and c of k / 128
+///
+/// sin y = s + (c sin z - s (1 - cos z)),   cos y = c - (s sin z + c (1 - cos z)).
+///
+/// The brackets are below 0.0041, so that they are computed in doubles. Every operation is off by at most u = 2^-52 of
+/// its result, in any rounding mode.
 pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     if x.is_nan() || x.abs() > GREATEST_ARGUMENT {
         let any = Interval::within(1.0);
         return (any, any);
     }
-    let turns = (x / std::f64::consts::FRAC_PI_2).round();
-    let [high, middle, low] = HALF_PI.map(|part| Interval::point(part * turns));
-    let rest = Interval::point(turns) * Interval { lo: 0.0, hi: HALF_PI_REST };
-    let y = Interval::point(x) - high - middle - low - rest;
-    // y = k / 32 + z with |z| <= 0.016: the series of z end with z^9 and z^10, with remainders below 1e-22.
-    let k = (y.middle() * PER_RADIAN).round();
-    let (kept_sine, kept_cosine) = NEAR[k.abs() as usize];
-    let kept_sine = if k < 0.0 { -kept_sine } else { kept_sine };
-    let z = y - Interval::point(k / PER_RADIAN);
-    let square = z.square();
-    let sine = z * (alternating(square, &ODD[..4]) + Interval::within(1e-22));
-    let cosine = alternating(square, &EVEN[..5]) + Interval::within(1e-22);
-    let (sine, cosine) = (kept_sine * cosine + kept_cosine * sine, kept_cosine * cosine - kept_sine * sine);
-    let within = |value: Interval| Interval { lo: value.lo.max(-1.0), hi: value.hi.min(1.0) };
-    let (sine, cosine) = (within(sine), within(cosine));
+    let quarters = rounded(x * std::f64::consts::FRAC_2_PI);
+    let [high, middle, low] = HALF_PI.map(|part| part * quarters);
+    // No error: both are within a factor of 2 of each other (Sterbenz), or `high` is 0.
+    let first = x - high;
+    let rest = middle + low;
+    // y = about + lost, by Knuth's two-sum.
+    let about = first - rest;
+    let back = about - first;
+    let lost = (first - (about - back)) - (rest + back);
+    let k = rounded(about * PER_RADIAN);
+    let z = (about - k / PER_RADIAN) + lost;
+    let Kept { sine, cosine, error } = NEAR[k.abs() as usize];
+    let sine = sine.copysign(k);
+    let square = z * z;
+    // The remainders are below z 2^-70 and 2^-80.
+    let sine_of_rest = z - z * square * (1.0 / 6.0 - square * (1.0 / 120.0));
+    let versine_of_rest = square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)));
+    // In units of u z: 2 from z, 1 from its sine, 1 from the product with it, 1 from the bracket's sum, and less than 1
+    // from all that has the factor z or u. In units of u: `rest` from its sum. `lost`, below u, is off by u^2, and
+    // q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
+    let error = error + f64::EPSILON * (6.0 * z.abs() + rest.abs()) + 7e-25 * quarters.abs();
+    let around = |kept: f64, bracket: f64| {
+        let sum = kept + bracket;
+        // One place for each of the sums; 1.02 is for the rounding of the error, and for the brackets' kept numbers.
+        let (lo, hi) = (sum.next_down() - 1.02 * error, sum.next_up() + 1.02 * error);
+        Interval { lo: lo.next_down().max(-1.0), hi: hi.next_up().min(1.0) }
+    };
+    let sine_of_y = around(sine, cosine * sine_of_rest - sine * versine_of_rest);
+    let cosine_of_y = around(cosine, -(sine * sine_of_rest + cosine * versine_of_rest));
     // A whole number below 2^27 is exact in both types.
-    match (turns as i64).rem_euclid(4) {
-        0 => (sine, cosine),
-        1 => (cosine, -sine),
-        2 => (-sine, -cosine),
-        _ => (-cosine, sine),
+    match (quarters as i64).rem_euclid(4) {
+        0 => (sine_of_y, cosine_of_y),
+        1 => (cosine_of_y, -sine_of_y),
+        2 => (-sine_of_y, -cosine_of_y),
+        _ => (-cosine_of_y, sine_of_y),
     }
 }
 
-/// Number of angles in a radian whose sine and cosine are kept.
-const PER_RADIAN: f64 = 32.0;
+/// Returns a whole number within 0.5 of a number below 2^52, and a little more in case of rounding.
+fn rounded(x: f64) -> f64 {
+    ((x.abs() + 0.5) as i64 as f64).copysign(x)
+}
 
-/// Sine and cosine of k / [`PER_RADIAN`] for k from 0 to 26. Their series end with y^19 and y^20. Terms alternate and
-/// fall, so the remainder is below the next term, 0.82^21 / 21! < 4e-22.
-static NEAR: LazyLock<[(Interval, Interval); 27]> = LazyLock::new(|| {
+/// Number of angles in a radian whose sine and cosine are kept.
+const PER_RADIAN: f64 = 128.0;
+
+/// Sine and cosine of an angle, both off by at most `error`.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    sine: f64,
+    cosine: f64,
+    error: f64,
+}
+
+/// Sine and cosine of k / [`PER_RADIAN`] for k from 0 to 101. Their series end with y^19 and y^20. Terms alternate and
+/// fall, so the remainder is below the next term, 0.8^21 / 21! < 2e-22.
+static NEAR: LazyLock<[Kept; 102]> = LazyLock::new(|| {
     std::array::from_fn(|k| {
+        if k == 0 {
+            return Kept { sine: 0.0, cosine: 1.0, error: 0.0 };
+        }
         let y = Interval::point(k as f64 / PER_RADIAN);
-        let (square, remainder) = (y.square(), Interval::within(4e-22));
-        (y * (alternating(square, &ODD) + remainder), alternating(square, &EVEN) + remainder)
+        let (square, remainder) = (y.square(), Interval::within(2e-22));
+        let sine = y * (alternating(square, &ODD) + remainder);
+        let cosine = alternating(square, &EVEN) + remainder;
+        let error = (sine - Interval::point(sine.middle())).magnitude();
+        let error = error.max((cosine - Interval::point(cosine.middle())).magnitude());
+        Kept { sine: sine.middle(), cosine: cosine.middle(), error }
     })
 });
 

@@ -1,5 +1,7 @@
 //! One step of the head: the spans of the handles, and the lemmas over them.
 
+use std::cell::OnceCell;
+
 use super::boards::{MovingBoard, Shape};
 use super::capsule::{Span, Spanned, moved_back};
 use super::grid::{GridPoint, span};
@@ -178,6 +180,13 @@ pub(super) struct Listed<'c, 'a> {
     slack: f64,
     /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
+    /// Upper bound of the distance from the centre of boards 0 and 1, once requested.
+    front_reach: OnceCell<f64>,
+}
+
+/// Returns an upper bound of a distance that is `metres` more than another.
+pub(super) fn within(metres: f64, distance: f64) -> f64 {
+    (Interval::point(distance) + Interval::point(metres)).hi
 }
 
 impl<'c, 'a> Listed<'c, 'a> {
@@ -192,7 +201,16 @@ impl<'c, 'a> Listed<'c, 'a> {
     pub fn behind(chain: &'c Chain<'a>, handles: Vec<Spanned>, metres: f64) -> Self {
         let is_fine = metres < NEXT_TO_EVENT * chain.team.shortest_link();
         let multiples = if is_fine { &FINE[..] } else { &COARSE };
-        Self { chain, handles, pad: 0.0, multiples, too_small: 0, slack: 0.0, body_forward: true }
+        Self {
+            chain,
+            handles,
+            pad: 0.0,
+            multiples,
+            too_small: 0,
+            slack: 0.0,
+            body_forward: true,
+            front_reach: OnceCell::new(),
+        }
     }
 
     /// Adds metres to the pad of every handle that is still to be enclosed.
@@ -221,15 +239,18 @@ impl<'c, 'a> Listed<'c, 'a> {
         }
     }
 
-    fn ring_holds(&self, board: usize, from_handle: usize) -> bool {
-        self.is_beyond(0.0, &self.chain.board(&self.handles, board), from_handle)
+    /// Returns a lower bound of the distance from the centre of all boards from a handle on; minus infinity if unknown.
+    pub fn innermost(&self, from_handle: usize) -> f64 {
+        self.chain.shape.innermost(self.ring(from_handle), self.chain.links[1])
     }
 
-    /// Returns true if all boards from `from_handle` on are further than `metres` from a board further in.
-    pub fn is_beyond(&self, metres: f64, inner: &MovingBoard, from_handle: usize) -> bool {
-        let Chain { shape, links, .. } = self.chain;
-        shape.innermost(self.ring(from_handle), links[1])
-            > (Interval::point(shape.outermost(inner)) + Interval::point(metres)).hi
+    /// Returns true if boards 0 and 1 are further than `metres` from all boards from a handle on.
+    pub fn is_beyond_front(&self, metres: f64, from_handle: usize) -> bool {
+        let reach = self.front_reach.get_or_init(|| {
+            let of_bench = |bench| self.chain.shape.outermost(&self.chain.board(&self.handles, bench));
+            f64::max(of_bench(0), of_bench(1))
+        });
+        self.innermost(from_handle) > within(metres, *reach)
     }
 
     /// Returns true if the listed handles suffice for the claim.
@@ -241,7 +262,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         match claim.links {
             Links::Front if !claim.clear => true,
             Links::Front if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) => {
-                self.ring_holds(0, last) && self.ring_holds(1, last)
+                self.is_beyond_front(0.0, last)
             }
             _ => self.is_on_line(last),
         }
@@ -301,11 +322,12 @@ impl<'c, 'a> Listed<'c, 'a> {
         let boards: Vec<_> = (0..listed).map(|bench| chain.board(&self.handles, bench)).collect();
         let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
         let firsts = if links == Links::All { listed } else { listed.min(2) };
+        let innermost: Vec<f64> = (0..=listed).map(|handle| self.innermost(handle)).collect();
         for (a, board) in boards[..firsts].iter().enumerate() {
             let outermost = chain.shape.outermost(board);
             let mut beyond = false;
             for (b, other) in boards.iter().enumerate().skip(a + 2) {
-                beyond = is_spiral && chain.shape.innermost(self.ring(b), chain.links[1]) > outermost;
+                beyond = innermost[b] > outermost;
                 if beyond {
                     break;
                 }
@@ -317,7 +339,7 @@ impl<'c, 'a> Listed<'c, 'a> {
             let next = listed.max(a + 2);
             if next < benches && !beyond {
                 let apart = if is_spiral {
-                    chain.shape.innermost(self.ring(listed), chain.links[1]) > outermost
+                    innermost[listed] > outermost
                 } else {
                     board.is_apart_from(&self.straight_run(next))
                 };

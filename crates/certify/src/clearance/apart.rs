@@ -8,7 +8,7 @@ use crate::first_order_step::FirstOrderStep;
 use crate::grid::GridPoint;
 use crate::lines::Links;
 use crate::path::Curve;
-use crate::step::{Claim, Listed};
+use crate::step::{Claim, Listed, within};
 use bench_dragon_motion::event::Event;
 
 impl Descent<'_, '_> {
@@ -60,9 +60,9 @@ impl Descent<'_, '_> {
         let chain = &self.chain;
         match links {
             Links::Front if !self.looks_at_boards() => true,
-            Links::Front if matches!(chain.exact.segments[0].curve, Curve::Inward { .. }) => [0, 1]
-                .iter()
-                .all(|bench| listed.is_beyond(self.threshold().max(0.0), &chain.board(&listed.handles, *bench), last)),
+            Links::Front if matches!(chain.exact.segments[0].curve, Curve::Inward { .. }) => {
+                listed.is_beyond_front(self.threshold().max(0.0), last)
+            }
             _ => listed.is_on_line(last),
         }
     }
@@ -87,10 +87,12 @@ impl Descent<'_, '_> {
             Some(first_order) => first_order.are_apart([a, b], threshold),
             None => boards[a].is_apart_by(threshold, &boards[b]),
         };
+        let innermost: Vec<f64> = (0..count).map(|handle| listed.innermost(handle)).collect();
         for (a, board) in boards[..firsts].iter().enumerate() {
+            let outermost = within(far, chain.shape.outermost(board));
             let mut beyond = false;
             for (b, other) in boards.iter().enumerate().skip(a + 2) {
-                beyond = is_spiral && listed.is_beyond(far, board, b);
+                beyond = innermost[b] > outermost;
                 if beyond {
                     break;
                 }
@@ -120,7 +122,8 @@ impl Descent<'_, '_> {
     ) -> bool {
         let threshold = self.threshold();
         if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) {
-            return listed.is_beyond(threshold.max(0.0), board, listed.handles.len() - 1);
+            let outermost = within(threshold.max(0.0), self.chain.shape.outermost(board));
+            return listed.innermost(listed.handles.len() - 1) > outermost;
         }
         board.is_further_than(threshold.max(0.0), &listed.straight_run(next))
             || match first_order {

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use std::io;
 
 use super::PlanError;
-use super::trial::{Nearest, Obstacle, deepest, free_from, obstacle};
+use super::trial::{Nearest, Obstacle, Proposal, deepest, free_from, obstacle};
 use crate::capsule::Span;
 use crate::clearance::Write;
 use crate::lines::{About, CertificateLine, CertifiedPitch};
@@ -121,7 +121,7 @@ fn written(found: &LeastPitch, proof: Proof, radius: f64, scene: &str, write: Wr
 }
 
 /// A function that proposes the least pitch between two with which the radius might be reached.
-type Propose<'p> = &'p mut dyn FnMut(f64, f64, &mut dyn FnMut(f64)) -> Option<f64>;
+type Propose<'p> = &'p mut dyn FnMut(f64, f64, &mut dyn FnMut(f64)) -> Proposal;
 
 /// Encloses the least pitch with any proposals. Wrong proposals only cost time. `keeps` requests the lines of the
 /// intervals.
@@ -149,6 +149,7 @@ fn decided(
         deepest: None,
         shown: None,
         shallow: SHALLOW,
+        proposal: Proposal::default(),
         intervals: 0,
         lines: keeps.then(Vec::new),
     };
@@ -157,7 +158,8 @@ fn decided(
     let mut next = from;
     for _ in 0..MOST_PROPOSALS {
         // The more turns fit into the radius, the longer the way.
-        let proposed = propose(next, greatest, &mut |pitch| progress(0.3 * (1.0 - (-0.3 * pitch / from).exp())));
+        let proposal = propose(next, greatest, &mut |pitch| progress(0.3 * (1.0 - (-0.3 * pitch / from).exp())));
+        let proposed = proposal.pitch;
         if proposed == Some(from) && reaches(from, progress).is_some() {
             return Err(PlanError(format!(
                 "the team reaches {radius} m with a pitch of {from} m already, the least that is tested: it is too \
@@ -165,6 +167,7 @@ fn decided(
             )));
         }
         let target = proposed.map_or(greatest, |pitch| pitch - BESIDE);
+        blocked.proposal = proposal;
         blocked.extend_to(target, &mut |share| progress(0.3 + 0.5 * share));
         let done = blocked.pitch >= target;
         if done && proposed.is_none() {
@@ -217,6 +220,8 @@ struct Blocked<'a> {
     shown: Option<Overlap>,
     /// Share of its first depth below which the overlap is shallow.
     shallow: f64,
+    /// The proposal for the pitches from here on.
+    proposal: Proposal,
     intervals: u64,
     /// A line for each interval, if they are kept.
     lines: Option<Vec<CertificateLine<'static>>>,
@@ -286,23 +291,26 @@ impl Blocked<'_> {
     }
 
     /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds
-    /// other boards or a lock. Returns true if it finds any.
+    /// other boards or a lock, unless these two overlap up to the proposed pitch. Returns true if it finds any.
     fn follow(&mut self) -> bool {
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest
             && !self.locks
         {
             // As the pitch grows, the head meets a board a little further back.
             let (a, b) = pair;
+            let stays = matches!(self.proposal.last, Some(Obstacle::Touch { pair, .. }) if pair == (a, b));
+            let shallow = if stays { 0.0 } else { self.shallow };
             for pairs in [&[pair][..], &[(a, b + 1), (a, b + 2), (a, b.saturating_sub(1).max(a + 2))]] {
                 let nearest = deepest(self.team, self.pitch, self.radius, pairs, head_radius);
-                if nearest.clearance < -self.shallow * depth {
+                if nearest.clearance < -shallow * depth {
                     let depth = if nearest.pair == pair { depth } else { -nearest.clearance };
                     self.deepest = Some(Deepest { pair: nearest.pair, depth, head_radius: nearest.head_radius });
                     return true;
                 }
             }
         }
-        let found = obstacle(self.team, self.pitch, self.radius);
+        let first = self.proposal.first.filter(|_| self.intervals == 0);
+        let found = first.or_else(|| obstacle(self.team, self.pitch, self.radius));
         self.locks = matches!(found, Some(Obstacle::Lock));
         let Some(Obstacle::Touch { pair, head_radius }) = found else { return self.locks };
         let Nearest { clearance, head_radius, .. } = deepest(self.team, self.pitch, self.radius, &[pair], head_radius);

@@ -45,28 +45,37 @@ pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64) -> Option<Obstacle>
     })
 }
 
-/// Returns the least pitch between two with which the search finds no obstacle; `None` if there is none.
+/// The least pitch that the search proposes, and obstacles of lesser pitches.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Proposal {
+    /// The least pitch of the range with which the search finds no obstacle, metres per turn; `None` if there is none.
+    pub pitch: Option<f64>,
+    /// The obstacle of the least pitch of the range.
+    pub first: Option<Obstacle>,
+    /// The obstacle that ends at `pitch`.
+    pub last: Option<Obstacle>,
+}
+
+/// Returns the least pitch between two with which the search finds no obstacle.
 ///
 /// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. The pitch
 /// grows in steps of half a percent. So a pitch is missed if the two boards come free and meet again within one step.
 /// `progress` receives each pitch.
-pub(super) fn free_from(
-    team: &Team,
-    (from, to): (f64, f64),
-    radius: f64,
-    progress: &mut dyn FnMut(f64),
-) -> Option<f64> {
-    let mut pitch = from;
-    while let Some(obstacle) = obstacle(team, pitch, radius) {
-        let free = |pitch: f64| !obstacle.blocks(team, pitch, radius);
-        while !free(pitch * GROWTH) {
-            pitch *= GROWTH;
+pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progress: &mut dyn FnMut(f64)) -> Proposal {
+    let (mut pitch, mut proposal) = (from, Proposal::default());
+    while let Some(mut found) = obstacle(team, pitch, radius) {
+        proposal.first.get_or_insert(found);
+        while let Some(next) = found.at_pitch(team, pitch * GROWTH, radius) {
+            (found, pitch) = (next, pitch * GROWTH);
             if pitch > to {
-                return None;
+                return proposal;
             }
         }
-        let free_at = match obstacle {
-            Obstacle::Lock => bisect_predicate(free, pitch, pitch * GROWTH),
+        proposal.last = Some(found);
+        let free_at = match found {
+            Obstacle::Lock => {
+                bisect_predicate(|pitch| found.at_pitch(team, pitch, radius).is_none(), pitch, pitch * GROWTH)
+            }
             Obstacle::Touch { pair, head_radius } => {
                 let clearance = |pitch: f64| deepest(team, pitch, radius, &[pair], head_radius).clearance;
                 sign_change(clearance, pitch, pitch * GROWTH)
@@ -76,7 +85,7 @@ pub(super) fn free_from(
         pitch = free_at * (1.0 + 1e-13);
         progress(pitch);
     }
-    (pitch <= to).then_some(pitch)
+    Proposal { pitch: (pitch <= to).then_some(pitch), ..proposal }
 }
 
 /// Returns the place within `low..=high` where a function becomes positive, to the last bits: the least place known to
@@ -107,11 +116,14 @@ fn sign_change(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f6
 }
 
 impl Obstacle {
-    /// Returns true if an obstacle of another pitch is an obstacle of this pitch too.
-    fn blocks(&self, team: &Team, pitch: f64, radius: f64) -> bool {
-        match *self {
-            Self::Lock => Trial::near(team, pitch, radius).locks(),
-            Self::Touch { pair, head_radius } => deepest(team, pitch, radius, &[pair], head_radius).clearance <= 0.0,
+    /// Returns the obstacle near the same place at another pitch, if there still is one.
+    fn at_pitch(self, team: &Team, pitch: f64, radius: f64) -> Option<Self> {
+        match self {
+            Self::Lock => Trial::near(team, pitch, radius).locks().then_some(self),
+            Self::Touch { pair, head_radius } => {
+                let Nearest { clearance, head_radius, .. } = deepest(team, pitch, radius, &[pair], head_radius);
+                (clearance <= 0.0).then_some(Self::Touch { pair, head_radius })
+            }
         }
     }
 }

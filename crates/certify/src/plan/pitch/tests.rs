@@ -1,6 +1,6 @@
 //! The least pitch with wrong proposals.
 
-use super::{LeastPitch, decided, least_pitch};
+use super::{LeastPitch, Proposal, decided, least_pitch};
 use bench_dragon_motion::model::team::Team;
 
 const TEAM: Team = Team { benches: 20, head_length: 0.52, body_length: 0.57, width: 0.054, hole_inset: 0.135 };
@@ -9,7 +9,8 @@ const RADIUS: f64 = 0.18;
 /// Returns the result for a sequence of proposals, followed by none.
 fn with_proposals(proposals: &[f64]) -> LeastPitch {
     let mut proposals = proposals.iter().copied();
-    decided(&TEAM, RADIUS, &mut |_, _, _| proposals.next(), false, &mut |_| ()).unwrap().0
+    let mut propose = |_, _, _: &mut dyn FnMut(f64)| Proposal { pitch: proposals.next(), ..Proposal::default() };
+    decided(&TEAM, RADIUS, &mut propose, false, &mut |_| ()).unwrap().0
 }
 
 #[test]
