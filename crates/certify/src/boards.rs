@@ -80,7 +80,7 @@ impl MovingBoard {
     pub fn is_further_than(&self, metres: f64, other: &Self) -> bool {
         let [x, y] = [0, 1].map(|axis| self.centre[axis] - other.centre[axis]);
         let reach = self.radius + other.radius + metres;
-        // At most six roundings in a row, each by less than 2^-52 of its result.
+        // At most ten roundings, each by at most 2^-52 of its result: `reach` is no subnormal number.
         reach * reach * (1.0 + 16.0 * f64::EPSILON) < x * x + y * y
     }
 
@@ -103,7 +103,7 @@ impl MovingBoard {
             let apart = (axis[0] * x + axis[1] * y).abs() - self.extent(axis) - other.extent(axis);
             (axis, apart)
         });
-        // Handles that move take away from that distance, and from each alike: only the greatest promise anything.
+        // A direction that does not part the boards at rest parts no moving ones. The greatest distance is tried first.
         axes.sort_unstable_by(|one, other| other.1.total_cmp(&one.1));
         let is_separated = |axis: [f64; 2]| self.is_separated(metres, other, axis.map(Interval::point));
         axes.into_iter().filter(|(_, apart)| *apart > metres).any(|(axis, _)| is_separated(axis))

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use super::interval::Interval;
 
-/// Pi / 2 as a sum of three doubles of 26 bits each: their products with a whole number below 2^27 are exact.
+/// Pi / 2 as a sum of three doubles of at most 26 bits each: their products with a whole number below 2^27 are exact.
 const HALF_PI: [f64; 3] = [1.5707963109016418, 1.5893254712295857e-8, 6.123233932053594e-17];
 
 /// Upper bound of pi / 2 minus the sum of [`HALF_PI`].
@@ -26,7 +26,7 @@ pub(super) fn pi() -> Interval {
 /// sin y = s + (c sin z - s (1 - cos z)),   cos y = c - (s sin z + c (1 - cos z)).
 ///
 /// The brackets are below 0.0041, so that they are computed in doubles. Every operation is off by at most u = 2^-52 of
-/// its result, in any rounding mode.
+/// its result, in any rounding mode; errors by underflow are below the last places that are added at the end.
 pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     if x.is_nan() || x.abs() > GREATEST_ARGUMENT {
         let any = Interval::within(1.0);
@@ -34,7 +34,8 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     }
     let quarters = rounded(x * std::f64::consts::FRAC_2_PI);
     let [high, middle, low] = HALF_PI.map(|part| part * quarters);
-    // No error: both are within a factor of 2 of each other (Sterbenz), or `high` is 0.
+    // No error: `high` is 0, or both are within a factor of 2 of each other (Sterbenz), since q = 1 begins at x = pi / 4,
+    // just above `high` / 2.
     let first = x - high;
     let rest = middle + low;
     // y = about + lost, by Knuth's two-sum.
@@ -46,12 +47,12 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     let Kept { sine, cosine, error } = NEAR[k.abs() as usize];
     let sine = sine.copysign(k);
     let square = z * z;
-    // The remainders are below z 2^-70 and 2^-80.
+    // The remainders are below z 2^-60 and 2^-79.
     let sine_of_rest = z - z * square * (1.0 / 6.0 - square * (1.0 / 120.0));
     let versine_of_rest = square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)));
     // In units of u z: 2 from z, 1 from its sine, 1 from the product with it, 1 from the bracket's sum, and less than 1
-    // from all that has the factor z or u. In units of u: `rest` from its sum. `lost`, below u, is off by u^2, and
-    // q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
+    // from the remainders and all that has the factor z or u. In units of u: `rest` from its sum. `lost`, below u, is off
+    // by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
     let error = error + f64::EPSILON * (6.0 * z.abs() + rest.abs()) + 7e-25 * quarters.abs();
     let around = |kept: f64, bracket: f64| {
         let sum = kept + bracket;
@@ -87,7 +88,7 @@ struct Kept {
 }
 
 /// Sine and cosine of k / [`PER_RADIAN`] for k from 0 to 101. Their series end with y^19 and y^20. Terms alternate and
-/// fall, so the remainder is below the next term, 0.8^21 / 21! < 2e-22.
+/// fall, so the remainders are below the next terms, for the sine's factor (101 / 128)^20 / 21! < 2e-22.
 static NEAR: LazyLock<[Kept; 102]> = LazyLock::new(|| {
     std::array::from_fn(|k| {
         if k == 0 {

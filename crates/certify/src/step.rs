@@ -180,13 +180,13 @@ pub(super) struct Listed<'c, 'a> {
     slack: f64,
     /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
-    /// Upper bound of the distance from the centre of boards 0 and 1, once requested.
+    /// Upper bound of the distance from the centre of boards 0 and 1, once requested. Listed handles do not change.
     front_reach: OnceCell<f64>,
 }
 
-/// Returns an upper bound of a distance that is `metres` more than another.
-pub(super) fn within(metres: f64, distance: f64) -> f64 {
-    (Interval::point(distance) + Interval::point(metres)).hi
+/// Returns an upper bound of the sum of two numbers.
+pub(super) fn sum_above(one: f64, other: f64) -> f64 {
+    (Interval::point(one) + Interval::point(other)).hi
 }
 
 impl<'c, 'a> Listed<'c, 'a> {
@@ -239,18 +239,20 @@ impl<'c, 'a> Listed<'c, 'a> {
         }
     }
 
-    /// Returns a lower bound of the distance from the centre of all boards from a handle on; minus infinity if unknown.
+    /// Returns a lower bound of the distance from the centre of all boards from a handle on, which is not the head's;
+    /// minus infinity if unknown.
     pub fn innermost(&self, from_handle: usize) -> f64 {
         self.chain.shape.innermost(self.ring(from_handle), self.chain.links[1])
     }
 
-    /// Returns true if boards 0 and 1 are further than `metres` from all boards from a handle on.
+    /// Returns true if boards 0 and 1, whose handles are listed, are further than `metres` from all boards from a handle
+    /// on.
     pub fn is_beyond_front(&self, metres: f64, from_handle: usize) -> bool {
         let reach = self.front_reach.get_or_init(|| {
             let of_bench = |bench| self.chain.shape.outermost(&self.chain.board(&self.handles, bench));
             f64::max(of_bench(0), of_bench(1))
         });
-        self.innermost(from_handle) > within(metres, *reach)
+        self.innermost(from_handle) > sum_above(*reach, metres)
     }
 
     /// Returns true if the listed handles suffice for the claim.

@@ -99,7 +99,18 @@ fn elementary_functions_hold_what_192_bits_find() {
     let unit = |random: &mut Random| (random.bits() >> 11) as f64 / (1u64 << 53) as f64;
     for _ in 0..20_000 {
         let size = 2f64.powi((random.bits() % 40) as i32 - 12);
-        let angle = (2.0 * unit(&mut random) - 1.0) * size;
+        let sign = 2.0 * unit(&mut random) - 1.0;
+        let whole = (unit(&mut random) * size).round();
+        let beside = |value: f64| f64::from_bits(value.to_bits() + (whole as u64) % 3 - 1);
+        // Angles of all sizes, beside multiples of pi / 4 and of 1 / 256, and the least and greatest numbers.
+        let angle = match random.bits() % 8 {
+            0 => beside((whole + 1.0) * std::f64::consts::FRAC_PI_4).copysign(sign),
+            1 => beside((whole + 1.0) / 256.0).copysign(sign),
+            2 => sign * f64::from_bits(random.bits() >> (2 + whole as u64 % 60)),
+            3 => sign * 2e8,
+            _ => sign * size,
+        };
+        let angle = if angle.abs() < 2e8 { angle } else { sign };
         let (sine, cosine) = sin_cos(angle);
         let what = || format!("{angle}");
         assert_holds(sine, &exact(angle).sin(BITS, ROUNDING, &mut constants), &what);

@@ -8,7 +8,7 @@ use crate::first_order_step::FirstOrderStep;
 use crate::grid::GridPoint;
 use crate::lines::Links;
 use crate::path::Curve;
-use crate::step::{Claim, Listed, within};
+use crate::step::{Claim, Listed, sum_above};
 use bench_dragon_motion::event::Event;
 
 impl Descent<'_, '_> {
@@ -89,7 +89,7 @@ impl Descent<'_, '_> {
         };
         let innermost: Vec<f64> = (0..count).map(|handle| listed.innermost(handle)).collect();
         for (a, board) in boards[..firsts].iter().enumerate() {
-            let outermost = within(far, chain.shape.outermost(board));
+            let outermost = sum_above(chain.shape.outermost(board), far);
             let mut beyond = false;
             for (b, other) in boards.iter().enumerate().skip(a + 2) {
                 beyond = innermost[b] > outermost;
@@ -122,7 +122,7 @@ impl Descent<'_, '_> {
     ) -> bool {
         let threshold = self.threshold();
         if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) {
-            let outermost = within(threshold.max(0.0), self.chain.shape.outermost(board));
+            let outermost = sum_above(self.chain.shape.outermost(board), threshold.max(0.0));
             return listed.innermost(listed.handles.len() - 1) > outermost;
         }
         board.is_further_than(threshold.max(0.0), &listed.straight_run(next))

@@ -240,19 +240,10 @@ impl Blocked<'_> {
         let mut width = FIRST_SHARE * from;
         while self.pitch < to && self.intervals < MOST_INTERVALS {
             width = width.min(to - self.pitch);
-            let mut proof = self.holds(width);
-            if proof.is_none() {
-                if !self.follow() {
-                    break;
-                }
-                while width > LEAST_SHARE * self.pitch {
-                    proof = self.holds(width);
-                    if proof.is_some() {
-                        break;
-                    }
-                    width *= 0.5;
-                }
-            }
+            let proof = self.holds(width).or_else(|| {
+                // The proposal may be wrong.
+                [true, false].into_iter().find_map(|hinted| self.narrowed(&mut width, hinted))
+            });
             let Some(proof) = proof else { break };
             let next = (self.pitch + width).min(to);
             self.shown = self.deepest.filter(|_| !self.locks).map(|Deepest { pair, head_radius, .. }| {
@@ -275,6 +266,24 @@ impl Blocked<'_> {
         }
     }
 
+    /// Follows the boards, with the hints of the proposal or without. Returns the proof for the greatest width of at most
+    /// `width` for which there is one, and sets `width` to that.
+    fn narrowed(&mut self, width: &mut f64, hinted: bool) -> Option<Shown> {
+        if !self.follow(hinted) {
+            return None;
+        }
+        let mut narrower = *width;
+        while narrower > LEAST_SHARE * self.pitch {
+            let proof = self.holds(narrower);
+            if proof.is_some() {
+                *width = narrower;
+                return proof;
+            }
+            narrower *= 0.5;
+        }
+        None
+    }
+
     /// Returns the proof, if there is one, that the two boards overlap or the head's link locks for all pitches up to
     /// `width` further on.
     fn holds(&self, width: f64) -> Option<Shown> {
@@ -291,16 +300,19 @@ impl Blocked<'_> {
     }
 
     /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds
-    /// other boards or a lock, unless these two overlap up to the proposed pitch. Returns true if it finds any.
-    fn follow(&mut self) -> bool {
+    /// other boards or a lock. Returns true if it finds any. With hints, it keeps two boards for which the proposal says
+    /// that they overlap up to the proposed pitch, and begins with the obstacle of the proposal.
+    fn follow(&mut self, hinted: bool) -> bool {
+        let Proposal { pitch: proposed, first, last } = self.proposal;
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest
             && !self.locks
         {
+            let stays = matches!(last, Some(Obstacle::Touch { pair: last, .. }) if last == pair);
+            let kept = if hinted && stays && proposed.is_some() { 0.0 } else { self.shallow };
             // As the pitch grows, the head meets a board a little further back.
             let (a, b) = pair;
-            let stays = matches!(self.proposal.last, Some(Obstacle::Touch { pair, .. }) if pair == (a, b));
-            let shallow = if stays { 0.0 } else { self.shallow };
-            for pairs in [&[pair][..], &[(a, b + 1), (a, b + 2), (a, b.saturating_sub(1).max(a + 2))]] {
+            let behind = [(a, b + 1), (a, b + 2), (a, b.saturating_sub(1).max(a + 2))];
+            for (pairs, shallow) in [(&[pair][..], kept), (&behind, self.shallow)] {
                 let nearest = deepest(self.team, self.pitch, self.radius, pairs, head_radius);
                 if nearest.clearance < -shallow * depth {
                     let depth = if nearest.pair == pair { depth } else { -nearest.clearance };
@@ -309,7 +321,7 @@ impl Blocked<'_> {
                 }
             }
         }
-        let first = self.proposal.first.filter(|_| self.intervals == 0);
+        let first = first.filter(|_| hinted && self.intervals == 0);
         let found = first.or_else(|| obstacle(self.team, self.pitch, self.radius));
         self.locks = matches!(found, Some(Obstacle::Lock));
         let Some(Obstacle::Touch { pair, head_radius }) = found else { return self.locks };

@@ -68,7 +68,7 @@ pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progre
         while let Some(next) = found.at_pitch(team, pitch * GROWTH, radius) {
             (found, pitch) = (next, pitch * GROWTH);
             if pitch > to {
-                return proposal;
+                return Proposal { last: None, ..proposal };
             }
         }
         proposal.last = Some(found);
