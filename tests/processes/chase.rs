@@ -131,7 +131,7 @@ fn a_second_chase_is_refused_and_holds_and_deaths_are_told() {
     let (chased, lines) = chase(name, &["artnet", "--listen", &at]);
     let mut watch = Process::start(program(name).args(["--json", "watch"]));
     let watched = watch.lines();
-    let sender = sender(name, &["--port", &port, "--seconds", "60"]);
+    let sender = sender(name, &["--port", &port, "--seconds", "600"]);
     state(&lines, "locked");
     let second = Process::start(program(name).args(["chase", "artnet", "--listen", &at])).output();
     assert_eq!(second.status.code(), Some(1));
