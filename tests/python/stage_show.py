@@ -15,6 +15,7 @@ import time
 
 import numpy
 
+from chromium import at_rest
 from stage_motion import solved_at
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, PROGRAM, STILL, WIDTH, browser, drawn, opened, passes, play, publisher, server, started, truth_at, until, words
 
@@ -192,6 +193,7 @@ def what_is_coming_is_named_and_seen():
                 document.getElementById("stage").style.cssText = "opacity: 1; transition: none";
                 document.getElementById("notice").style.visibility = "hidden";
             }""")
+            at_rest(one)
             rings_what_comes(one, danger)
             signs_have_contrast(one)
         speaks_chinese(chinese[0])
