@@ -166,6 +166,8 @@ class Path:
         assert not len(open_), "a link has no follower"
         # Secants, and halves where they do not converge.
         last, at, ends = (near, low), (far, high), (near.copy(), far.copy())
+        # The rounding of places, far from the start too.
+        exact = 1e-14 * (link + np.abs(s) + np.abs(front).max(axis=-1))
         for turn in range(120):
             slope = at[1] - last[1]
             guess = at[0] - at[1] * (at[0] - last[0]) / np.where(slope == 0, np.inf, slope)
@@ -175,7 +177,7 @@ class Path:
             below = value < 0
             ends = np.where(below, guess, ends[0]), np.where(below, ends[1], guess)
             last, at = at, (guess, value)
-            if turn > 2 and (np.abs(value) <= 3e-15 * (link + np.abs(s))).all() and turn < 12 or turn > 70:
+            if turn > 2 and (np.abs(value) <= exact).all() and turn < 12 or turn > 70:
                 break
         return s - guess
 
@@ -183,10 +185,17 @@ class Path:
 def greatest(function, low, high):
     """Returns the places between `low` and `high` where functions with one maximum are greatest, and the maxima."""
     share = 0.5 * (math.sqrt(5) - 1)
-    for _ in range(60):
-        first, last = high - share * (high - low), low + share * (high - low)
-        right = function(first) < function(last)
-        low, high = np.where(right, first, low), np.where(right, high, last)
+    inner = [high - share * (high - low), low + share * (high - low)]
+    values = [function(place) for place in inner]
+    # Near a maximum a function is flat: the last brackets are 1e-8 of the first.
+    for _ in range(38):
+        right = values[0] < values[1]
+        low, high = np.where(right, inner[0], low), np.where(right, high, inner[1])
+        kept = np.where(right, inner[1], inner[0]), np.where(right, values[1], values[0])
+        place = np.where(right, low + share * (high - low), high - share * (high - low))
+        value = function(place)
+        inner = [np.where(right, kept[0], place), np.where(right, place, kept[0])]
+        values = [np.where(right, kept[1], value), np.where(right, value, kept[1])]
     at = 0.5 * (low + high)
     return at, function(at)
 
