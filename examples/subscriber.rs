@@ -1,6 +1,7 @@
 //! A subscriber in Rust: reads the frames of a running publisher for some seconds and counts them.
 //!
-//! `cargo run --release -- run` in one terminal, `cargo run --release --example subscriber [NAME [SECONDS]]` in another.
+//! `cargo run --release -- run` in one terminal, `cargo run --release --example subscriber [NAME [SECONDS]]` in
+//! another.
 
 use std::time::{Duration, Instant};
 

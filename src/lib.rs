@@ -1,7 +1,7 @@
 //! A bench dragon, live: where every handle of a coiling chain of benches is, published at a fixed rate.
 //!
-//! This library is the crates of the workspace under one name. Without the feature `library` it is [`messages`] and [`client`]:
-//! all that a subscriber compiles. `ARCHITECTURE.md` draws how the crates depend on each other.
+//! This library is the crates of the workspace under one name. Without the feature `library` it is [`messages`] and
+//! [`client`]: all that a subscriber compiles. `ARCHITECTURE.md` draws how the crates depend on each other.
 //!
 //! - [`messages`]: layouts, states, commands and JSON of what a publisher and its subscribers exchange.
 //! - [`client`]: follow, interpolate and command a running publisher.

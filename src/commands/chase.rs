@@ -165,8 +165,8 @@ impl TimecodeArguments {
     }
 }
 
-/// Returns the text of --scene, or else of the show's own scene, for which a publisher is waited for; `None` if a signal comes
-/// first.
+/// Returns the text of --scene, or else of the show's own scene, for which a publisher is waited for; `None` if a
+/// signal comes first.
 fn scene_text(common: &Common, stop: &AtomicBool) -> Result<Option<SceneText>, CommandError> {
     if common.scene.is_some() {
         return common.scene_text().map(Some);

@@ -1,7 +1,7 @@
 //! The lines of this program's log on their way to `/rosout`: JSON lines on the standard input of the process of ROS 2.
 //!
-//! In the parent: a [`LogSender`], called by the thread that watches the process. In the process: [`receive`], called by
-//! `send ros2`.
+//! In the parent: a [`LogSender`], called by the thread that watches the process. In the process: [`receive`], called
+//! by `send ros2`.
 
 use std::io::{self, ErrorKind, Write};
 use std::process::ChildStdin;

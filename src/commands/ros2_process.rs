@@ -1,7 +1,7 @@
 //! The process that publishes a show on ROS 2 for `run` and `replay`: `send ros2`, started, restarted and ended here.
 //!
-//! The loop's process loads no DDS. A thread starts the process, restarts a process that ended, sends it the lines of this
-//! program's log, and ends it with the show.
+//! The loop's process loads no DDS. A thread starts the process, restarts a process that ended, sends it the lines of
+//! this program's log, and ends it with the show.
 
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader};

@@ -1,5 +1,5 @@
-//! The facts about a scene that the page of `view` shows and that no publisher sends: whether it loops, and its clearance
-//! over the whole show. In: the text of a scene. Out: facts for `outputs`. Computed once for each scene.
+//! The facts about a scene that the page of `view` shows and that no publisher sends: whether it loops, and its
+//! clearance over the whole show. In: the text of a scene. Out: facts for `outputs`. Computed once for each scene.
 
 use std::time::{Duration, Instant};
 
@@ -25,8 +25,8 @@ pub fn scene_facts(text: &str) -> Option<SceneFacts> {
     Some(SceneFacts { loop_stand, clearance: clearance(&scene) })
 }
 
-/// Returns the clearance over the show: of boards, and of boards and obstacles. `None` for fewer than three benches on empty
-/// ground, where a search gave up, or where it takes too long.
+/// Returns the clearance over the show: of boards, and of boards and obstacles. `None` for fewer than three benches on
+/// empty ground, where a search gave up, or where it takes too long.
 fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
     let timeline = scene.timeline(&mut |_| ());
     let freeze = *timeline.freeze(scene.stops_at_contact());

@@ -321,8 +321,8 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
 }
 
 impl Parent {
-    /// Kills this process when its parent ends, so that no process remains. Closes the parent's files, which iceoryx2 lets
-    /// children inherit and which would stay open as long as this process. Call this before a file is opened.
+    /// Kills this process when its parent ends, so that no process remains. Closes the parent's files, which iceoryx2
+    /// lets children inherit and which would stay open as long as this process. Call this before a file is opened.
     pub fn watch(&self) -> Result<(), CommandError> {
         let Some(parent) = self.end_with_parent else { return Ok(()) };
         close_inherited_files();

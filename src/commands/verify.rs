@@ -1,5 +1,5 @@
-//! `verify`: plays the show of a log again and compares every bit, checks a certificate of events, or computes the poses
-//! of a recording again.
+//! `verify`: plays the show of a log again and compares every bit, checks a certificate of events, or computes the
+//! poses of a recording again.
 
 pub mod certificate;
 mod recording;

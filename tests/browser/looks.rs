@@ -1,4 +1,5 @@
-//! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show look.
+//! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show
+//! look.
 //!
 //! The tests are in `tests/python/stage_transport.py`, `stage_show.py`, `stage_seat.py`,
 //! `stage_dragons.py` and `stage_ground.py`. No test asserts a speed.

@@ -252,7 +252,8 @@ fn a_picture_has_every_obstacle_at_its_place_with_its_keep_out() {
     assert_eq!(outline("boundary"), "M-30 -20L30 -20L30 25L-30 25Z");
     let wide: Vec<_> = group("keep-outs").children().filter_map(|node| node.attribute("stroke-width")).collect();
     assert_eq!(wide, ["3", "3", "2", "2"]);
-    // Dashes around each side of a keep-out: 1 circle, 2 + 1 sides of the spectators, 5 of the house, 4 of the boundary.
+    // Dashes around each side of a keep-out: 1 circle, 2 + 1 sides of the spectators, 5 of the house, 4 of the
+    // boundary.
     let rims = group("keep-out-rims");
     assert!(rims.attribute("stroke-dasharray").is_some());
     assert_eq!(rims.children().filter(roxmltree::Node::is_element).count(), 13);

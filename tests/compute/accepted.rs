@@ -172,8 +172,8 @@ fn written(search: impl FnOnce(&mut dyn FnMut(&CertificateLine) -> io::Result<()
     lines
 }
 
-/// Writes the certificate of a show's least clearance and has it checked. Returns the end of the stretch that is proved;
-/// `None` for a scene without a clearance.
+/// Writes the certificate of a show's least clearance and has it checked. Returns the end of the stretch that is
+/// proved; `None` for a scene without a clearance.
 fn clearance_certified(text: &str) -> Option<Until> {
     let (claim, enclosed) = clearance_of(text)?;
     if let (Some(lo), Some(hi), Some(enclosed)) = (claim.lo, claim.hi, enclosed) {

@@ -217,8 +217,8 @@ fn changed_certificates_of_clearances_are_refused() {
     }
 }
 
-/// Boards that overlap a wall by 20 mm all the way: a claim of a little more overlap follows from Lemma 11 with m < 0, a
-/// claim of less is false. No translation of 0.3 m frees boards between two walls, or boards within a polygon.
+/// Boards that overlap a wall by 20 mm all the way: a claim of a little more overlap follows from Lemma 11 with m < 0,
+/// a claim of less is false. No translation of 0.3 m frees boards between two walls, or boards within a polygon.
 #[test]
 fn claims_of_overlaps_are_checked() {
     let scene = "[team]\nbenches = 3\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\

@@ -87,8 +87,8 @@ fn paper_with(key: &str, value: &str) -> Scene {
     Scene::parse(&text.replace(&line, &format!("{key} = {value}")), "changed", "changed").unwrap()
 }
 
-/// Spirals of three kinds: head and body alike, pitches at which boards meet slowly, long heads. Each has benches, head,
-/// body, width, inset, pitch, turns and speed.
+/// Spirals of three kinds: head and body alike, pitches at which boards meet slowly, long heads. Each has benches,
+/// head, body, width, inset, pitch, turns and speed.
 const SPIRALS: [(u32, [f64; 7]); 9] = [
     (219, [1.917, 1.917, 0.336, 0.141, 0.9121, 21.05, 0.68]),
     (83, [2.028, 2.028, 0.228, 0.222, 0.6204, 16.5, 0.89]),

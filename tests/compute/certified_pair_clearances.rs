@@ -1,5 +1,5 @@
-//! Certificates of the least clearances of several dragons: the checker accepts them, a brute force over the show's time
-//! finds nothing nearer and the stated boards as near, and changed certificates are refused.
+//! Certificates of the least clearances of several dragons: the checker accepts them, a brute force over the show's
+//! time finds nothing nearer and the stated boards as near, and changed certificates are refused.
 //!
 //! `BENCH_DRAGON_LONG=1` makes 600 pairs in place of 40, `BENCH_DRAGON_CASES=few` 12.
 

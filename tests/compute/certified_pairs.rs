@@ -194,8 +194,8 @@ fn the_example_scenes_of_several_dragons_are_proved() {
     }
 }
 
-/// A certificate of two dragons that never meet: nothing follows their result, and a claim up to a lock needs steps up to
-/// that lock.
+/// A certificate of two dragons that never meet: nothing follows their result, and a claim up to a lock needs steps up
+/// to that lock.
 #[test]
 fn a_claim_that_two_dragons_do_not_meet_needs_its_steps() {
     let wide = "kind = \"spiral\"\npitch = 1.7\nstart_turn = 3.0";

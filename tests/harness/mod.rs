@@ -287,7 +287,8 @@ pub fn unique(name: &str) -> String {
     format!("test_{}_{name}", std::process::id())
 }
 
-/// Fails if tests of two modules of one test program use the same name: their services would be the same, or their files.
+/// Fails if tests of two modules of one test program use the same name: their services would be the same, or their
+/// files.
 fn assert_used_by_one_module(name: &str) {
     static USERS: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
     // A test runs on a thread with its name; threads that it starts itself have none.

@@ -1,5 +1,5 @@
-//! The actors beside the loop: the statistics thread, control clients, subscribers, and the actors that set the wall clock
-//! or stop the show.
+//! The actors beside the loop: the statistics thread, control clients, subscribers, and the actors that set the wall
+//! clock or stop the show.
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -80,8 +80,8 @@ fn only_the_model_knows_the_kinds_of_a_segment() {
     assert!(seen > 10, "{seen} matches in the model");
 }
 
-/// `tests/run` names the test programs: one that it does not name would never run, and neither would tests of a crate that are no
-/// unit tests.
+/// `tests/run` names the test programs: one that it does not name would never run, and neither would tests of a crate
+/// that are no unit tests.
 #[test]
 fn tests_run_runs_every_test_program() {
     let run = include_str!("../run");

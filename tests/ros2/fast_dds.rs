@@ -81,8 +81,8 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     process
 }
 
-/// A Fast DDS client sends its first request before RustDDS knows it, in half of all cases. Fast DDS repeats the request
-/// only after its heartbeat period, here an hour: an answer proves that the publisher requests it again.
+/// A Fast DDS client sends its first request before RustDDS knows it, in half of all cases. Fast DDS repeats the
+/// request only after its heartbeat period, here an hour: an answer proves that the publisher requests it again.
 #[test]
 fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
     if !can_run(peer_program().map(drop)) {
@@ -108,8 +108,8 @@ fn a_hundred_new_clients_each_get_the_answer_to_their_first_call() {
         for process in side_by_side {
             let output = process.output();
             let errors = text(&output.stderr);
-            // Beside many other participants, discovery at times takes Fast DDS more than a minute, on its own or on our
-            // side. Such a client has made no call; another one takes its place.
+            // Beside many other participants, discovery at times takes Fast DDS more than a minute, on its own or on
+            // our side. Such a client has made no call; another one takes its place.
             let has_called = !errors.contains("no server of") && !errors.contains("no match with");
             undiscovered += u32::from(!has_called);
             let printed = json_lines(&output);
@@ -189,8 +189,8 @@ fn stage_path_and_each_cue_come_exactly_once_to_each_subscriber() {
     stopped(publisher);
 }
 
-/// Returns for subscribers, one after the other, the time of creation and the stamps of their alerts. Each is a process:
-/// Fast DDS at times hangs or dies when many participants of one process come and go.
+/// Returns for subscribers, one after the other, the time of creation and the stamps of their alerts. Each is a
+/// process: Fast DDS at times hangs or dies when many participants of one process come and go.
 fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
     let arguments = [&["--samples", "1", "--linger", "0.15", "--seconds", "60"], further].concat();
     let join = |_| {
@@ -333,8 +333,9 @@ fn visit(name: &str, index: usize) -> Visit {
     Visit::Served
 }
 
-/// Half of the subscribers are killed, the others leave. A subscriber that spins would never end, as one of Fast DDS does
-/// that is sent an empty change. `BENCH_DRAGON_SUBSCRIBERS` is their number, 4,000 by default; 200,000 take a night.
+/// Half of the subscribers are killed, the others leave. A subscriber that spins would never end, as one of Fast DDS
+/// does that is sent an empty change. `BENCH_DRAGON_SUBSCRIBERS` is their number, 4,000 by default; 200,000 take a
+/// night.
 #[test]
 fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_messages() {
     // Beside many other processes a subscriber may discover the publisher later than within its minute.

@@ -1,5 +1,5 @@
-//! `send ros2`, the process that publishes a running show on ROS 2: attached late, killed, restarted, of two shows, with
-//! services. Cyclone DDS is the wire peer; shared memory shows that no frame is lost.
+//! `send ros2`, the process that publishes a running show on ROS 2: attached late, killed, restarted, of two shows,
+//! with services. Cyclone DDS is the wire peer; shared memory shows that no frame is lost.
 #![cfg(feature = "ros2")]
 
 use crate::harness;

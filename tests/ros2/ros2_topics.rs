@@ -149,7 +149,8 @@ fn have_common_stamps(lines: &[Value], is_sim: bool) -> bool {
         && (!is_sim || has_one("clock", &|message| nanoseconds(&message["clock"])))
 }
 
-/// Two shows with every topic: the scene of one leaves its stamps on `/clock`, that of the other puts them on wall time.
+/// Two shows with every topic: the scene of one leaves its stamps on `/clock`, that of the other puts them on wall
+/// time.
 #[test]
 fn stamps_are_on_the_clock_or_on_wall_time_as_the_scene_requests() {
     if !can_run(python_modules(&["cyclonedds"])) {

@@ -96,8 +96,8 @@ impl Capsule {
         self.component(other, at.tangent, at.turned())
     }
 
-    /// Returns t . (u - x) for all u of this capsule and x of the other, t being the tangent at x, by Taylor's formula of
-    /// the second order along the other's span. With a junction in the span nothing is known of it.
+    /// Returns t . (u - x) for all u of this capsule and x of the other, t being the tangent at x, by Taylor's formula
+    /// of the second order along the other's span. With a junction in the span nothing is known of it.
     pub fn second_order_product(&self, path: &ExactPath, other: &Self, Span(first, last): Span) -> Interval {
         let Some(rate) = path.bend_rate(first, last) else { return Interval::within(f64::INFINITY) };
         let Self { middle, point, tangent: [x, y], half, curvature, .. } = *other;

@@ -34,8 +34,8 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     }
     let quarters = rounded(x * std::f64::consts::FRAC_2_PI);
     let [high, middle, low] = HALF_PI.map(|part| part * quarters);
-    // No error: `high` is 0, or both are within a factor of 2 of each other (Sterbenz), since q = 1 begins at x = pi / 4,
-    // just above `high` / 2.
+    // No error: `high` is 0, or both are within a factor of 2 of each other (Sterbenz), since q = 1 begins at
+    // x = pi / 4, just above `high` / 2.
     let first = x - high;
     let rest = middle + low;
     // y = about + lost, by Knuth's two-sum.
@@ -51,8 +51,8 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     let sine_of_rest = z - z * square * (1.0 / 6.0 - square * (1.0 / 120.0));
     let versine_of_rest = square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)));
     // In units of u z: 2 from z, 1 from its sine, 1 from the product with it, 1 from the bracket's sum, and less than 1
-    // from the remainders and all that has the factor z or u. In units of u: `rest` from its sum. `lost`, below u, is off
-    // by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
+    // from the remainders and all that has the factor z or u. In units of u: `rest` from its sum. `lost`, below u, is
+    // off by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
     let error = error + f64::EPSILON * (6.0 * z.abs() + rest.abs()) + 7e-25 * quarters.abs();
     let around = |kept: f64, bracket: f64| {
         let sum = kept + bracket;
@@ -123,8 +123,8 @@ const fn reciprocals<const N: usize>(divisors: [f64; N]) -> [Interval; N] {
     reciprocals
 }
 
-/// Returns 1 - s q1 (1 - s q2 (1 - ...)), the sum of a series whose terms have the factors -s q1, -s q2, ..., for s from
-/// 0 to 1. All partial sums are from 0 to 1, so that the ends of products are the products of ends.
+/// Returns 1 - s q1 (1 - s q2 (1 - ...)), the sum of a series whose terms have the factors -s q1, -s q2, ..., for s
+/// from 0 to 1. All partial sums are from 0 to 1, so that the ends of products are the products of ends.
 fn alternating(s: Interval, factors: &[Interval]) -> Interval {
     factors.iter().rev().fold(Interval::ONE, |sum, factor| {
         let least = ((s.lo.max(0.0) * factor.lo).next_down() * sum.lo).next_down();

@@ -61,8 +61,8 @@ pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned
     holds.then_some(sign)
 }
 
-/// Returns true if the product of the tangent at a place of a span and the way from there to a place of `other` is proved
-/// to have a sign, that of `sign`, for all such places. The span is cut into stretches.
+/// Returns true if the product of the tangent at a place of a span and the way from there to a place of `other` is
+/// proved to have a sign, that of `sign`, for all such places. The span is cut into stretches.
 fn has_sign(path: &ExactPath, other: &Capsule, span: Span, sign: f64) -> bool {
     let mut waiting = vec![span];
     for _ in 0..MOST_STRETCHES {

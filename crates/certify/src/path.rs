@@ -258,8 +258,8 @@ impl ExactPath {
         }
     }
 
-    /// Creates all turnarounds whose turn radius is in an interval. With `turned`, each is turned about the centre so that
-    /// A has this polar angle: then the spirals too depend on the radius, but all places move little with it.
+    /// Creates all turnarounds whose turn radius is in an interval. With `turned`, each is turned about the centre so
+    /// that A has this polar angle: then the spirals too depend on the radius, but all places move little with it.
     pub fn turnaround(pitch: f64, turn_radius: Interval, arc_ratio: f64, turned: Option<f64>, lead_in: f64) -> Self {
         let a = Interval::point(pitch).over(pi() * 2.0);
         let theta = turn_radius.over(a);
@@ -611,8 +611,8 @@ fn exactly(at: Interval) -> [Interval; 2] {
     [at, Interval::ZERO]
 }
 
-/// Returns sine and cosine of a coordinate: those of its first double, turned by the second one, whose square bounds the
-/// error.
+/// Returns sine and cosine of a coordinate: those of its first double, turned by the second one, whose square bounds
+/// the error.
 fn sin_cos_at(Place(_, at, rest): Place) -> (Interval, Interval) {
     let (sine, cosine) = sin_cos(at);
     if rest == 0.0 {

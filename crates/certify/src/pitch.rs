@@ -45,8 +45,8 @@ impl Pitches<'_> {
         Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
     }
 
-    /// Returns the spans of the handles from 1 on and a point, if with every pitch the two boards are proved to have the
-    /// point in common. Lengths are in units of a.
+    /// Returns the spans of the handles from 1 on and a point, if with every pitch the two boards are proved to have
+    /// the point in common. Lengths are in units of a.
     pub fn overlap(&self) -> Option<(Vec<Span>, [f64; 2])> {
         let Self { team, from, to, theta, benches } = *self;
         if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
@@ -131,8 +131,8 @@ pub(crate) struct Reached {
 }
 
 /// Returns the proof, if there is one, that a team reaches `radius`, metres from the centre, on a spiral of this pitch
-/// from any distance. Until the head's front handle is there, no two boards touch and no link locks. `progress` receives
-/// the share of the way that is done.
+/// from any distance. Until the head's front handle is there, no two boards touch and no link locks. `progress`
+/// receives the share of the way that is done.
 pub(crate) fn reaches(
     team: &Team,
     pitch: f64,

@@ -467,8 +467,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    /// Returns the spans of handles 1 and on and a point, if two boards are proved to have the point in common while the
-    /// head is between two grid points.
+    /// Returns the spans of handles 1 and on and a point, if two boards are proved to have the point in common while
+    /// the head is between two grid points.
     fn touch(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
         let benches = benches(event);
         let handles = self.chain.spans(from, to, benches[1] + 1)?;

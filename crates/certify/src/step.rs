@@ -245,8 +245,8 @@ impl<'c, 'a> Listed<'c, 'a> {
         self.chain.shape.innermost(self.ring(from_handle), self.chain.links[1])
     }
 
-    /// Returns true if boards 0 and 1, whose handles are listed, are further than `metres` from all boards from a handle
-    /// on.
+    /// Returns true if boards 0 and 1, whose handles are listed, are further than `metres` from all boards from a
+    /// handle on.
     pub fn is_beyond_front(&self, metres: f64, from_handle: usize) -> bool {
         let reach = self.front_reach.get_or_init(|| {
             let of_bench = |bench| self.chain.shape.outermost(&self.chain.board(&self.handles, bench));

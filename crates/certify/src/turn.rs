@@ -46,8 +46,8 @@ pub(crate) struct Turns<'a> {
 
 impl<'a> Turns<'a> {
     /// Creates the turnarounds of this pitch and arc ratio with turn radii between two. `path` is that with the middle
-    /// radius. Places of an arc are those of `path`. A place of a spiral is that of `path` at the same polar angle behind A
-    /// or beyond -A.
+    /// radius. Places of an arc are those of `path`. A place of a spiral is that of `path` at the same polar angle
+    /// behind A or beyond -A.
     pub fn new(team: &'a Team, (pitch, arc_ratio): (f64, f64), radii: [f64; 2], path: Path) -> Self {
         let radius = Interval { lo: radii[0], hi: radii[1] };
         let a = Interval::point(pitch).over(pi() * 2.0);
@@ -78,8 +78,8 @@ impl<'a> Turns<'a> {
     }
 
     /// Returns true if, with every radius, two boards are proved to have a point in common while the head is at a
-    /// place, if it comes there without a lock. That is `head` with the middle radius, and its coordinate grows by `rate`
-    /// per metre of the radius.
+    /// place, if it comes there without a lock. That is `head` with the middle radius, and its coordinate grows by
+    /// `rate` per metre of the radius.
     pub fn overlap(&self, (head, rate): (Place, f64), [a, b]: [usize; 2]) -> bool {
         if a + 2 > b || b >= self.team.benches {
             return false;

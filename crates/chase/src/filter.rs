@@ -46,8 +46,8 @@ const BIAS_PART: f64 = 0.125;
 const MOST_BIAS: f64 = 1.5;
 
 impl DelayLockedLoop {
-    /// Creates a loop from a first reading: a position at a moment of CLOCK_MONOTONIC, of a source at about `rate` units
-    /// per second.
+    /// Creates a loop from a first reading: a position at a moment of CLOCK_MONOTONIC, of a source at about `rate`
+    /// units per second.
     pub fn new(at_ns: u64, position: f64, rate: f64, noise: Noise) -> Self {
         Self {
             noise,

@@ -141,7 +141,8 @@ pub enum ChaseError {
 }
 
 impl<'a> Chase<'a> {
-    /// Creates the chase of the show `name` by a source, whose `inputs` come from a thread of [`sources`](crate::sources).
+    /// Creates the chase of the show `name` by a source, whose `inputs` come from a thread of
+    /// [`sources`](crate::sources).
     ///
     /// # Errors
     /// [`ChaseError`]: another chase runs, for example.

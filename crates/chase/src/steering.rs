@@ -187,7 +187,8 @@ impl Steering {
         show.is_new &= !show.plays;
     }
 
-    /// Handles the answer to the pending command: its code and the tick at which it took hold; `None` if no answer comes.
+    /// Handles the answer to the pending command: its code and the tick at which it took hold; `None` if no answer
+    /// comes.
     pub fn answered(&mut self, answer: Option<(Code, u64)>) {
         let Some(show) = &mut self.show else { return };
         let Some(Pending { command, sent_ns }) = show.pending.take() else { return };

@@ -13,8 +13,8 @@ use crate::steering::{Goal, Limits};
 const WINDOW: f64 = 3.0;
 /// The distance of the points that are compared first, metres.
 const STEP: f64 = 0.25;
-/// Steps along the tangent from the nearest of those points. Each leaves the part of the error that is the distance from
-/// the path divided by the radius of its curve.
+/// Steps along the tangent from the nearest of those points. Each leaves the part of the error that is the distance
+/// from the path divided by the radius of its curve.
 const REFINEMENTS: usize = 8;
 /// The greatest distance from the path, metres.
 pub const MOST_DISTANCE: f64 = 1.0;
@@ -97,8 +97,8 @@ impl Track {
         Projection { travelled, distance: offset(travelled).norm() }
     }
 
-    /// Handles a position of the tracker on the stage, metres. `show_time` is the simulated time of the show, near whose
-    /// head a performer is looked for first.
+    /// Handles a position of the tracker on the stage, metres. `show_time` is the simulated time of the show, near
+    /// whose head a performer is looked for first.
     pub fn read(&mut self, point: Point, at_ns: u64, show_time: f64) {
         let head_speed = self.motion.head_speed();
         let near = self

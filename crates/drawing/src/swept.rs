@@ -17,14 +17,16 @@ use i_overlay::i_float::int::point::IntPoint;
 /// Greatest distance of the outline from the true one, metres.
 pub const TOLERANCE: f64 = 1e-3;
 
-/// Greatest distance of a corner from the straight line of its step, metres. An edge that turns by an angle a within the
-/// step bulges by up to its length times a^2 / 8 beyond the polygons of the step, as far as its corners leave their lines.
+/// Greatest distance of a corner from the straight line of its step, metres. An edge that turns by an angle a within
+/// the step bulges by up to its length times a^2 / 8 beyond the polygons of the step, as far as its corners leave their
+/// lines.
 const STRAIGHT: f64 = 0.1 * TOLERANCE;
 
 /// Metres of the grid to which corners are rounded: on a grid, the union has no corner but those of its rings.
 const GRID: f64 = 1e-6;
 
-/// Polygons that are united first: few, since the positions of a board overlap many others and every edge crosses theirs.
+/// Polygons that are united first: few, since the positions of a board overlap many others and every edge crosses
+/// theirs.
 const TOGETHER: usize = 24;
 
 /// A polygon's ring of corners, without the first one again at the end.

@@ -6,9 +6,9 @@
 //! subscriber built for another layout is refused instead of reading nonsense.
 //!
 //! `msgs/msg` and `packaging/python/bench_dragon/layouts.py` are generated from this file, doc comments included, by
-//! `BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::`. The comments are therefore for readers of all three languages. Facts
-//! of iceoryx2 alone stand in a paragraph that begins with "Over iceoryx2", which `msgs/msg` leaves out. A link to a
-//! constant or to an enum of [`state`](crate::state) gives the ROS 2 message those constants.
+//! `BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::`. The comments are therefore for readers of all three
+//! languages. Facts of iceoryx2 alone stand in a paragraph that begins with "Over iceoryx2", which `msgs/msg` leaves
+//! out. A link to a constant or to an enum of [`state`](crate::state) gives the ROS 2 message those constants.
 
 mod chase;
 mod control;
@@ -118,9 +118,9 @@ pub struct FrameHeader {
     /// Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged after the end of the
     /// show.
     pub time_scale: f64,
-    /// Metres between the nearest two boards that share no handle, negative when they overlap; of a scene with obstacles
-    /// the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than three benches and
-    /// no obstacles.
+    /// Metres between the nearest two boards that share no handle, negative when they overlap; of a scene with
+    /// obstacles the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than three
+    /// benches and no obstacles.
     pub min_clearance: f64,
     /// The number of handles in this message.
     pub handles: u32,
@@ -139,10 +139,11 @@ pub struct FrameHeader {
 
 /// A change of the alert level, or a step of the countdown towards an event.
 ///
-/// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level, or a board and
-/// an obstacle that are nearer. The fields that begin with `event` are the event the alert is about: the next contact,
-/// obstacle, stall or lock while the level is clear or approaching, else the event that has happened. An obstacle stands
-/// where a second bench would, by its number: the number of handles plus its place in the scene, the boundary last.
+/// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level, or a board
+/// and an obstacle that are nearer. The fields that begin with `event` are the event the alert is about: the next
+/// contact, obstacle, stall or lock while the level is clear or approaching, else the event that has happened. An
+/// obstacle stands where a second bench would, by its number: the number of handles plus its place in the scene, the
+/// boundary last.
 ///
 /// Over iceoryx2 the payload of `<name>/alerts`.
 ///
@@ -180,8 +181,8 @@ pub struct CollisionAlert {
     pub event_time: f64,
     /// `event_time - sim_time`, simulated seconds; negative once it has passed; NaN if there is no event.
     pub time_to_event: f64,
-    /// Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle; negative
-    /// when they overlap; NaN if there are neither.
+    /// Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle;
+    /// negative when they overlap; NaN if there are neither.
     pub clearance: f64,
     /// The midpoint between the nearest two boards, metres right of the centre; NaN if there are fewer than three
     /// benches.
@@ -189,8 +190,8 @@ pub struct CollisionAlert {
     /// The midpoint between the nearest two boards, metres up from the centre; NaN if there are fewer than three
     /// benches.
     pub y: f64,
-    /// The place of the event, metres right of the centre: the touching point of a contact, the point of a board nearest
-    /// to an obstacle, the rear handle of the bench that stalls or locks; NaN if there is no event.
+    /// The place of the event, metres right of the centre: the touching point of a contact, the point of a board
+    /// nearest to an obstacle, the rear handle of the bench that stalls or locks; NaN if there is no event.
     pub event_x: f64,
     /// The place of the event, metres up from the centre; NaN if there is no event.
     pub event_y: f64,

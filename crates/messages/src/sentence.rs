@@ -132,8 +132,8 @@ pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
     if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
 }
 
-/// Returns a number with the fewest digits that read back to the same bits: with an exponent outside 1e-6 to 1e15, where
-/// Rust would write every zero.
+/// Returns a number with the fewest digits that read back to the same bits: with an exponent outside 1e-6 to 1e15,
+/// where Rust would write every zero.
 pub fn number(value: f64) -> String {
     let is_plain = value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs());
     if is_plain { value.to_string() } else { format!("{value:e}") }

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::layouts::{Stage, StageDragon, StageObstacle, StageSegment};
 
-/// A [`Stage`] with the segments of its paths and outlines. Over ROS 2 and in files, the fields of [`Stage`] and then the
-/// list of segments.
+/// A [`Stage`] with the segments of its paths and outlines. Over ROS 2 and in files, the fields of [`Stage`] and then
+/// the list of segments.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 pub struct StageMessage {
     /// The header.

@@ -3,8 +3,9 @@
 //! Only this file has the [`Severity`] of each: colours, signs and diagnostics follow from the severity, and not from
 //! the list of states.
 //!
-//! On the wire the values of each type are numbered in their order, from 0; levels have the numbers of their states. The constants in `msgs/msg` and in the
-//! Python layouts are generated from this file, doc comments included: see [`layouts`](crate::layouts).
+//! On the wire the values of each type are numbered in their order, from 0; levels have the numbers of their states.
+//! The constants in `msgs/msg` and in the Python layouts are generated from this file, doc comments included: see
+//! [`layouts`](crate::layouts).
 
 /// The kinds of events. Two events at one time are listed in this order, those that end a motion last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -358,8 +358,8 @@ impl Ensemble {
         TimedEvent { event: Event { travelled: dragon.motion.travelled_at(time), ..freeze.event }, time }
     }
 
-    /// Makes the monitor of the live clearance of different dragons. `choices` has the solver of each dragon's frames, in
-    /// its path's own coordinates.
+    /// Makes the monitor of the live clearance of different dragons. `choices` has the solver of each dragon's frames,
+    /// in its path's own coordinates.
     pub fn between_monitor(&self, choices: &[Choice]) -> BetweenMonitor {
         let teams: Vec<Team> = self.dragons.iter().map(|dragon| *dragon.motion.team()).collect();
         let monitor = BetweenMonitor::new(&teams, self.link_tolerance().max(1e-9));

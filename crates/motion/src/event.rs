@@ -29,8 +29,8 @@ pub struct Event {
     /// The first bench concerned: of two that touch, the bench nearer the head; else the bench that stalls, locks or
     /// reaches an obstacle.
     pub bench_a: Option<u32>,
-    /// The second of two benches that touch. An obstacle stands here by its number: the number of handles plus its place
-    /// on the ground.
+    /// The second of two benches that touch. An obstacle stands here by its number: the number of handles plus its
+    /// place on the ground.
     pub bench_b: Option<u32>,
     /// The touching point, the point of the board nearest to an obstacle, or the rear handle of a stall or lock. `None`
     /// for the path's end.

@@ -328,8 +328,8 @@ impl Motion {
         }
     }
 
-    /// Makes the monitor of the clearance of the obstacles in this motion's frames, in the path's own coordinates; `None`
-    /// without obstacles. `choice` is as in [`Motion::clearance_monitor`].
+    /// Makes the monitor of the clearance of the obstacles in this motion's frames, in the path's own coordinates;
+    /// `None` without obstacles. `choice` is as in [`Motion::clearance_monitor`].
     pub fn obstacle_monitor(&self, choice: &Choice) -> Option<ObstacleMonitor> {
         let ground = self.ground.in_own_frame(&self.placement);
         (!ground.is_empty()).then(|| ObstacleMonitor::new(self.team, ground, choice.table.as_ref()))
@@ -459,8 +459,9 @@ impl Motion {
         })
     }
 
-    /// Returns the least clearance of each obstacle from the start until the show ends at `freeze`. `progress` is called
-    /// as by [`Motion::timeline`]. The list is empty without obstacles, and if a place inside the motion has no solution.
+    /// Returns the least clearance of each obstacle from the start until the show ends at `freeze`. `progress` is
+    /// called as by [`Motion::timeline`]. The list is empty without obstacles, and if a place inside the motion has no
+    /// solution.
     pub fn obstacle_clearances(
         &self,
         freeze: &TimedEvent,

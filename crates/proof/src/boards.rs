@@ -114,8 +114,8 @@ impl<'a> Board<'a> {
             || self.is_apart_somehow(&zero, other)
     }
 
-    /// Returns true if Lemma 2 shows that the gap between two boards is more than `metres`, in a direction of their sides
-    /// or between them.
+    /// Returns true if Lemma 2 shows that the gap between two boards is more than `metres`, in a direction of their
+    /// sides or between them.
     pub fn is_apart_by(&self, metres: &Interval, other: &Self) -> bool {
         let rough = metres.rough();
         let mut axes: Vec<_> =
@@ -319,8 +319,8 @@ impl Rough {
 }
 
 /// Returns true if Lemma 3, *Ring*, shows boards near the centre of the spiral to be more than `metres` apart from all
-/// body boards further out. The handles of the former are at most `reach` metres from the centre, those of the latter at least `ring`
-/// metres.
+/// body boards further out. The handles of the former are at most `reach` metres from the centre, those of the latter
+/// at least `ring` metres.
 pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval, metres: &Interval) -> bool {
     let half_link = team.link(1) * Interval::new(0.5);
     let half_width = team.width * Interval::new(0.5);

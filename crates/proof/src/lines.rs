@@ -223,7 +223,8 @@ pub struct ProvedEvent {
     /// counted within each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub dragons: Vec<usize>,
-    /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not checked.
+    /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not
+    /// checked.
     #[serde(default)]
     pub because: Option<String>,
 }

@@ -12,8 +12,8 @@ const MOST_STRETCHES: usize = 100_000;
 /// Limit of stretches of a front's span.
 const MOST_FRONT_STRETCHES: usize = 2_000;
 
-/// Checks Lemma 1: for each place of `front`, the follower lies in `rear` and is continuous. Each capsule comes with the
-/// points at both ends of its span. Returns the front product.
+/// Checks Lemma 1: for each place of `front`, the follower lies in `rear` and is continuous. Each capsule comes with
+/// the points at both ends of its span. Returns the front product.
 ///
 /// # Errors
 /// The condition that is not proved.

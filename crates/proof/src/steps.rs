@@ -337,8 +337,8 @@ fn boards_on_ground<'c>(
     boards
 }
 
-/// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs with boards 0
-/// and 1. Returns the number of pairs.
+/// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs with boards
+/// 0 and 1. Returns the number of pairs.
 fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String> {
     let team = &scene.team;
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())

@@ -4,8 +4,8 @@
 //! best-effort subscriber acknowledges nothing, a killed reliable one nothing until its lease ends, and both count
 //! (`Writer::remove_all_acked_changes_but_keep_depth`). RustDDS has no limit of time. So this file sends the writer, in
 //! our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2): of a best-effort subscriber for all messages, of
-//! a reliable one for those that are older than [`AGE`] and not among the last `depth`. A reliable subscriber gets a GAP
-//! for these messages. RustDDS ignores the ACKNACK if the subscriber has acknowledged more. Called by the volatile
+//! a reliable one for those that are older than [`AGE`] and not among the last `depth`. A reliable subscriber gets a
+//! GAP for these messages. RustDDS ignores the ACKNACK if the subscriber has acknowledged more. Called by the volatile
 //! writers.
 
 use std::collections::{BTreeMap, VecDeque};

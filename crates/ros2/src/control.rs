@@ -3,10 +3,10 @@
 //!
 //! Clients of both RMW implementations are answered, each in its own mapping ([`mapping`]). The requests use
 //! ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's writers. ros2-client's
-//! `Server` does not fit: it speaks one mapping, hides the bytes of a request, and answers at once. A client whose reply
-//! reader is not matched yet would never get that answer, so an answer waits here ([`Matches`]). A dead client, or one
-//! that floods the services, costs the loop nothing: this process takes the requests, and passes a bounded number of
-//! commands to the show at once.
+//! `Server` does not fit: it speaks one mapping, hides the bytes of a request, and answers at once. A client whose
+//! reply reader is not matched yet would never get that answer, so an answer waits here ([`Matches`]). A dead client,
+//! or one that floods the services, costs the loop nothing: this process takes the requests, and passes a bounded
+//! number of commands to the show at once.
 
 mod calls;
 mod endpoints;
@@ -38,8 +38,8 @@ const MOST_CALLS: usize = 16;
 const MOST_PENDING: usize = 512;
 /// The longest wait of an answer for its client's reply reader: while the client is there, and otherwise. RMW
 /// implementations stop after 0.1 s. On a loaded machine discovery takes longer, and a lost datagram of discovery is
-/// repeated after seconds; an answer that is sent before is lost. Other answers do not wait. It is also the longest wait of
-/// an answer that RustDDS refuses: a killed client ends such a refusal after its lease, 20 s with Fast DDS.
+/// repeated after seconds; an answer that is sent before is lost. Other answers do not wait. It is also the longest
+/// wait of an answer that RustDDS refuses: a killed client ends such a refusal after its lease, 20 s with Fast DDS.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(30);
 const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
@@ -246,7 +246,8 @@ impl Server {
             if !reached && since.elapsed() < patience {
                 return true;
             }
-            // A client of the other mapping would read this answer as random numbers. Without a match, all get the answer.
+            // A client of the other mapping would read this answer as random numbers. Without a match, all get the
+            // answer.
             let readers = match client.reader.filter(|_| reached) {
                 Some(reader) => vec![reader],
                 None => matches.readers_in_process(endpoint.responses_guid, client.writer),

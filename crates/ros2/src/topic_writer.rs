@@ -3,15 +3,15 @@
 //! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
 //! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first; with
 //! Fast DDS also a volatile one, since RustDDS does not read the durability of a subscriber. So a message without
-//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left. From a
-//! subscriber that joins others older messages are withheld by a GAP of our own ([`gaps`](super::gaps)): RustDDS sends one
-//! only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches both, and a
-//! transient-local one would report the second as incompatible. Messages to single readers are none either: RustDDS
-//! repairs them for every later subscriber.
+//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left.
+//! From a subscriber that joins others older messages are withheld by a GAP of our own ([`gaps`](super::gaps)): RustDDS
+//! sends one only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches
+//! both, and a transient-local one would report the second as incompatible. Messages to single readers are none either:
+//! RustDDS repairs them for every later subscriber.
 //!
-//! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages for
-//! all subscribers of the topic. So a refused message is held and written again, and a writer that refuses for longer
-//! than a new subscriber takes is replaced.
+//! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages
+//! for all subscribers of the topic. So a refused message is held and written again, and a writer that refuses for
+//! longer than a new subscriber takes is replaced.
 //!
 //! A volatile writer is relieved by a second one before it has written many messages ([`relief`](super::relief)), and
 //! keeps the messages of some seconds only ([`acknowledgements`](super::acknowledgements)).

@@ -30,8 +30,8 @@ const RELEASE_HOLD: f64 = 0.1;
 pub struct Alert {
     /// The level.
     pub level: Level,
-    /// The event of the alert. While the level is clear or approaching: the next contact, obstacle, stall or lock, if any. Else:
-    /// the latest event that has happened.
+    /// The event of the alert. While the level is clear or approaching: the next contact, obstacle, stall or lock, if
+    /// any. Else: the latest event that has happened.
     pub event: Option<TimedEvent>,
     /// The nearest two boards in the frame, or a board and an obstacle; `None` with neither.
     pub nearest: Option<PairClearance>,

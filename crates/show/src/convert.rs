@@ -118,7 +118,8 @@ pub struct Decimation {
 }
 
 impl Decimation {
-    /// Chooses from dragons with these numbers of handles, at least 2, in the order of the frame. `every` is at least 1.
+    /// Chooses from dragons with these numbers of handles, at least 2, in the order of the frame. `every` is at least
+    /// 1.
     pub fn new(dragons: impl IntoIterator<Item = usize>, every: usize) -> Self {
         let (mut handles, mut first) = (Vec::new(), 0);
         for count in dragons {
@@ -248,8 +249,8 @@ impl<'a> From<&'a Scene> for OnStage<'a> {
     }
 }
 
-/// Returns the stage of a motion, or of a scene's dragons, with the events and cues of its show. `scene_hash` is BLAKE3 of the scene's text, or
-/// zeros without a text.
+/// Returns the stage of a motion, or of a scene's dragons, with the events and cues of its show. `scene_hash` is BLAKE3
+/// of the scene's text, or zeros without a text.
 pub fn stage<'a>(
     run_id: u64,
     stamp_ns: u64,

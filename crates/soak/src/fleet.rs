@@ -262,8 +262,8 @@ impl Fleet {
         Some(held)
     }
 
-    /// Returns the present resources of the publisher's child process, which publishes on ROS 2, from which the growth of
-    /// its memory follows. Returns `None` without ROS 2, and while the process is restarted.
+    /// Returns the present resources of the publisher's child process, which publishes on ROS 2, from which the growth
+    /// of its memory follows. Returns `None` without ROS 2, and while the process is restarted.
     pub(super) fn measure_ros2(&mut self) -> Option<Resources> {
         let child = self.plan.ros2.then(|| child_of(self.publisher.id())).flatten()?;
         let held = Resources::of(child)?;

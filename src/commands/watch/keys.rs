@@ -1,7 +1,7 @@
 //! The keys of `watch`, as of a media player, applied to the show.
 //!
-//! In: keys, and the answers of a [`CommandClient`]. Out: lines for the screen. Nothing is sent without a key, and no call
-//! waits for an answer.
+//! In: keys, and the answers of a [`CommandClient`]. Out: lines for the screen. Nothing is sent without a key, and no
+//! call waits for an answer.
 
 use std::collections::VecDeque;
 use std::io;

@@ -1,6 +1,6 @@
 //! Certificates of every question, checked again by a second program in another language:
-//! `tests/python/second_judge.py`, with the ball arithmetic of Arb. It finds the handles itself and checks the claims, not
-//! the proof. `BENCH_DRAGON_LONG=1`: 500 scenes.
+//! `tests/python/second_judge.py`, with the ball arithmetic of Arb. It finds the handles itself and checks the claims,
+//! not the proof. `BENCH_DRAGON_LONG=1`: 500 scenes.
 
 mod several;
 
@@ -96,7 +96,8 @@ const QUESTIONS: [(&str, &[&str]); 4] = [
     ("pitch", &["plan", "pitch", "--reach-radius"]),
 ];
 
-/// Writes the certificates of a scene for some questions. Returns their files; none for a scene that the program refuses.
+/// Writes the certificates of a scene for some questions. Returns their files; none for a scene that the program
+/// refuses.
 fn certified(folder: &Path, name: &str, scene: &str, questions: &[&str]) -> Vec<PathBuf> {
     let input = folder.join(format!("{name}.toml"));
     std::fs::write(&input, scene).unwrap();

@@ -1,5 +1,5 @@
-//! Certificates of all questions as `verify` reads them: refused with a sentence, or accepted with claims that agree with
-//! the ordinary search.
+//! Certificates of all questions as `verify` reads them: refused with a sentence, or accepted with claims that agree
+//! with the ordinary search.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -99,8 +99,8 @@ fn scene_of(benches: u32, hole_inset: f64, path: &str) -> String {
     )
 }
 
-/// Returns certificates of few lines of each question. Events: on a line, on one on which boards overlap from the start,
-/// on a bend, a stall and a lock on a spiral, obstacles that are avoided or touched.
+/// Returns certificates of few lines of each question. Events: on a line, on one on which boards overlap from the
+/// start, on a bend, a stall and a lock on a spiral, obstacles that are avoided or touched.
 fn seeds() -> Vec<Vec<u8>> {
     let line = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"line\"\nlength = 0.1\n";
     let bend = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nradius = 5.0\nside = \"left\"\nturns = 0.01\n";

@@ -19,7 +19,8 @@ pub struct SceneFile {
 pub fn scenes() -> Vec<SceneFile> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/config");
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    // A stage and several dragons have events and sentences of their own: tests/commands/ground.rs, tests/processes/several.rs.
+    // A stage and several dragons have events and sentences of their own: tests/commands/ground.rs,
+    // tests/processes/several.rs.
     paths.retain(|path| !["square.toml", "coil.toml", "crossing.toml"].iter().any(|name| path.ends_with(name)));
     paths.sort();
     let scenes: Vec<SceneFile> = paths.into_iter().map(SceneFile::read).collect();

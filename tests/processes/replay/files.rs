@@ -100,7 +100,8 @@ pub fn read(file: &Path) -> Kept {
     kept
 }
 
-/// Writes a recording again with its attachments and with each message as `change` returns it: removed, changed, or several messages.
+/// Writes a recording again with its attachments and with each message as `change` returns it: removed, changed, or
+/// several messages.
 pub fn rewrite<'a>(file: &'a [u8], to: &Path, change: impl Fn(Message<'a>) -> Vec<Message<'a>>) {
     let options = WriteOptions::new().profile("ros2").chunk_size(Some(50_000));
     let mut writer: Writer<_> = options.create(BufWriter::new(File::create(to).unwrap())).unwrap();

@@ -192,8 +192,8 @@ fn with_a_handle_less(message: Message<'_>) -> Message<'_> {
     message
 }
 
-/// Returns simulated time, the first handle, and the number of alerts and cues, of each frame that the library plays, and
-/// the reason of an early end.
+/// Returns simulated time, the first handle, and the number of alerts and cues, of each frame that the library plays,
+/// and the reason of an early end.
 fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64, usize)>, ReadError> {
     let options = ReplayOptions { pace: Pace::Even(100.0), start: None, looping: false };
     let (mut replay, thread) = Prepared::open(file, options)?.begin()?;
@@ -236,8 +236,8 @@ fn a_bag_of_another_recorder_is_played() {
     assert_eq!((&played["frames"], &played["end"]), (&frames.len().into(), &"recording".into()), "{played}");
 }
 
-/// `ros2 bag record --max-bag-duration` begins a new file at times; the latched stage is in the first. Others repeat the
-/// alert that holds in each file.
+/// `ros2 bag record --max-bag-duration` begins a new file at times; the latched stage is in the first. Others repeat
+/// the alert that holds in each file.
 #[test]
 fn a_bag_of_several_files_is_played_as_one_recording() {
     let folder = tempfile::tempdir().unwrap();

@@ -113,7 +113,8 @@ fn a_subscriber_loses_no_message_and_gets_none_twice_when_another_writer_relieve
     assert_eq!(frames.len(), received, "frames come twice");
     let missing = frames.last().unwrap() - frames.first().unwrap() + 1 - received as u64;
     println!("{missing} of {received} frames are missing: {ros2}; the first writer wrote {greatest}");
-    // A busy process of ROS 2 skips frames. Beside a subscriber that is too slow it drops messages, which is another test.
+    // A busy process of ROS 2 skips frames. Beside a subscriber that is too slow it drops messages, which is another
+    // test.
     let is_slow = ros2["discarded"] != 0;
     assert!(is_slow || missing <= ros2["skipped"].as_u64().unwrap(), "{missing} are missing: {ros2}");
 }

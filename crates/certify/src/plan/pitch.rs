@@ -266,8 +266,8 @@ impl Blocked<'_> {
         }
     }
 
-    /// Follows the boards, with the hints of the proposal or without. Returns the proof for the greatest width of at most
-    /// `width` for which there is one, and sets `width` to that.
+    /// Follows the boards, with the hints of the proposal or without. Returns the proof for the greatest width of at
+    /// most `width` for which there is one, and sets `width` to that.
     fn narrowed(&mut self, width: &mut f64, hinted: bool) -> Option<Shown> {
         if !self.follow(hinted) {
             return None;
@@ -300,8 +300,8 @@ impl Blocked<'_> {
     }
 
     /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds
-    /// other boards or a lock. Returns true if it finds any. With hints, it keeps two boards for which the proposal says
-    /// that they overlap up to the proposed pitch, and begins with the obstacle of the proposal.
+    /// other boards or a lock. Returns true if it finds any. With hints, it keeps two boards for which the proposal
+    /// says that they overlap up to the proposed pitch, and begins with the obstacle of the proposal.
     fn follow(&mut self, hinted: bool) -> bool {
         let Proposal { pitch: proposed, first, last } = self.proposal;
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest

@@ -1,8 +1,8 @@
 //! The least turn radius, enclosed: with every radius up to the lower number a link stalls or locks or boards overlap,
 //! with the upper number none of these happens.
 //!
-//! In: a team, a pitch, the ratio of the arcs. Out: the two numbers. "The least turn" in `docs/proofs.md` has the proof.
-//! The ordinary search ([`super::turn_trial`]) only suggests where to search.
+//! In: a team, a pitch, the ratio of the arcs. Out: the two numbers. "The least turn" in `docs/proofs.md` has the
+//! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
 
 use super::PlanError;
 use super::turn_trial::{Family, Witness};
@@ -58,8 +58,8 @@ pub struct TurnLimit {
 /// Distance of the two numbers in metres, with room for rounding.
 const WIDTH: f64 = 0.95e-9;
 
-/// Multiples of [`WIDTH`] that are tried. Next to a lock the follower is so fast that doubles cannot resolve its way, and
-/// the proof needs a greater distance from the lock.
+/// Multiples of [`WIDTH`] that are tried. Next to a lock the follower is so fast that doubles cannot resolve its way,
+/// and the proof needs a greater distance from the lock.
 const FURTHER: [f64; 7] = [1.0, 4.0, 10.0, 40.0, 160.0, 640.0, 4096.0];
 
 /// Number of benches with which a radius is tried first.
@@ -85,8 +85,8 @@ const BETTER: f64 = 1e-7;
 const FIRST_RATIO_STEP: f64 = 0.7;
 const LEAST_RATIO_STEP: f64 = 2e-3;
 
-/// Encloses the least turn radius of a team on spirals of a pitch, with arcs of a ratio, or with the best ratio that the
-/// search finds if there is none. `progress` receives the share of the work that is done, from 0 to 1.
+/// Encloses the least turn radius of a team on spirals of a pitch, with arcs of a ratio, or with the best ratio that
+/// the search finds if there is none. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
 /// The team turns round with the least radius that is tested, or its boards overlap on a straight line.
@@ -219,7 +219,8 @@ impl Blocked<'_> {
         }
     }
 
-    /// Takes the witness with the widest interval of at most `width` and at least `least` metres, and returns its width.
+    /// Takes the witness with the widest interval of at most `width` and at least `least` metres, and returns its
+    /// width.
     fn widest(&mut self, witnesses: impl IntoIterator<Item = Witness>, width: f64, least: f64) -> Option<f64> {
         let (before, mut best) = (self.witness, None);
         let mut widest = least;

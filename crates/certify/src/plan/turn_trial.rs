@@ -66,8 +66,8 @@ pub(super) struct Family<'a> {
 pub(super) enum Witness {
     /// One handle of a link at a pivot, the other one before `end` and on the wrong side of the pivot's normal.
     Fold { kind: EventKind, link: usize, pivot: Place, end: Place },
-    /// Two boards that overlap with the head at a place with this radius. The place's coordinate grows by `rate` per metre
-    /// of the radius.
+    /// Two boards that overlap with the head at a place with this radius. The place's coordinate grows by `rate` per
+    /// metre of the radius.
     Overlap { pair: (u32, u32), head: Place, radius: f64, rate: f64 },
 }
 
@@ -254,8 +254,8 @@ impl Family<'_> {
         rate.into_iter().chain([0.0]).map(|rate| Witness::Overlap { pair, head, radius, rate }).collect()
     }
 
-    /// Returns the boards of several pairs that overlap most deeply with the head near a place, metres past the beginning
-    /// of the S, and the head's place then.
+    /// Returns the boards of several pairs that overlap most deeply with the head near a place, metres past the
+    /// beginning of the S, and the head's place then.
     fn deepest(&self, radius: f64, pairs: &[(u32, u32)], past: f64) -> Option<((u32, u32), Place)> {
         let window = WINDOW * self.team.shortest_link();
         let lead_in = self.spiral_between(radius, radius.max(self.team.longest_link()) + BOARDS_BEFORE * self.pitch);

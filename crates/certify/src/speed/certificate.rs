@@ -16,8 +16,8 @@ const SHARE: f64 = 0.9;
 /// Share of a ratio by which the checker's enclosure of it may be wider.
 const SPARE: f64 = 2e-12;
 
-/// Encloses the greatest ratio as [`super::greatest_ratio`] does, and writes a certificate that no handle exceeds `limit`
-/// metres per second. `scene` is the text of the motion's scene. The
+/// Encloses the greatest ratio as [`super::greatest_ratio`] does, and writes a certificate that no handle exceeds
+/// `limit` metres per second. `scene` is the text of the motion's scene. The
 /// search gives up after `most_handles`.
 ///
 /// # Errors

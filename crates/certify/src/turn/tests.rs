@@ -14,8 +14,8 @@ const PITCH: f64 = 1.7;
 const RADIUS: f64 = 4.5;
 const RATIO: f64 = 2.0;
 
-/// Returns the places of all handles and their points, turned so that A has the polar angle of A with `RADIUS`. The head's
-/// coordinate is that of a place with `RADIUS`, and grows by `rate` per metre.
+/// Returns the places of all handles and their points, turned so that A has the polar angle of A with `RADIUS`. The
+/// head's coordinate is that of a place with `RADIUS`, and grows by `rate` per metre.
 fn handles(radius: f64, head: Place, rate: f64) -> Vec<(Place, [f64; 2])> {
     let path = Path::turnaround(PITCH, radius, RATIO, 0.0, 100.0).unwrap();
     let turned = (radius - RADIUS) * std::f64::consts::TAU / PITCH;

@@ -59,8 +59,9 @@ pub struct Cue {
 pub struct ControlRequest {
     /// A number that the client chooses; the response repeats it.
     pub id: u64,
-    /// The value of a command that has one: simulated seconds per second, simulated seconds, or periods. With the command
-    /// state, 1 requests a response whose `time_scale` is the rate of the show when it plays, even while it is paused.
+    /// The value of a command that has one: simulated seconds per second, simulated seconds, or periods. With the
+    /// command state, 1 requests a response whose `time_scale` is the rate of the show when it plays, even while it is
+    /// paused.
     pub value: f64,
     /// 0 state, 1 pause, 2 resume, 3 rate, 4 seek, 5 step, 6 restart, 7 hold, 8 release, 9 go.
     pub command: u32,

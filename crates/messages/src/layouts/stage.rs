@@ -77,9 +77,9 @@ pub const SCENE_HASH_BYTES: usize = 32;
 
 /// The header of a scene's text.
 ///
-/// Over iceoryx2 the user header of `<name>/scene`, whose payload is the text (UTF-8, TOML) as a slice of bytes. Sent at
-/// the start and kept for late subscribers. The text is empty if it is not known, as in the replay of a recording without
-/// it.
+/// Over iceoryx2 the user header of `<name>/scene`, whose payload is the text (UTF-8, TOML) as a slice of bytes. Sent
+/// at the start and kept for late subscribers. The text is empty if it is not known, as in the replay of a recording
+/// without it.
 ///
 /// # Examples
 ///
@@ -215,8 +215,8 @@ pub struct StageCue {
 /// Handles are numbered through all dragons. In the bench fields of alerts and events the number of handles plus j is
 /// the obstacle j, from 0.
 ///
-/// Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments of
-/// the path, layout 3 gave them their name, layout 4 added the time line: the freeze time, the events and the cues,
+/// Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments
+/// of the path, layout 3 gave them their name, layout 4 added the time line: the freeze time, the events and the cues,
 /// layout 5 the hash of the scene's text, layout 6 the dragons, the obstacles and a path of any length.
 ///
 /// # Examples

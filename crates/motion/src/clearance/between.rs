@@ -207,8 +207,8 @@ impl BetweenMonitor {
         }
     }
 
-    /// Returns the same monitor with a table of a show of these dragons from its start to `end` seconds. `travelled` has
-    /// the metres that the head of a dragon has travelled at a time of the show.
+    /// Returns the same monitor with a table of a show of these dragons from its start to `end` seconds. `travelled`
+    /// has the metres that the head of a dragon has travelled at a time of the show.
     pub fn with_table(self, dragons: &[TabledDragon<'_>], end: f64, travelled: &dyn Fn(usize, f64) -> f64) -> Self {
         Self { table: BetweenTable::new(dragons, end, travelled), ..self }
     }

@@ -2,10 +2,10 @@
 //!
 //! **Why nothing is skipped.** The proof in [`super`] does not use that two boards belong to one chain: it needs the
 //! clearances at both ends of a step and bounds C of the paths of the boards' points on the stage. Here a step is
-//! one of time. Each head goes forward along its path, or stands, so that C of each board is that of its own dragon, and
-//! B = C_a + C_b. Boards that stand have no path. Two boards on straight lines, neither of which begins or ends to move
-//! within the step, move relative to each other by the difference of their two vectors, along a straight line: B is
-//! its length. So two dragons that go side by side, or one behind the other, cost few steps.
+//! one of time. Each head goes forward along its path, or stands, so that C of each board is that of its own dragon,
+//! and B = C_a + C_b. Boards that stand have no path. Two boards on straight lines, neither of which begins or ends to
+//! move within the step, move relative to each other by the difference of their two vectors, along a straight line: B
+//! is its length. So two dragons that go side by side, or one behind the other, cost few steps.
 
 use crate::event::Budget;
 use crate::linkage::NoFollower;

@@ -1,16 +1,17 @@
 //! First touches of the obstacles of a ground and the least clearance of each, by the steps of [`super`].
 //!
-//! **Why nothing is skipped.** An obstacle stands still, so the proof in [`super`] holds with B = C of the board: if its
-//! distance d from the shape is at most x >= 0 at some time of a step, take the nearest points P of the board and Q of
-//! the shape then, or a common point. At both ends of the step P is at least as far from Q as the distances d_start and
-//! d_end, and P goes along a path no longer than C. So d_start + d_end <= 2 x + C. Where the clearance sought is an
-//! overlap, d < 0, the displacements that are additive take C's place. This holds for a convex shape. Out of a pocket of
-//! another shape the least translation may jump. There a board that is C longer and wider to each side takes the board's
-//! place: in the whole step the board is within it, so its least translation frees the board at any time of the step.
+//! **Why nothing is skipped.** An obstacle stands still, so the proof in [`super`] holds with B = C of the board: if
+//! its distance d from the shape is at most x >= 0 at some time of a step, take the nearest points P of the board and Q
+//! of the shape then, or a common point. At both ends of the step P is at least as far from Q as the distances d_start
+//! and d_end, and P goes along a path no longer than C. So d_start + d_end <= 2 x + C. Where the clearance sought is an
+//! overlap, d < 0, the displacements that are additive take C's place. This holds for a convex shape. Out of a pocket
+//! of another shape the least translation may jump. There a board that is C longer and wider to each side takes the
+//! board's place: in the whole step the board is within it, so its least translation frees the board at any time of the
+//! step.
 //!
 //! **Along a straight line** a board only moves by a vector D, and its distance from a side of a shape is a convex
-//! function of the way. Its slopes at both ends of the step bound it from below: along a wall nothing is lost. **Along a
-//! circle** the board and the circle's centre keep their distance: a round obstacle moves past the board by the turn
+//! function of the way. Its slopes at both ends of the step bound it from below: along a wall nothing is lost. **Along
+//! a circle** the board and the circle's centre keep their distance: a round obstacle moves past the board by the turn
 //! times the distance of the two centres.
 //!
 //! **Which boards.** A body board is where board 1 is when handle 1 is at the front handle's place. So boards behind
@@ -394,8 +395,8 @@ fn benches_of(meetings: &[Meeting]) -> usize {
     meetings.iter().map(|&(bench, _)| bench + 1).max().unwrap_or(0)
 }
 
-/// Returns a lower bound of a convex function of the share of a way, given at both ends the distance and the points that
-/// are nearest: from its slopes there.
+/// Returns a lower bound of a convex function of the share of a way, given at both ends the distance and the points
+/// that are nearest: from its slopes there.
 fn convex_bound(first: (f64, Point, Point), last: (f64, Point, Point), way: Vector) -> f64 {
     let slope = |(_, on_board, on_side): (f64, Point, Point)| {
         let outward = on_board - on_side;

@@ -1,8 +1,8 @@
 //! The search of [`super`]. Steps of a motion are proved to contain nothing nearer than a limit, and are halved if the
 //! proof fails.
 //!
-//! In: a [`SteppedSearch`], which knows the bodies and the bounds of their motion. The bodies are the boards of one chain
-//! (`search`), the boards of two dragons (`between`), or boards and obstacles (`ground`). Out: calls of
+//! In: a [`SteppedSearch`], which knows the bodies and the bounds of their motion. The bodies are the boards of one
+//! chain (`search`), the boards of two dragons (`between`), or boards and obstacles (`ground`). Out: calls of
 //! [`SteppedSearch::record`]. No pair is at or below the limit anywhere else.
 
 use crate::event::{Budget, Spent};
@@ -62,8 +62,8 @@ impl<'s, 'b> SearchState<'s, 'b> {
     }
 }
 
-/// Bodies that move, as the search sees them. The coordinate of their motion is the metres that a head has travelled, or
-/// the seconds of a show.
+/// Bodies that move, as the search sees them. The coordinate of their motion is the metres that a head has travelled,
+/// or the seconds of a show.
 pub(super) trait SteppedSearch<'s, 'b: 's> {
     /// The bodies at one coordinate.
     type Bodies;

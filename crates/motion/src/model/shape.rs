@@ -1,5 +1,5 @@
-//! Shapes that stand on the stage, and the signed distance of a board to each. The ground calls it; it is independent of
-//! team, path and keep-out.
+//! Shapes that stand on the stage, and the signed distance of a board to each. The ground calls it; it is independent
+//! of team, path and keep-out.
 //!
 //! The signed distance is positive apart, in metres: the Euclidean distance. It is negative where the board and the
 //! shape overlap: minus the least translation that frees the board (`escape`). The shape of a boundary is the plane

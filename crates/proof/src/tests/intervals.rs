@@ -86,7 +86,8 @@ fn interval(random: &mut Rng) -> (Interval, Vec<Number>) {
     (Interval::between(a, b), vec![a, b])
 }
 
-/// Every operation returns the number next to the exact result in its direction: no other number of 128 bits is between.
+/// Every operation returns the number next to the exact result in its direction: no other number of 128 bits is
+/// between.
 #[test]
 fn operations_are_rounded_to_the_next_number() {
     let mut random = Rng::with_seed(5);

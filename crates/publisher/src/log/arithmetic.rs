@@ -1,13 +1,13 @@
-//! The arithmetic on which the bits of a frame depend: the processor's instructions and the crate of the elementary functions.
-//! The log names both, and `verify` compares them with those of its machine.
+//! The arithmetic on which the bits of a frame depend: the processor's instructions and the crate of the elementary
+//! functions. The log names both, and `verify` compares them with those of its machine.
 
 use serde::{Deserialize, Serialize};
 
 use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::scene::Scene;
 
-/// The crate that computes sines and their like, compiled in (`bench_dragon_motion::model::elementary`). Earlier programs
-/// called the C library, and logged a hash of its results.
+/// The crate that computes sines and their like, compiled in (`bench_dragon_motion::model::elementary`). Earlier
+/// programs called the C library, and logged a hash of its results.
 const ELEMENTARY_FUNCTIONS: &str = "libm 0.2.16";
 
 /// The arithmetic of a machine, as far as it affects a frame.

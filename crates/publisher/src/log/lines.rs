@@ -1,7 +1,7 @@
 //! The lines of a log: JSON objects, each with a check over all bytes before it.
 //!
-//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged. It is reported by its number,
-//! before anything is computed.
+//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged. It is reported by its
+//! number, before anything is computed.
 
 use serde::{Deserialize, Serialize};
 
@@ -72,7 +72,8 @@ pub enum Line {
         skipped: u64,
         /// Frames in no hash.
         lost: u64,
-        /// The reason for the end of the run. After an error, the frame of the last period may be published and not logged.
+        /// The reason for the end of the run. After an error, the frame of the last period may be published and not
+        /// logged.
         reason: End,
     },
 }

@@ -35,8 +35,8 @@ const CHUNK_INDEX_BYTES: u64 = 512;
 const END_BYTES: u64 = 64 << 10;
 /// zstd's default: handles are nearly random, so higher levels take much longer and save nothing.
 const COMPRESSION_LEVEL: u32 = 3;
-/// The metadata from which `ros2 bag info` takes the distribution, as rosbag2 writes it at the start of a bag. Its other
-/// values come from the file's statistics. Since version 9 the quality of service is in words.
+/// The metadata from which `ros2 bag info` takes the distribution, as rosbag2 writes it at the start of a bag. Its
+/// other values come from the file's statistics. Since version 9 the quality of service is in words.
 const ROSBAG2_METADATA: &str = "\
 version: 8
 storage_identifier: mcap

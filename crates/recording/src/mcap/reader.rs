@@ -1,8 +1,8 @@
 //! Reads a recording: checks that it can be played, reads its contents, and its chunks one by one.
 //!
-//! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics, or a bag of several. Out: a
-//! [`Recording`], which has frames of a known type; then [`Item`]s, chunk by chunk, in the order of the files. That is the
-//! order of reception: log times decrease if the recording machine's clock was set back. Called by the
+//! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics, or a bag of several. Out:
+//! a [`Recording`], which has frames of a known type; then [`Item`]s, chunk by chunk, in the order of the files. That
+//! is the order of reception: log times decrease if the recording machine's clock was set back. Called by the
 //! [`replay`](crate::replay).
 
 use std::collections::HashMap;
@@ -197,8 +197,8 @@ impl Contents {
 }
 
 impl Recording {
-    /// Opens a file, or the files of a directory that `ros2 bag record` wrote. Reads their indexes and the first message
-    /// of each topic.
+    /// Opens a file, or the files of a directory that `ros2 bag record` wrote. Reads their indexes and the first
+    /// message of each topic.
     ///
     /// # Errors
     /// [`ReadError`]

@@ -1,8 +1,8 @@
 //! The check of responses against the table of commands: the codes and states that the responses so far allow.
 //!
-//! It knows no times, except those that follow from the scene: the [`record`](super::record) compares times with frames. A
-//! step or a cue may change the state between two responses. Every possible state is kept, and each response removes
-//! the states that would have answered otherwise.
+//! It knows no times, except those that follow from the scene: the [`record`](super::record) compares times with
+//! frames. A step or a cue may change the state between two responses. Every possible state is kept, and each response
+//! removes the states that would have answered otherwise.
 
 use bench_dragon_messages::control::{Code, Command, RATES, Refusal};
 use bench_dragon_messages::state::PlaybackState;

@@ -79,7 +79,8 @@ pub fn conduct<Failed: From<OpenError>>(
     })
 }
 
-/// Reads until the stage has come, and compares it with the facts of the scene. Returns false if it does not come in time.
+/// Reads until the stage has come, and compares it with the facts of the scene. Returns false if it does not come in
+/// time.
 fn wait_for_stage(
     feed: &mut Feed,
     record: &mut Record,

@@ -93,8 +93,8 @@ impl Record {
         self.fault(fault);
     }
 
-    /// Returns true if simulated time jumps between two frames without a seek, a restart or the end of the show. To be called
-    /// once every answer of these periods has come.
+    /// Returns true if simulated time jumps between two frames without a seek, a restart or the end of the show. To be
+    /// called once every answer of these periods has come.
     fn begins_again_unasked(&self, before: &FrameHeader, frame: &FrameHeader) -> bool {
         before.run_id == frame.run_id
             && before.tick + 1 == frame.tick

@@ -1,7 +1,7 @@
 //! A service of one message with a list: `<name>/stage` and `<name>/scene`, sent once and kept for late subscribers.
 //!
-//! In: a header and the elements. Out: one sample. Called by [`SharedMemoryPublisher`](super::SharedMemoryPublisher), on
-//! the loop's thread.
+//! In: a header and the elements. Out: one sample. Called by [`SharedMemoryPublisher`](super::SharedMemoryPublisher),
+//! on the loop's thread.
 
 use std::fmt::Debug;
 use std::time::Instant;
