@@ -3,7 +3,8 @@
     chase_tracker.py --leader NAME --follower NAME --from PORT --to PORT --seconds S --result FILE
 
 The leader's `send psn` sends to the first port, the follower's `chase psn` listens at the second. Writes a JSON object
-with the distances of the follower's head from the leader's along the path, from 3 s after the first packet.
+with the distances of the follower's head from the leader's along the path, from 3 s after the first packet and 1 s
+after the follower's start.
 """
 
 import argparse
@@ -57,9 +58,12 @@ def main():
         frames.stop = True
         frames.join()
     times = [header[0] for header in leader.headers]
+    # A busy machine starts the chase late.
+    moves = next(header[0] * 1e-9 for header in follower.headers if header[1] != follower.headers[0][1])
+    begin = max(started + 3, moves + 1)
     distances, epochs = [], set()
     for deadline_ns, sim_time, _, epoch, _ in follower.headers:
-        if not 3 <= deadline_ns * 1e-9 - started < arguments.seconds:
+        if not begin <= deadline_ns * 1e-9 < started + arguments.seconds:
             continue
         place = bisect.bisect(times, deadline_ns) - 1
         moment, leading, rate, _, _ = leader.headers[place]
