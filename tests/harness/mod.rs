@@ -9,7 +9,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -148,7 +148,10 @@ impl Lines {
         let mut lines = Vec::new();
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
-            lines.push(self.0.recv_timeout(left).unwrap_or_else(|_| panic!("no \"{what}\" within {:?}", patience())));
+            lines.push(self.0.recv_timeout(left).unwrap_or_else(|error| match error {
+                RecvTimeoutError::Timeout => panic!("no \"{what}\" within {:?}", patience()),
+                RecvTimeoutError::Disconnected => panic!("the process printed no \"{what}\", and its output has ended"),
+            }));
             if lines.last().is_some_and(|line| is_it(line)) {
                 return lines;
             }
@@ -160,7 +163,6 @@ impl Lines {
         let deadline = Instant::now() + patience();
         let mut lines = Vec::new();
         loop {
-            use std::sync::mpsc::RecvTimeoutError;
             match self.0.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
                 Ok(line) => lines.push(line),
                 Err(RecvTimeoutError::Disconnected) => return lines,

@@ -203,7 +203,10 @@ def offered(reader, participants):
     """Returns the quality of service of the publishers that a reader has matched, and the lease of their participants in
     seconds, as discovery tells them."""
     found = [reader.get_matched_publication_data(handle) for handle in reader.get_matched_publications()]
-    leases = {each.key: each.qos[Policy.Liveliness].lease_duration / 1e9 for each in participants.read(N=1000)}
+    # A publisher that has gone in between has no data, and the last sample of a participant that has gone no lease.
+    found = [each for each in found if each is not None]
+    heard = [each for each in participants.read(N=1000) if each.sample_info.valid_data]
+    leases = {each.key: each.qos[Policy.Liveliness].lease_duration / 1e9 for each in heard}
     return {
         "offered": sorted({f"{each.qos[Policy.Reliability]} {each.qos[Policy.Durability]}" for each in found}),
         "leases_s": sorted({leases[each.participant_key] for each in found}),
