@@ -40,9 +40,8 @@ pub struct ChaseStatus {
     pub distance: f64,
     /// 0 ArtTimeCode, 1 MIDI timecode, 2 LTC, 3 PosiStageNet.
     pub source: u32,
-    /// 0 silent, 1 locking, 2 locked, 3 freewheeling, 4 standing, 5 backward, 6 lost, 7 held, 8 paused, 9 sought, 10
-    /// ended. 7 to 9: the chase waits, because the show is held, or another client has paused it or sent it to another
-    /// time.
+    /// 0 silent, 1 locking, 2 locked, 3 freewheeling, 4 standing, 5 backward, 6 lost, 7 held, 8 paused, 9 sought, 10 ended.
+    /// 7 to 9: the chase waits, because the show is held, or another client has paused it or sent it to another time.
     pub state: u32,
     /// The label of timecode now: hours. 0 without a label.
     pub hours: u32,
