@@ -118,8 +118,8 @@ pub struct Decimation {
 }
 
 impl Decimation {
-    /// Chooses from dragons with these numbers of handles, at least 2, in the order of the frame. `every` is at least
-    /// 1.
+    /// Chooses from dragons with these numbers of handles, at least 2, in the order of the frame. `every` is
+    /// at least 1.
     pub fn new(dragons: impl IntoIterator<Item = usize>, every: usize) -> Self {
         let (mut handles, mut first) = (Vec::new(), 0);
         for count in dragons {
