@@ -26,7 +26,7 @@ PLACES = """() => new Promise((done) => {
 
 def motion_is_smooth_at_any_rate():
     counts = "[picture.received, picture.drawn, picture.sequence]"
-    with server() as url, browser(viewport={"width": 640, "height": 480}) as (page, complaints):
+    with server() as url, browser(screen=None, viewport={"width": 640, "height": 480}) as (page, complaints):
         page.goto(url)
         with publisher("--start", "100", "--rate", "2"):
             drawn(page)
@@ -58,7 +58,7 @@ def between_frames_is_where_the_solver_has_it():
     is at the start of the show, where the bends are widest: there four frames that a busy machine leaves out in a row
     cost 2.4e-7 m."""
     random = numpy.random.default_rng()
-    with server() as url, publisher("--rate", "10"), browser() as (page, complaints):
+    with server() as url, publisher("--rate", "10"), browser(screen=None) as (page, complaints):
         page.goto(url)
         drawn(page)
         until(page, "picture.received >= 5", "frames to draw between")
@@ -98,7 +98,7 @@ PICTURES = """() => new Promise((done) => {
 def loops_are_not_joined():
     """Every picture drawn while the show loops lies on the spiral; an interpolation between end and start would not."""
     options = ["--start", "411", "--rate", "10", "--loop", "--end-hold", "0"]
-    with server() as url, publisher(*options), browser(viewport={"width": 640, "height": 480}) as (page, complaints):
+    with server() as url, publisher(*options), browser(screen=None, viewport={"width": 640, "height": 480}) as (page, complaints):
         page.goto(url)
         drawn(page)
         pictures = page.evaluate(PICTURES)
@@ -136,7 +136,7 @@ def interpolation_keeps_its_rules():
         usual = {"due": 1000 * t, "time": t, "scale": 1, "playing": True, "run": "1", "epoch": 0}
         return {**usual, "handles": sum(handles, []), **changes}
 
-    with server() as url, browser() as (page, complaints):
+    with server() as url, browser(screen=None) as (page, complaints):
         page.goto(url)
 
         def at(frames, *moments, stage=None):

@@ -63,8 +63,17 @@ def browser(**context):
         yield opened(running, **context)
 
 
-def opened(running, **context):
+# A screen of 20 pictures a second, on which a page costs a third. Tests of motion have a common one.
+SLOW_SCREEN = """(() => {
+    const next = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 34);
+})()"""
+
+
+def opened(running, screen=SLOW_SCREEN, **context):
     page = running.new_context(**{"viewport": {"width": 1280, "height": 720}, "color_scheme": "light", **context}).new_page()
+    if screen:
+        page.add_init_script(screen)
     complaints = []
     page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))

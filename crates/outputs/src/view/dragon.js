@@ -7,6 +7,9 @@ import { SpeedScale } from "./palette.js";
 import { Show } from "./show.js";
 import { nameOf, say } from "./words.js";
 
+/** The part of a pixel by which a picture may lag behind. */
+const PART = 1 / 16;
+
 /** Returns the distance of the outermost bench from a place. */
 function reachOf(stage, handles, { x, y }) {
   let most = 0;
@@ -130,11 +133,16 @@ export class Dragon {
     return this.own(nameOf(bench));
   }
 
-  /** Returns a value that changes with its picture. */
-  lookKey() {
+  /**
+   * Returns a value that changes with its picture, by `PART` of a pixel or more, of which `pixels` are in a metre: a show
+   * that is slow enough costs as little as one that stands still.
+   */
+  lookKey(pixels) {
     const { frame, colours, marks, stage, publisher } = this, { shown, stream } = publisher;
+    const step = PART / (pixels * colours.head * (1 + colours.width));
+    const moment = step > 0 ? Math.floor(shown.time / step) : shown.time;
     const texts = marks.map(({ kind, pair, text }) => [kind, pair, text]), light = [this.show?.phase, this.sight.stale];
-    const show = [frame.run, frame.state, shown.time, shown.from.epoch, stream.alert?.level, stage.scene];
+    const show = [frame.run, frame.state, moment, shown.from.epoch, stream.alert?.level, stage.scene];
     return [show, colours.resting, this.path.reach, colours.step, colours.head, texts, light].join();
   }
 

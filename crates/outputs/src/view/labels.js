@@ -22,8 +22,13 @@ export class Labels {
     this.placed = [];
     this.key = null;
     this.laidAt = this.drawnAt = -Infinity;
-    /** True once no word moves any more. */
-    this.settled = true;
+    /** True while a word moves, and if the layout is of an earlier picture. */
+    this.isMoving = this.isLate = false;
+  }
+
+  /** Returns true if the words want another picture now. */
+  isDue(now) {
+    return this.isMoving || (this.isLate && now - this.laidAt >= INTERVAL);
   }
 
   /**
@@ -79,8 +84,7 @@ export class Labels {
     const passed = Math.min(100, now - this.drawnAt), part = this.isStill ? 1 : 1 - Math.exp((-3 * passed) / EASING),
         kept = new Map();
     this.drawnAt = now;
-    // The layout is of an earlier picture: another one follows.
-    this.settled = this.laidAt === now;
+    [this.isMoving, this.isLate] = [false, this.laidAt !== now];
     const { unit } = camera;
     const labels = this.placed.flatMap(({ item: { key }, box, line, share, isBadge, goal }, index) => {
       const item = items.find((one) => one.key === key);
@@ -93,7 +97,7 @@ export class Labels {
       const far = isOther ? 0 : Math.hypot(wanted.x - from.x, wanted.y - from.y),
           offset = isOther || far < 0.5 ? wanted : { x: from.x + part * (wanted.x - from.x),
           y: from.y + part * (wanted.y - from.y) };
-      if (far >= 0.5) this.settled = false;
+      this.isMoving ||= far >= 0.5;
       kept.set(key, { ...offset, share });
       const at = { x: end.x + offset.x, y: end.y + offset.y, half: item.half, tall: item.tall };
       const isBare = !line || (item.own && standsAtOwn(item.own, boardsNear(dragons, camera, at, unit), at, unit));

@@ -68,7 +68,7 @@ meet();
  * the publisher of the header.
  */
 let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0,
-    drawnAt = -Infinity;
+    drawn = { pass: 0, at: 0 };
 
 /**
  * For tests and measurements: the received and drawn data. `shown` is the simulated time and the handles of the
@@ -151,13 +151,12 @@ function pass() {
 /** Draws the picture, only if it has changed: a show that stands still costs nothing. */
 function paint(there) {
   if (lanterns) return light(there);
-  const hasFocus = document.activeElement === canvas;
-  const look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y, camera.scale, camera.c, camera.s, chosen,
-      whose.name, palette.ground, measure.key, hasFocus && measure.on,
-      labels?.settled === false && performance.now()].join();
+  const hasFocus = document.activeElement === canvas, pixels = camera.scale * camera.ratio;
+  const look = [there.map((dragon) => dragon.lookKey(pixels)), camera.x, camera.y, camera.scale, camera.c, camera.s,
+      chosen, whose.name, palette.ground, measure.key, hasFocus && measure.on,
+      labels?.isDue(passedAt) && passedAt].join();
   if (look === last) return;
-  if (last) resolution.take(passedAt - drawnAt);
-  [last, drawnAt] = [look, passedAt];
+  took(look);
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
     const { stage, places, colours, path, obstacles, marks, sight, identity } = dragon,
@@ -174,13 +173,19 @@ function paint(there) {
   drawnOf(isOneOfMany);
 }
 
+/** Notes what is drawn now, and measures the time of a picture if the last pass drew one too. */
+function took(look) {
+  if (last && !seat && picture.passes === drawn.pass + 1) resolution.take(passedAt - drawn.at);
+  [last, drawn] = [look, { pass: picture.passes, at: passedAt }];
+}
+
 /** Draws the show look. */
 function light(there) {
-  const isDue = pace?.begin(passedAt) ?? true, look = [there.map((dragon) => dragon.lookKey()), camera.x, camera.y,
-      camera.scale, camera.c, camera.s, seat?.key].join();
+  const isDue = pace?.begin(passedAt) ?? true, pixels = seat ? Infinity : camera.scale * camera.ratio;
+  const look = [there.map((dragon) => dragon.lookKey(pixels)), camera.x, camera.y, camera.scale, camera.c, camera.s,
+      seat?.key].join();
   if (look === last || !isDue) return;
-  if (last && !seat) resolution.take(passedAt - drawnAt);
-  [last, drawnAt] = [look, passedAt];
+  took(look);
   lanterns.draw(context, camera, there);
   pace?.drawn(passedAt);
   picture.drawn++;
