@@ -183,12 +183,16 @@ class Path:
 
 
 def greatest(function, low, high):
-    """Returns the places between `low` and `high` where functions with one maximum are greatest, and the maxima."""
+    """Returns places between `low` and `high` where functions with one maximum are not negative, and the values; without
+    such places, negative values. Functions grow by no more than their argument."""
     share = 0.5 * (math.sqrt(5) - 1)
     inner = [high - share * (high - low), low + share * (high - low)]
     values = [function(place) for place in inner]
     # Near a maximum a function is flat: the last brackets are 1e-8 of the first.
     for _ in range(38):
+        most = np.maximum(*values)
+        if ((most >= 0) | (most + high - low < 0)).all():
+            break
         right = values[0] < values[1]
         low, high = np.where(right, inner[0], low), np.where(right, high, inner[1])
         kept = np.where(right, inner[1], inner[0]), np.where(right, values[1], values[0])
@@ -196,8 +200,7 @@ def greatest(function, low, high):
         value = function(place)
         inner = [np.where(right, kept[0], place), np.where(right, place, kept[0])]
         values = [np.where(right, kept[1], value), np.where(right, value, kept[1])]
-    at = 0.5 * (low + high)
-    return at, function(at)
+    return np.where(values[0] > values[1], *inner), np.maximum(*values)
 
 
 class Show:
