@@ -7,7 +7,7 @@ use super::camera::Camera;
 use super::metres;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::description::PathDescription;
-use bench_dragon_motion::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon_motion::model::segment::{OutlineKind, SegmentOutline};
 use bench_dragon_motion::model::spiral::Direction;
 use bench_dragon_motion::model::{Point, Vector};
 use bench_dragon_motion::placement::Placement;

@@ -23,7 +23,8 @@ use bench_dragon_messages::state::EventKind;
 
 use crate::model::board::Board;
 use crate::model::description::PathDescription;
-use crate::model::path::{Disjoint, Path, SegmentOutline};
+use crate::model::path::{Disjoint, Path};
+use crate::model::segment::SegmentOutline;
 use crate::model::team::Team;
 use crate::solve::newton::Newton;
 use crate::solve::paper::{self, Paper, PaperRules};

@@ -10,7 +10,7 @@ use crate::linkage::NoFollower;
 use crate::model::curve::{Coordinate, Curve};
 use crate::model::double_double::DoubleDouble;
 use crate::model::elementary;
-use crate::model::path::{OutlineKind, SegmentOutline};
+use crate::model::segment::{OutlineKind, SegmentOutline};
 use crate::model::spiral::{Direction, Spiral};
 use crate::model::{Point, Vector};
 use crate::solve::{ChainMut, Solver};

@@ -11,7 +11,7 @@ use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::ground::Obstacle;
 use bench_dragon_motion::model::Point;
-use bench_dragon_motion::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon_motion::model::segment::{OutlineKind, SegmentOutline};
 use bench_dragon_motion::model::shape::{Shape, ShapeKind};
 use bench_dragon_motion::model::spiral::Direction;
 use bench_dragon_motion::model::team::Team;

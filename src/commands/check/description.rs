@@ -1,7 +1,7 @@
 //! What `check` says of a scene without its motion: teams, paths, placements, solvers, alerts and outputs.
 
 use bench_dragon::motion::ensemble::{Dragon, Ensemble};
-use bench_dragon::motion::model::path::{OutlineKind, SegmentOutline};
+use bench_dragon::motion::model::segment::{OutlineKind, SegmentOutline};
 use bench_dragon::motion::model::spiral::Direction;
 use bench_dragon::motion::placement::Placement;
 use bench_dragon::motion::solve::Velocities;

@@ -97,6 +97,10 @@ impl Curve for Arc {
         2.0 * self.radius * elementary::sin(half) * self.tangent(from.plus(half))
     }
 
+    fn largest_summand(&self, _: Coordinate, _: Coordinate, length: f64) -> f64 {
+        self.origin.coords.amax().max(length.min(2.0 * self.radius))
+    }
+
     fn link_pose(&self, front: Coordinate, rear: Coordinate, _: f64) -> LinkPose {
         // The chord is parallel to the tangent half way.
         let half = 0.5 * front.minus(rear);

@@ -4,9 +4,9 @@
 //! doubles, so that a place far along loses no digits. Its coordinate may grow or fall in the direction of travel.
 //!
 //! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`. It also needs a variant of
-//! [`Segment`](super::segment::Segment) and of `description`, and a constructor and an outline in `path`. No other code
-//! of this crate distinguishes kinds of curves: `model` has a test of that. The methods with a default have one that is
-//! valid for every curve; the default of a bound costs time only.
+//! [`Segment`](super::segment::Segment) with its outline, and one of `description` that constructs it. No other code of
+//! `model` distinguishes kinds of curves. The methods with a default have one that is valid for every curve; the
+//! default of a bound costs time only.
 
 use super::double_double::DoubleDouble;
 use super::team::Team;
@@ -154,6 +154,12 @@ pub trait Curve {
 
     /// Returns the vector from one place to another, metres, with a relative error of a few units in the last place.
     fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector;
+
+    /// Returns the largest summand of the points from one place to another, `length` metres later, or a bound of it,
+    /// metres. The points of a curve about the origin have none.
+    fn largest_summand(&self, first: Coordinate, _last: Coordinate, length: f64) -> f64 {
+        self.point(first).coords.amax().max(length)
+    }
 
     /// Returns the pose of the link of `link` metres between two places.
     fn link_pose(&self, front: Coordinate, rear: Coordinate, _link: f64) -> LinkPose {

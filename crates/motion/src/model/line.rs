@@ -54,6 +54,10 @@ impl Curve for Line {
         to.minus(from) * self.direction
     }
 
+    fn largest_summand(&self, _: Coordinate, _: Coordinate, _: f64) -> f64 {
+        self.origin.coords.amax()
+    }
+
     fn follower(&self, _: Coordinate, behind: f64, link: f64) -> Result<Follower, NoFollower> {
         Ok(Follower::within(link, behind))
     }

@@ -12,7 +12,7 @@ use super::double_double::DoubleDouble;
 use super::elementary::{atan, atan2, hypot};
 use super::line::Line;
 use super::placed_spiral::PlacedSpiral;
-use super::segment::Segment;
+use super::segment::{Segment, SegmentOutline};
 use super::spiral::{Direction, Spiral};
 use super::{Point, Vector};
 
@@ -92,45 +92,6 @@ pub struct Path {
     segments: Vec<Placed>,
     /// By segment: the centre and the radius of a circle that holds it; none for a path of one segment.
     circles: Vec<(Point, f64)>,
-}
-
-/// The outline of a segment, for drawings.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SegmentOutline {
-    /// Kind of the curve.
-    pub kind: OutlineKind,
-    /// Its first point.
-    pub start: Point,
-    /// Direction of travel there, radians counter-clockwise from x.
-    pub heading: f64,
-    /// Metres along it.
-    pub length: f64,
-}
-
-/// The curve of a segment's outline.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum OutlineKind {
-    /// Straight on.
-    Line,
-    /// Part of a circle.
-    Arc {
-        /// 1/m, positive if it turns left.
-        curvature: f64,
-    },
-    /// Along r = pitch theta / 2 pi; outward, turned by half a turn.
-    Spiral {
-        /// Towards the centre or away from it.
-        direction: Direction,
-        /// Metres per turn.
-        pitch: f64,
-        /// Polar angle of its beginning on the unturned spiral, radians.
-        first: f64,
-        /// Polar angle of its end on the unturned spiral, radians.
-        last: f64,
-        /// Curvature at its beginning, 1/m, positive to the left, of a piece of a route, and of a spiral that a
-        /// placement moves, turns or mirrors; NaN of a spiral about the origin.
-        curvature: f64,
-    },
 }
 
 impl Path {
@@ -296,15 +257,7 @@ impl Path {
     pub fn largest_summand(&self, behind: f64) -> f64 {
         let of = |placed: &Placed| {
             let length = placed.end - placed.begin.max(-behind);
-            match placed.segment {
-                Segment::Line(line) => line.origin.coords.amax(),
-                Segment::Arc(arc) => arc.origin.coords.amax().max(length.min(2.0 * arc.radius)),
-                Segment::Spiral(_) => 0.0,
-                Segment::PlacedSpiral(spiral) => {
-                    let widest = spiral.spiral().radius(placed.anchor).max(spiral.spiral().radius(placed.last));
-                    spiral.point(placed.anchor).coords.amax().max(length.min(2.0 * widest))
-                }
-            }
+            placed.segment.largest_summand(placed.anchor, placed.last, length)
         };
         self.segments.iter().map(of).fold(0.0, f64::max)
     }
@@ -335,28 +288,7 @@ impl Path {
         ahead
             .map(|placed| {
                 let begin = placed.begin.max(0.0);
-                let (first, last) = (placed.at(begin), placed.last);
-                let tangent = placed.segment.tangent(first);
-                let kind = match placed.segment {
-                    Segment::Line(_) => OutlineKind::Line,
-                    Segment::Arc(arc) => OutlineKind::Arc { curvature: arc.signed_curvature() },
-                    Segment::Spiral(spiral) => OutlineKind::Spiral {
-                        direction: spiral.direction(),
-                        pitch: spiral.pitch(),
-                        first: first.high,
-                        last: last.high,
-                        curvature: f64::NAN,
-                    },
-                    Segment::PlacedSpiral(spiral) => OutlineKind::Spiral {
-                        direction: spiral.spiral().direction(),
-                        pitch: spiral.spiral().pitch(),
-                        first: first.high,
-                        last: last.high,
-                        curvature: spiral.signed_curvature(first),
-                    },
-                };
-                let start = placed.segment.point(first);
-                SegmentOutline { kind, start, heading: atan2(tangent.y, tangent.x), length: placed.end - begin }
+                placed.segment.outline(placed.at(begin), placed.last, placed.end - begin)
             })
             .collect()
     }
@@ -403,6 +335,21 @@ pub struct Route {
     remainders: Option<Remainders>,
 }
 
+/// A curve between two of its places: a piece of a route.
+#[derive(Debug, Clone, Copy)]
+pub struct RoutePiece {
+    /// The curve.
+    pub segment: Segment,
+    /// The place where the piece begins.
+    pub first: Coordinate,
+    /// The place where it ends.
+    pub last: Coordinate,
+    /// Metres along it.
+    pub length: f64,
+    /// Turns by which its direction changes, positive to the left.
+    pub turned: f64,
+}
+
 /// The rounding errors of the end, the heading and the length of a route so far.
 #[derive(Debug, Clone, Copy, Default)]
 struct Remainders {
@@ -420,18 +367,29 @@ impl Route {
 
     /// Adds a straight line of `length` metres.
     pub fn line(self, length: f64) -> Self {
-        let line = Line { origin: self.end, direction: self.direction() };
-        self.continued(Segment::Line(line), Coordinate::ZERO, Coordinate { high: length, low: 0.0 }, length, 0.0)
+        self.piece(|origin, direction| {
+            let last = Coordinate { high: length, low: 0.0 };
+            RoutePiece {
+                segment: Segment::Line(Line { origin, direction }),
+                first: Coordinate::ZERO,
+                last,
+                length,
+                turned: 0.0,
+            }
+        })
     }
 
     /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
     pub fn arc(self, side: Side, radius: f64, turns: impl Into<DoubleDouble>) -> Self {
         let around = turns.into();
         let turns = around.high;
-        let arc = Arc::new(self.end, self.direction(), side, radius);
-        let turned = if side == Side::Left { turns } else { -turns };
-        let last = DoubleDouble::from_turns(around);
-        self.continued(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
+        self.piece(|origin, direction| RoutePiece {
+            segment: Segment::Arc(Arc::new(origin, direction, side, radius)),
+            first: Coordinate::ZERO,
+            last: DoubleDouble::from_turns(around),
+            length: radius * TAU * turns,
+            turned: if side == Side::Left { turns } else { -turns },
+        })
     }
 
     /// Adds an Archimedean spiral of `pitch` metres per turn. It begins `radius` metres from its centre, which is on
@@ -452,11 +410,15 @@ impl Route {
         let first = DoubleDouble::from_turns(high).plus(TAU * low);
         let around = DoubleDouble::from_turns(turns);
         let last = first.plus(spiral.sign() * around.high).plus(spiral.sign() * around.low);
-        let placed = PlacedSpiral::new(self.end, self.direction(), side, spiral, first);
         let inclined = atan(around.high / (1.0 + first.high * last.high)) / TAU;
         let turned = turns.high + inclined;
-        let turned = if side == Side::Left { turned } else { -turned };
-        self.continued(Segment::PlacedSpiral(placed), first, last, spiral.arc_length(first, last), turned)
+        self.piece(|origin, direction| RoutePiece {
+            segment: Segment::PlacedSpiral(PlacedSpiral::new(origin, direction, side, spiral, first)),
+            first,
+            last,
+            length: spiral.arc_length(first, last),
+            turned: if side == Side::Left { turned } else { -turned },
+        })
     }
 
     fn direction(&self) -> Vector {
@@ -467,7 +429,9 @@ impl Route {
         Vector::new(cosine, sine)
     }
 
-    fn continued(mut self, segment: Segment, first: Coordinate, last: Coordinate, length: f64, turned: f64) -> Self {
+    /// Adds the piece that begins at the route's end, a point, in the route's unit direction there.
+    pub fn piece(mut self, of: impl FnOnce(Point, Vector) -> RoutePiece) -> Self {
+        let RoutePiece { segment, first, last, length, turned } = of(self.end, self.direction());
         let before = self.path.length();
         self.path.push(segment, first, last, length);
         let Some(rest) = &mut self.remainders else {

@@ -103,6 +103,11 @@ impl Curve for PlacedSpiral {
         self.vector(self.spiral.displacement(from, to))
     }
 
+    fn largest_summand(&self, first: Coordinate, last: Coordinate, length: f64) -> f64 {
+        let widest = self.spiral.radius(first).max(self.spiral.radius(last));
+        self.point(first).coords.amax().max(length.min(2.0 * widest))
+    }
+
     fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose {
         let pose = self.spiral.link_pose(front, rear, link);
         LinkPose { direction: self.vector(pose.direction), ..pose }

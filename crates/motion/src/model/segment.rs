@@ -1,10 +1,12 @@
-//! [`Segment`]: one of the curves of a path. This is the only list of the kinds of curves that is matched on.
+//! [`Segment`]: one of the curves of a path, and its outline for drawings. This is the only list of the kinds of curves
+//! that is matched on.
 
 use super::arc::Arc;
 use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
+use super::elementary::atan2;
 use super::line::Line;
 use super::placed_spiral::PlacedSpiral;
-use super::spiral::Spiral;
+use super::spiral::{Direction, Spiral};
 use super::team::Team;
 use super::{Point, Vector};
 
@@ -56,6 +58,7 @@ forward! {
     fn arc_over(&self, chord: f64) -> Option<f64>;
     fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64;
     fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector;
+    fn largest_summand(&self, first: Coordinate, last: Coordinate, length: f64) -> f64;
     fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose;
     fn follower(&self, front: Coordinate, behind: f64, link: f64) -> Result<Follower, NoFollower>;
     fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64>;
@@ -69,4 +72,64 @@ forward! {
     fn quiet_place(&self, team: &Team, limit: f64, last: Coordinate) -> Option<Coordinate>;
     fn seen_from_frame(&self, moved: (Coordinate, Coordinate), turned: f64, behind: Coordinate) -> Option<f64>;
     fn frame_travel(&self, turned: f64) -> f64;
+}
+
+/// The outline of a segment, for drawings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SegmentOutline {
+    /// Kind of the curve.
+    pub kind: OutlineKind,
+    /// Its first point.
+    pub start: Point,
+    /// Direction of travel there, radians counter-clockwise from x.
+    pub heading: f64,
+    /// Metres along it.
+    pub length: f64,
+}
+
+/// The curve of a segment's outline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OutlineKind {
+    /// Straight on.
+    Line,
+    /// Part of a circle.
+    Arc {
+        /// 1/m, positive if it turns left.
+        curvature: f64,
+    },
+    /// Along r = pitch theta / 2 pi; outward, turned by half a turn.
+    Spiral {
+        /// Towards the centre or away from it.
+        direction: Direction,
+        /// Metres per turn.
+        pitch: f64,
+        /// Polar angle of its beginning on the unturned spiral, radians.
+        first: f64,
+        /// Polar angle of its end on the unturned spiral, radians.
+        last: f64,
+        /// Curvature at its beginning, 1/m, positive to the left, of a piece of a route, and of a spiral that a
+        /// placement moves, turns or mirrors; NaN of a spiral about the origin.
+        curvature: f64,
+    },
+}
+
+impl Segment {
+    /// Returns the outline of the `length` metres from one place to another.
+    pub(super) fn outline(&self, first: Coordinate, last: Coordinate, length: f64) -> SegmentOutline {
+        let tangent = self.tangent(first);
+        let spiral = |spiral: &Spiral, curvature| OutlineKind::Spiral {
+            direction: spiral.direction(),
+            pitch: spiral.pitch(),
+            first: first.high,
+            last: last.high,
+            curvature,
+        };
+        let kind = match self {
+            Self::Line(_) => OutlineKind::Line,
+            Self::Arc(arc) => OutlineKind::Arc { curvature: arc.signed_curvature() },
+            Self::Spiral(about_origin) => spiral(about_origin, f64::NAN),
+            Self::PlacedSpiral(placed) => spiral(placed.spiral(), placed.signed_curvature(first)),
+        };
+        SegmentOutline { kind, start: self.point(first), heading: atan2(tangent.y, tangent.x), length }
+    }
 }

@@ -273,6 +273,10 @@ impl Curve for Spiral {
         self.pose(to, from, 1.0).direction
     }
 
+    fn largest_summand(&self, _: Coordinate, _: Coordinate, _: f64) -> f64 {
+        0.0
+    }
+
     fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose {
         self.pose(front, rear, link)
     }
