@@ -5,9 +5,10 @@
 
 use super::capsule::{Capsule, Pair};
 use super::chain::{Chain, span_is_one};
+use super::curve::At;
 use super::ground::Mapping;
 use super::interval::{Interval, Vector};
-use super::path::{At, Place, Span};
+use super::path::{Place, Span};
 use super::scene::{Scene, Team};
 use super::sides::Sides;
 

@@ -8,6 +8,7 @@ mod apart;
 mod boards;
 mod capsule;
 mod chain;
+mod curve;
 mod elementary;
 mod events;
 mod far;

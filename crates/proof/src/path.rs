@@ -1,12 +1,12 @@
-//! The path of a certificate, in intervals: its curves, its places and their order, and bounds of length, curvature and
-//! turning between two places (docs/proofs.md, "Definitions" and "Capsules").
+//! The path of a certificate, in intervals: its segments, its places and their order, and bounds of length, curvature
+//! and turning between two places (docs/proofs.md, "Definitions" and "Capsules").
 
 use std::cmp::Ordering;
 
 use serde::Deserialize;
 
-use super::elementary;
-use super::interval::{Interval, Vector};
+use super::curve::{At, Curve};
+use super::interval::Interval;
 
 /// A place: the segment, and the coordinate on it, the sum of two doubles. The second, which a file may leave out, is
 /// at most half a unit in the last place of the first.
@@ -30,217 +30,6 @@ impl Place {
 /// A span, the earlier end first.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(super) struct Span(pub Place, pub Place);
-
-/// A curve, as a function of its coordinate.
-pub(super) enum Curve {
-    /// Towards the centre: the coordinate falls with travel. `a` is in metres of radius per radian.
-    Inward { a: Interval, frame: Option<Frame> },
-    /// Away from the centre, turned by half a turn.
-    Outward { a: Interval, frame: Option<Frame> },
-    /// Coordinates are metres from `origin`.
-    Line { origin: Vector, direction: Vector },
-    /// Coordinates are radians from `origin`.
-    /// `to_left` is 1 if the centre is on the left, else -1.
-    Arc { origin: Vector, direction: Vector, to_centre: Vector, radius: Interval, to_left: Interval },
-}
-
-/// The place of a route's spiral: the spiral about the origin is mirrored (y to -y), rotated and moved.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
-    centre: Vector,
-    /// Cosine and sine of the rotation.
-    rotation: Vector,
-    is_mirrored: bool,
-}
-
-impl Frame {
-    fn vector(&self, Vector { x, y }: &Vector) -> Vector {
-        let Vector { x: cosine, y: sine } = &self.rotation;
-        let y = if self.is_mirrored { -*y } else { *y };
-        Vector { x: cosine * x - sine * y, y: sine * x + cosine * y }
-    }
-
-    fn at(&self, At { point, tangent }: &At) -> At {
-        At { point: self.centre.plus(&self.vector(point)), tangent: self.vector(tangent) }
-    }
-
-    /// Returns a curvature to the left, or its rate, of the spiral about the origin in this frame.
-    fn bend(frame: Option<&Self>, bend: Interval) -> Interval {
-        if frame.is_some_and(|frame| frame.is_mirrored) { -bend } else { bend }
-    }
-}
-
-/// A point of the path with the unit tangent in the direction of travel.
-#[derive(Debug, Clone)]
-pub(super) struct At {
-    pub point: Vector,
-    pub tangent: Vector,
-}
-
-impl Curve {
-    /// Creates an arc that begins at `origin` with `direction`. `to_left` is 1 if its centre is on the left, else -1.
-    pub fn arc(origin: Vector, direction: Vector, to_left: Interval, radius: Interval) -> Self {
-        let to_centre = Vector { x: -(direction.y * to_left), y: direction.x * to_left };
-        Self::Arc { origin, direction, to_centre, radius, to_left }
-    }
-
-    /// Creates a spiral of `a` metres per radian from `origin`, where its polar angle is `first` and the direction of
-    /// travel `heading` radians from x. `to_left` is true if its centre is on the left.
-    pub fn spiral_from(
-        origin: &Vector,
-        heading: &Interval,
-        is_inward: bool,
-        to_left: bool,
-        a: Interval,
-        first: &Interval,
-    ) -> Self {
-        let of = |frame| if is_inward { Self::Inward { a, frame } } else { Self::Outward { a, frame } };
-        // About the origin an inward spiral turns right, an outward one left, with the tangent at theta + atan theta +
-        // pi.
-        let is_mirrored = is_inward == to_left;
-        let own_heading = first + elementary::atan(first) + elementary::turns(0.5);
-        let turned = if is_mirrored { heading + own_heading } else { heading - own_heading };
-        let (sine, cosine) = elementary::sin_cos(&turned);
-        let frame = Frame { centre: *origin, rotation: Vector { x: cosine, y: sine }, is_mirrored };
-        let centre = origin.minus(&frame.vector(&of(None).at(first).point));
-        of(Some(Frame { centre, ..frame }))
-    }
-
-    /// Returns point and tangent at a coordinate.
-    pub fn at(&self, coordinate: &Interval) -> At {
-        match self {
-            Self::Inward { a, frame } => {
-                let at = spiral_at(a, coordinate);
-                frame.as_ref().map_or_else(|| at.clone(), |frame| frame.at(&at))
-            }
-            Self::Outward { a, frame } => {
-                let At { point, tangent } = spiral_at(a, coordinate);
-                // Turned by half a turn, and travelled the other way.
-                let at = At { point: Vector { x: -point.x, y: -point.y }, tangent };
-                frame.as_ref().map_or_else(|| at.clone(), |frame| frame.at(&at))
-            }
-            Self::Line { origin, direction } => {
-                At { point: origin.plus(&direction.scaled(coordinate)), tangent: *direction }
-            }
-            Self::Arc { origin, direction, to_centre, radius, .. } => {
-                let (sine, cosine) = elementary::sin_cos(coordinate);
-                let across = to_centre.scaled(&(Interval::new(1.0) - cosine));
-                let chord = direction.scaled(&sine).plus(&across);
-                let tangent = direction.scaled(&cosine).plus(&to_centre.scaled(&sine));
-                At { point: origin.plus(&chord.scaled(radius)), tangent }
-            }
-        }
-    }
-
-    /// Returns the metres of travel from one coordinate to another.
-    pub fn metres(&self, from: &Interval, to: &Interval) -> Interval {
-        match self {
-            Self::Inward { a, .. } => spiral_metres(a, from) - spiral_metres(a, to),
-            Self::Outward { a, .. } => spiral_metres(a, to) - spiral_metres(a, from),
-            Self::Line { .. } => to - from,
-            Self::Arc { radius, .. } => radius * (to - from),
-        }
-    }
-
-    /// Returns an upper bound of the metres from one coordinate to a later one.
-    fn metres_bound(&self, from: &Interval, to: &Interval) -> Interval {
-        match self {
-            // The radian at angle theta is a w(theta) metres long, most at the greater angle.
-            Self::Inward { a, .. } => a * w(from) * (from - to),
-            Self::Outward { a, .. } => a * w(to) * (to - from),
-            Self::Line { .. } | Self::Arc { .. } => self.metres(from, to),
-        }
-    }
-
-    /// Returns an upper bound of the curvature from one coordinate to a later one, 1/m.
-    fn curvature_bound(&self, from: &Interval, to: &Interval) -> Interval {
-        match self {
-            Self::Inward { a, .. } => spiral_curvature(a, to),
-            Self::Outward { a, .. } => spiral_curvature(a, from),
-            Self::Line { .. } => Interval::new(0.0),
-            Self::Arc { radius, .. } => Interval::new(1.0) / radius,
-        }
-    }
-
-    /// Returns an upper bound of the radians by which the path turns from one coordinate to a later one.
-    fn turning_bound(&self, from: &Interval, to: &Interval) -> Interval {
-        let spiral = |outer: &Interval, inner: &Interval| {
-            let square = inner.square();
-            (outer - inner) * (square + Interval::new(2.0)) / (square + Interval::new(1.0))
-        };
-        match self {
-            Self::Inward { .. } => spiral(from, to),
-            Self::Outward { .. } => spiral(to, from),
-            Self::Line { .. } => Interval::new(0.0),
-            Self::Arc { .. } => to - from,
-        }
-    }
-
-    /// Returns the curvature from one coordinate to a later one, positive to the left, 1/m.
-    pub fn bend(&self, from: &Interval, to: &Interval) -> Interval {
-        match self {
-            // The curvature falls with the angle.
-            Self::Inward { a, frame } => {
-                Frame::bend(frame.as_ref(), -spiral_curvature(a, from).hull(&spiral_curvature(a, to)))
-            }
-            Self::Outward { a, frame } => {
-                Frame::bend(frame.as_ref(), spiral_curvature(a, from).hull(&spiral_curvature(a, to)))
-            }
-            Self::Line { .. } => Interval::new(0.0),
-            Self::Arc { radius, to_left, .. } => to_left / radius,
-        }
-    }
-
-    /// Returns the change of that curvature per metre from one coordinate to a later one, 1/m^2.
-    fn bend_rate(&self, from: &Interval, to: &Interval) -> Interval {
-        match self {
-            Self::Inward { a, frame } | Self::Outward { a, frame } => {
-                let theta = from.hull(to);
-                let square = theta.square();
-                let w_squared = square + Interval::new(1.0);
-                let rate = -(theta * (square + Interval::new(4.0)) / (a.square() * w_squared * w_squared.square()));
-                Frame::bend(frame.as_ref(), rate)
-            }
-            Self::Line { .. } | Self::Arc { .. } => Interval::new(0.0),
-        }
-    }
-
-    /// Returns a double near the metres per unit of the coordinate, negative if the coordinate falls with travel.
-    fn rough_speed(&self, coordinate: f64) -> f64 {
-        match self {
-            Self::Inward { a, .. } => -a.rough() * coordinate.hypot(1.0),
-            Self::Outward { a, .. } => a.rough() * coordinate.hypot(1.0),
-            Self::Line { .. } => 1.0,
-            Self::Arc { radius, .. } => radius.rough(),
-        }
-    }
-}
-
-fn w(theta: &Interval) -> Interval {
-    (theta.square() + Interval::new(1.0)).sqrt()
-}
-
-fn spiral_at(a: &Interval, theta: &Interval) -> At {
-    let (sine, cosine) = elementary::sin_cos(theta);
-    let w = w(theta);
-    let radius = a * theta;
-    let point = Vector { x: cosine * radius, y: sine * radius };
-    let tangent = Vector { x: (theta * sine - cosine) / w, y: -(theta * cosine + sine) / w };
-    At { point, tangent }
-}
-
-/// Returns the metres from the centre: a / 2 (theta w + asinh theta).
-fn spiral_metres(a: &Interval, theta: &Interval) -> Interval {
-    let w = w(theta);
-    let asinh = elementary::ln(&(theta + w));
-    a * Interval::new(0.5) * (theta * w + asinh)
-}
-
-fn spiral_curvature(a: &Interval, theta: &Interval) -> Interval {
-    let square = theta.square();
-    let w_squared = square + Interval::new(1.0);
-    (square + Interval::new(2.0)) / (a * w_squared * w_squared.sqrt())
-}
 
 /// A curve with its first coordinate (none for the first segment) and its last (none without an end).
 pub(super) struct Segment {
@@ -323,7 +112,7 @@ impl Path {
     }
 
     fn falls(&self, segment: usize) -> bool {
-        matches!(self.segments[segment].curve, Curve::Inward { .. })
+        self.segments[segment].curve.falls()
     }
 
     /// Returns true if the place is valid: a number strictly inside a segment. The centre of a spiral that is the whole
@@ -367,20 +156,17 @@ impl Path {
 
     /// Returns true if the segment is a line.
     pub fn is_line(&self, segment: usize) -> bool {
-        matches!(self.segments[segment].curve, Curve::Line { .. })
+        self.segments[segment].curve.is_line()
     }
 
     /// Returns true if the segment is an arc.
     pub fn is_arc(&self, segment: usize) -> bool {
-        matches!(self.segments[segment].curve, Curve::Arc { .. })
+        self.segments[segment].curve.is_arc()
     }
 
     /// Returns the metres from the centre at a place of an inward spiral.
     pub fn spiral_radius(&self, place: Place) -> Option<Interval> {
-        match &self.segments[place.0].curve {
-            Curve::Inward { a, .. } => Some(a * place.coordinate()),
-            _ => None,
-        }
+        self.segments[place.0].curve.spiral_radius(place.coordinate())
     }
 
     /// Returns the parts of a span in each segment: its curve, and the coordinates at the ends.

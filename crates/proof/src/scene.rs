@@ -4,10 +4,11 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use super::curve::{Curve, PieceText, read_piece};
 use super::elementary;
 use super::ground::{Mapping, Obstacle, PlacementText, StageText};
 use super::interval::{Interval, Vector};
-use super::path::{Curve, Path, PathEnd, Segment};
+use super::path::{Path, PathEnd, Segment};
 
 /// Limit of benches.
 const MOST: usize = 1_000_000;
@@ -126,34 +127,12 @@ enum PathText {
     },
 }
 
-#[derive(Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-enum PieceText {
-    Line { length: f64 },
-    Arc { radius: f64, side: Side, turns: Option<f64>, length: Option<f64> },
-    Spiral { pitch: f64, radius: f64, direction: Way, side: Side, turns: Option<f64>, length: Option<f64> },
-}
-
-#[derive(Deserialize, Clone, Copy, PartialEq)]
-#[serde(rename_all = "lowercase")]
-enum Way {
-    In,
-    Out,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "lowercase")]
-enum Side {
-    Left,
-    Right,
-}
-
 /// Reads a text.
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     toml::from_str(text).map_err(|error: toml::de::Error| error.message().trim().replace('\n', ", "))
 }
 
-fn positive(field: &str, number: f64) -> Result<Interval, String> {
+pub(super) fn positive(field: &str, number: f64) -> Result<Interval, String> {
     if number.is_finite() && number > 0.0 {
         Ok(Interval::new(number))
     } else {
@@ -271,7 +250,7 @@ impl Scene {
         let Team { benches, width, hole_inset, head_link, body_link } = self.team;
         let team = Team { benches, width, hole_inset, head_link, body_link };
         let zero = Interval::new(0.0);
-        let inward = Segment { curve: Curve::Inward { a, frame: None }, begin: None, end: Some(zero) };
+        let inward = Segment { curve: Curve::inward(a), begin: None, end: Some(zero) };
         let path = Path::new(vec![inward], zero, PathEnd::Coordinate(zero), zero);
         Self {
             name: String::new(),
@@ -312,7 +291,7 @@ fn growth(pitch: f64) -> Result<Interval, String> {
 
 fn spiral(pitch: f64, start_turn: f64) -> Result<Path, String> {
     positive("path.start_turn", start_turn)?;
-    let curve = Curve::Inward { a: growth(pitch)?, frame: None };
+    let curve = Curve::inward(growth(pitch)?);
     let inward = Segment { curve, begin: None, end: Some(Interval::new(0.0)) };
     let start = elementary::turns(start_turn);
     let length = inward.curve.metres(&start, &Interval::new(0.0));
@@ -327,7 +306,7 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
     let radius = positive("path.turn_radius", *turn_radius)?;
     let ratio = positive("path.arc_ratio", *arc_ratio)?;
     let turn = radius / a;
-    let inward = Curve::Inward { a, frame: None };
+    let inward = Curve::inward(a);
     let lead_in = match (lead_in, start_turn) {
         (Some(metres), None) if *metres == 0.0 => Interval::new(0.0),
         (Some(metres), None) => positive("path.lead_in", *metres)?,
@@ -361,7 +340,7 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
         Segment { curve: inward, begin: None, end: Some(turn) },
         Segment { curve: first, begin: zero(), end: Some(angle) },
         Segment { curve: second, begin: zero(), end: Some(angle) },
-        Segment { curve: Curve::Outward { a, frame: None }, begin: Some(turn), end: None },
+        Segment { curve: Curve::outward(a), begin: Some(turn), end: None },
     ];
     Ok(Path::new(segments, lead_in, PathEnd::Travelled, length))
 }
@@ -377,7 +356,7 @@ fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Pa
     // Directions follow from the angle turned so far: the product of thousands of rotations would be too wide.
     let mut heading = elementary::turns(heading_turns);
     let zero = || Interval::new(0.0);
-    let behind = Curve::Line { origin, direction: direction(&heading) };
+    let behind = Curve::line(origin, &heading);
     let mut segments = vec![Segment { curve: behind, begin: None, end: Some(zero()) }];
     let (mut length, mut end) = (zero(), zero());
     for piece in pieces {
@@ -393,118 +372,4 @@ fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Pa
         last.end = None;
     }
     Ok(Path::new(segments, zero(), PathEnd::Coordinate(end), length))
-}
-
-fn direction(heading: &Interval) -> Vector {
-    let (sine, cosine) = elementary::sin_cos(heading);
-    Vector { x: cosine, y: sine }
-}
-
-/// Returns the curve of a piece that begins at `origin`, its first and last coordinates, and the radians by which it
-/// turns to the left.
-fn read_piece(
-    piece: &PieceText,
-    origin: Vector,
-    heading: &Interval,
-) -> Result<(Curve, Interval, Interval, Interval), String> {
-    let zero = Interval::new(0.0);
-    let to_left = |side: &Side| Interval::new(if matches!(side, Side::Left) { 1.0 } else { -1.0 });
-    match piece {
-        PieceText::Line { length } => {
-            let end = positive("path.pieces.length", *length)?;
-            Ok((Curve::Line { origin, direction: direction(heading) }, zero, end, zero))
-        }
-        PieceText::Arc { radius, side, turns, length } => {
-            let radius = positive("path.pieces.radius", *radius)?;
-            let end = match (turns, length) {
-                (Some(turns), None) => {
-                    positive("path.pieces.turns", *turns)?;
-                    elementary::turns(*turns)
-                }
-                (None, Some(length)) => positive("path.pieces.length", *length)? / radius,
-                _ => return Err("an arc has either turns or a length".to_owned()),
-            };
-            let curve = Curve::arc(origin, direction(heading), to_left(side), radius);
-            Ok((curve, zero, end, to_left(side) * end))
-        }
-        PieceText::Spiral { pitch, radius, direction, side, turns, length } => {
-            let a = positive("path.pieces.pitch", *pitch)? / elementary::turns(1.0);
-            let first = positive("path.pieces.radius", *radius)? / a;
-            let is_inward = *direction == Way::In;
-            let last = match (turns, length) {
-                (Some(turns), None) => {
-                    positive("path.pieces.turns", *turns)?;
-                    let around = elementary::turns(*turns);
-                    if is_inward { first - around } else { first + around }
-                }
-                (None, Some(length)) => {
-                    let metres = positive("path.pieces.length", *length)?;
-                    last_angle(&a, &first, &if is_inward { -metres } else { metres })?
-                }
-                _ => return Err("a spiral has either turns or a length".to_owned()),
-            };
-            if !last.is_positive() {
-                return Err("a spiral leads to its centre or past it".to_owned());
-            }
-            let (inner, outer) = if is_inward { (last, first) } else { (first, last) };
-            let turned = (outer - inner) + (elementary::atan(&outer) - elementary::atan(&inner));
-            let is_left = matches!(side, Side::Left);
-            let curve = Curve::spiral_from(&origin, heading, is_inward, is_left, a, &first);
-            Ok((curve, first, last, to_left(side) * turned))
-        }
-    }
-}
-
-/// Returns the polar angle `metres` of a spiral further out than `first`, further in if they are negative, by a step of
-/// Newton's method from a guess: the root is within an interval if the step from its middle leads there with every rate
-/// in it.
-fn last_angle(a: &Interval, first: &Interval, metres: &Interval) -> Result<Interval, String> {
-    let outward = Curve::Outward { a: *a, frame: None };
-    let step = |from: f64, within: &Interval| {
-        let rate = a * (within.square() + Interval::new(1.0)).sqrt();
-        (metres - outward.metres(first, &Interval::new(from))) / rate
-    };
-    let guess = rough_angle(metres.rough() / a.rough(), first.rough());
-    // Near the centre the guess lacks digits, as a difference of lengths.
-    let guess = (0..4).fold(guess, |guess, _| guess + step(guess, &Interval::new(guess)).rough());
-    let within = Interval::new(guess) + Interval::new(1e-9 * guess.abs()).around_zero();
-    let last = Interval::new(guess) + step(guess, &within);
-    let is_found = guess > 0.0 && (last - Interval::new(guess)).abs().is_below(&Interval::new(1e-9 * guess));
-    if is_found { Ok(last) } else { Err("a spiral's length leads to its centre or past it".to_owned()) }
-}
-
-/// Returns a double near the polar angle that is `length` further out than `first` on the spiral r = theta.
-fn rough_angle(length: f64, first: f64) -> f64 {
-    let of = |theta: f64| 0.5 * (theta * theta.hypot(1.0) + theta.asinh());
-    let target = of(first) + length;
-    // The length is convex: Newton's method comes down from a guess that is too far out.
-    let mut theta = (2.0 * target.max(0.0)).sqrt();
-    for _ in 0..100 {
-        theta -= (of(theta) - target) / theta.hypot(1.0);
-    }
-    theta
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The metres to the angle found are those asked for, with more digits than a double has, up to a centimetre from
-    /// the centre.
-    #[test]
-    fn the_angle_after_some_metres_of_a_spiral() {
-        let a = Interval::new(1.7) / elementary::turns(1.0);
-        let first = Interval::new(12.0) / a;
-        let to_centre = Curve::Inward { a, frame: None }.metres(&first, &Interval::new(0.0));
-        let inward = [1e-3, 40.0, 266.0].map(|metres| Interval::new(-metres));
-        let outward = [1e-3, 1.0, 1e5].map(Interval::new);
-        let near_the_centre = [Interval::new(0.01) - to_centre];
-        for metres in inward.into_iter().chain(outward).chain(near_the_centre) {
-            let last = last_angle(&a, &first, &metres).unwrap();
-            let found = Curve::Outward { a, frame: None }.metres(&first, &last);
-            assert!((found - metres).abs().is_below(&Interval::new(1e-19)), "{}", metres.rough());
-        }
-        assert!(last_angle(&a, &first, &-to_centre).is_err());
-        assert!(last_angle(&a, &first, &Interval::new(-300.0)).is_err());
-    }
 }

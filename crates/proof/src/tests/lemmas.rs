@@ -5,9 +5,10 @@ use fastrand::Rng;
 use super::cases;
 use crate::boards::{Board, covers, is_inside_ring};
 use crate::capsule::{Capsule, Pair};
+use crate::curve::Curve;
 use crate::interval::{Interval, Vector};
 use crate::link;
-use crate::path::{Curve, Place, Span};
+use crate::path::{Place, Span};
 use crate::scene::Scene;
 
 fn scene(path: &str) -> Scene {
