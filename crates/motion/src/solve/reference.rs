@@ -5,6 +5,7 @@
 //! digits. It shares only names with the path, the linkage and the solvers in doubles. It takes some milliseconds per
 //! frame. `trade` and tests call it; a scene asks it for the turns of a spiral whose length is given.
 
+mod curve;
 mod path;
 mod real;
 mod walk;
@@ -12,7 +13,8 @@ mod walk;
 #[cfg(test)]
 mod tests;
 
-use self::path::{RealParam, RealPath};
+use self::curve::RealParam;
+use self::path::RealPath;
 use self::real::Real;
 use self::walk::Walk;
 use crate::linkage::NoFollower;
@@ -50,7 +52,7 @@ impl Piece {
     /// # Errors
     /// A sentence if there is no memory for the constants pi and ln 2.
     pub fn turns_of_metres(self, metres: f64, rough: f64) -> Result<DoubleDouble, String> {
-        path::turns_of_metres(self, metres, rough)
+        curve::turns_of_metres(self, metres, rough)
     }
 }
 

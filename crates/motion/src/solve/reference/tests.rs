@@ -6,7 +6,7 @@ mod tables;
 use proptest::prelude::*;
 use tables::{Row, table};
 
-use super::path::Curve;
+use super::curve::Curve;
 use super::real::{Functions, RealVector};
 use super::*;
 use crate::model::Point;
