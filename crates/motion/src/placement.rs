@@ -10,8 +10,7 @@ use crate::linkage::NoFollower;
 use crate::model::curve::{Coordinate, Curve};
 use crate::model::double_double::DoubleDouble;
 use crate::model::elementary;
-use crate::model::segment::{OutlineKind, SegmentOutline};
-use crate::model::spiral::{Direction, Spiral};
+use crate::model::segment::SegmentOutline;
 use crate::model::{Point, Vector};
 use crate::solve::{ChainMut, Solver};
 
@@ -90,11 +89,11 @@ impl Placement {
     /// Returns the placement of the spiral about the origin that a spiral of an outline is: its beginning, its heading
     /// and the side of its curvature say where it lies. `None` for other curves.
     pub fn of_spiral(outline: &SegmentOutline) -> Option<Self> {
-        let OutlineKind::Spiral { direction, pitch, first, curvature, .. } = outline.kind else { return None };
+        let (spiral, first, curvature) = outline.kind.spiral()?;
         if curvature.is_nan() {
             return Some(Self::IDENTITY);
         }
-        let (spiral, first) = (Spiral::new(pitch, direction), Coordinate { high: first, low: 0.0 });
+        let first = Coordinate { high: first, low: 0.0 };
         let (point, tangent) = (spiral.point(first).coords, spiral.tangent(first));
         let mirror = spiral.turning() * curvature < 0.0;
         let heading = if mirror { -1.0 } else { 1.0 } * elementary::atan2(tangent.y, tangent.x);
@@ -176,23 +175,7 @@ impl Placement {
     pub fn outline(&self, outline: SegmentOutline) -> SegmentOutline {
         let SegmentOutline { kind, start, heading, length } = outline;
         let side = self.turn.map_or(1.0, |turn| turn.side);
-        let kind = match kind {
-            OutlineKind::Line => kind,
-            OutlineKind::Arc { curvature } => OutlineKind::Arc { curvature: side * curvature },
-            OutlineKind::Spiral { .. } if self.is_identity() => kind,
-            OutlineKind::Spiral { direction, pitch, first, last, curvature } if curvature.is_finite() => {
-                OutlineKind::Spiral { direction, pitch, first, last, curvature: side * curvature }
-            }
-            OutlineKind::Spiral { direction, pitch, first, last, .. } => {
-                let way = match direction {
-                    Direction::Inward => -side,
-                    Direction::Outward => side,
-                };
-                let square = 1.0 + first * first;
-                let curvature = way * TAU / pitch * (1.0 + square) / (square * square.sqrt());
-                OutlineKind::Spiral { direction, pitch, first, last, curvature }
-            }
-        };
+        let kind = if self.is_identity() { kind } else { kind.placed(side) };
         SegmentOutline { kind, start: self.point(start), heading: self.heading(heading), length }
     }
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{HasStamp, Header, Pose, Time};
-use bench_dragon_messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_OUTWARD_SPIRAL, StageMessage, StageSegment};
+use bench_dragon_messages::{StageMessage, StageSegment};
 
 /// The turn between two points, radians: the chord of a circle of 9 m is 9 mm off.
 const TURN: f64 = std::f64::consts::PI / 36.0;
@@ -48,66 +48,17 @@ impl HasStamp for Path {
 /// Returns points along segments with the direction of travel: the ends of every segment, and a point for each turn by
 /// five degrees.
 pub(super) fn poses(segments: &[StageSegment]) -> Vec<Pose> {
-    let turned: f64 = segments.iter().map(turn_of).sum();
+    let turned: f64 = segments.iter().map(StageSegment::turn).sum();
     let turn = TURN.max(turned / MOST_POINTS);
     let along = |segment: &StageSegment| {
-        let pieces = (turn_of(segment) / turn).ceil().max(1.0) as usize;
+        let pieces = (segment.turn() / turn).ceil().max(1.0) as usize;
         let segment = *segment;
-        (0..=pieces).map(move |piece| pose_at(&segment, piece as f64 / pieces as f64))
+        (0..=pieces).map(move |piece| {
+            let (x, y, heading) = segment.pose_at(piece as f64 / pieces as f64);
+            Pose::flat(x, y, heading)
+        })
     };
     segments.iter().flat_map(along).collect()
-}
-
-/// Returns the radians by which a segment turns.
-fn turn_of(segment: &StageSegment) -> f64 {
-    match segment.kind {
-        SEGMENT_ARC => (segment.curvature * segment.length).abs(),
-        SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => (segment.theta_last - segment.theta_first).abs(),
-        _ => 0.0,
-    }
-}
-
-/// Returns the pose at a share, from 0 to 1, of a segment's length or of a spiral's polar angle.
-fn pose_at(segment: &StageSegment, share: f64) -> Pose {
-    let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, pitch, kind, .. } = *segment;
-    match kind {
-        SEGMENT_ARC => {
-            let here = heading + share * curvature * length;
-            let right = x + (here.sin() - heading.sin()) / curvature;
-            Pose::flat(right, y - (here.cos() - heading.cos()) / curvature, here)
-        }
-        SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => {
-            let theta = theta_first + share * (theta_last - theta_first);
-            let per_radian = pitch / std::f64::consts::TAU;
-            let (sine, cosine) = theta.sin_cos();
-            let radius = per_radian * theta;
-            // Opposite to the derivative by theta: inward because theta decreases, outward because of the half turn.
-            let (along_x, along_y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
-            let side = if kind == SEGMENT_INWARD_SPIRAL { 1.0 } else { -1.0 };
-            let own = (side * radius * cosine, side * radius * sine, along_y.atan2(along_x));
-            if curvature.is_nan() { Pose::flat(own.0, own.1, own.2) } else { placed(segment, own) }
-        }
-        _ => {
-            let (sine, cosine) = heading.sin_cos();
-            Pose::flat(x + share * length * cosine, y + share * length * sine, heading)
-        }
-    }
-}
-
-/// Returns a pose of a spiral that is placed elsewhere, from its place on the spiral about the origin. Beginning and
-/// heading say where the spiral lies; an inward one bends to the right unless it is mirrored, an outward one to the
-/// left.
-fn placed(segment: &StageSegment, (x, y, heading): (f64, f64, f64)) -> Pose {
-    let unplaced = StageSegment { curvature: f64::NAN, ..*segment };
-    let Pose { position: first, orientation } = pose_at(&unplaced, 0.0);
-    let first_heading = 2.0 * orientation.z.atan2(orientation.w);
-    let bend = if segment.kind == SEGMENT_INWARD_SPIRAL { -1.0 } else { 1.0 };
-    let side = bend * segment.curvature.signum();
-    let turned = segment.heading - side * first_heading;
-    let (sine, cosine) = turned.sin_cos();
-    let (right, up) = (x - first.x, side * (y - first.y));
-    let place = (segment.x + cosine * right - sine * up, segment.y + sine * right + cosine * up);
-    Pose::flat(place.0, place.1, side * heading + turned)
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! What `check` says of a scene without its motion: teams, paths, placements, solvers, alerts and outputs.
 
 use bench_dragon::motion::ensemble::{Dragon, Ensemble};
-use bench_dragon::motion::model::segment::{OutlineKind, SegmentOutline};
-use bench_dragon::motion::model::spiral::Direction;
+use bench_dragon::motion::model::segment::SegmentOutline;
 use bench_dragon::motion::placement::Placement;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::motion::{Choice, Motion};
@@ -149,28 +148,12 @@ fn ground(scene: &Scene) -> String {
 /// Describes the path in words.
 fn path(motion: &Motion) -> String {
     let outline = motion.path().outline();
-    if let [SegmentOutline { kind: OutlineKind::Spiral { pitch, first, .. }, .. }] = outline.as_slice() {
-        let turn = first / std::f64::consts::TAU;
+    if let [only] = outline.as_slice()
+        && let Some((spiral, first, _)) = only.kind.spiral()
+    {
+        let (pitch, turn) = (spiral.pitch(), first / std::f64::consts::TAU);
         return format!("inward spiral, {pitch} m per turn, the head starting on turn {}", figure(turn));
     }
-    let segments: Vec<String> = outline.iter().map(segment).collect();
+    let segments: Vec<String> = outline.iter().map(SegmentOutline::to_string).collect();
     format!("{:.3} m: {}", motion.path().length(), segments.join(", "))
-}
-
-fn segment(outline: &SegmentOutline) -> String {
-    let length = outline.length;
-    match outline.kind {
-        OutlineKind::Line => format!("{length:.3} m straight on"),
-        OutlineKind::Arc { curvature } => {
-            let side = if curvature > 0.0 { "left" } else { "right" };
-            format!("{length:.3} m to the {side} at radius {:.6} m", 1.0 / curvature.abs())
-        }
-        OutlineKind::Spiral { direction, pitch, .. } => {
-            let way = match direction {
-                Direction::Inward => "inward",
-                Direction::Outward => "outward",
-            };
-            format!("{length:.3} m {way} along a spiral of {pitch} m per turn")
-        }
-    }
 }

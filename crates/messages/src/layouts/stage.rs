@@ -61,6 +61,64 @@ impl StageSegment {
             _ => "unknown",
         }
     }
+
+    /// Returns the radians by which it turns; of a spiral, those about its centre.
+    pub fn turn(&self) -> f64 {
+        match self.kind {
+            SEGMENT_ARC => (self.curvature * self.length).abs(),
+            SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => (self.theta_last - self.theta_first).abs(),
+            _ => 0.0,
+        }
+    }
+
+    /// Returns the point, metres right and up, and the direction of travel, radians, at a share, from 0 to 1, of its
+    /// length or of a spiral's polar angle.
+    pub fn pose_at(&self, share: f64) -> (f64, f64, f64) {
+        let Self { x, y, heading, length, curvature, theta_first, theta_last, .. } = *self;
+        match self.kind {
+            SEGMENT_ARC => {
+                let here = heading + share * curvature * length;
+                let right = x + (here.sin() - heading.sin()) / curvature;
+                (right, y - (here.cos() - heading.cos()) / curvature, here)
+            }
+            SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => {
+                let own = self.about_origin(theta_first + share * (theta_last - theta_first));
+                if curvature.is_nan() { own } else { self.placed(own) }
+            }
+            _ => {
+                let (sine, cosine) = heading.sin_cos();
+                (x + share * length * cosine, y + share * length * sine, heading)
+            }
+        }
+    }
+
+    /// Returns the pose at a polar angle of its spiral about the origin.
+    fn about_origin(&self, theta: f64) -> (f64, f64, f64) {
+        let per_radian = self.pitch / std::f64::consts::TAU;
+        let (sine, cosine) = theta.sin_cos();
+        let radius = per_radian * theta;
+        // Opposite to the derivative by theta: inward because theta decreases, outward because of the half turn.
+        let (along_x, along_y) = (radius * sine - per_radian * cosine, -radius * cosine - per_radian * sine);
+        let side = if self.kind == SEGMENT_INWARD_SPIRAL { 1.0 } else { -1.0 };
+        (side * radius * cosine, side * radius * sine, along_y.atan2(along_x))
+    }
+
+    /// Returns a pose of a spiral that is placed elsewhere, from its place on the spiral about the origin. Beginning
+    /// and heading say where the spiral lies; an inward one bends to the right unless it is mirrored, an outward one to
+    /// the left.
+    fn placed(&self, (x, y, heading): (f64, f64, f64)) -> (f64, f64, f64) {
+        let (first_x, first_y, first_heading) = self.about_origin(self.theta_first);
+        // By half the angle, as in the quaternion of a pose.
+        let (half_sine, half_cosine) = (0.5 * first_heading).sin_cos();
+        let first_heading = 2.0 * half_sine.atan2(half_cosine);
+        let bend = if self.kind == SEGMENT_INWARD_SPIRAL { -1.0 } else { 1.0 };
+        let side = bend * self.curvature.signum();
+        let turned = self.heading - side * first_heading;
+        let (sine, cosine) = turned.sin_cos();
+        let (right, up) = (x - first_x, side * (y - first_y));
+        let place = (self.x + cosine * right - sine * up, self.y + sine * right + cosine * up);
+        (place.0, place.1, side * heading + turned)
+    }
 }
 
 /// The most dragons of a show.

@@ -1,6 +1,9 @@
 //! [`Segment`]: one of the curves of a path, and its outline for drawings. This is the only list of the kinds of curves
 //! that is matched on.
 
+use std::f64::consts::TAU;
+use std::fmt;
+
 use super::arc::Arc;
 use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
 use super::elementary::atan2;
@@ -111,6 +114,56 @@ pub enum OutlineKind {
         /// placement moves, turns or mirrors; NaN of a spiral about the origin.
         curvature: f64,
     },
+}
+
+impl OutlineKind {
+    /// Returns the kind after a placement other than the identity; `side` is -1 for a reflection, else 1.
+    pub(crate) fn placed(self, side: f64) -> Self {
+        match self {
+            Self::Line => self,
+            Self::Arc { curvature } => Self::Arc { curvature: side * curvature },
+            Self::Spiral { direction, pitch, first, last, curvature } if curvature.is_finite() => {
+                Self::Spiral { direction, pitch, first, last, curvature: side * curvature }
+            }
+            Self::Spiral { direction, pitch, first, last, .. } => {
+                let way = match direction {
+                    Direction::Inward => -side,
+                    Direction::Outward => side,
+                };
+                let square = 1.0 + first * first;
+                let curvature = way * TAU / pitch * (1.0 + square) / (square * square.sqrt());
+                Self::Spiral { direction, pitch, first, last, curvature }
+            }
+        }
+    }
+
+    /// Returns the spiral about the origin, and the polar angle and the curvature of its beginning; `None` for other
+    /// curves.
+    pub fn spiral(&self) -> Option<(Spiral, f64, f64)> {
+        let Self::Spiral { direction, pitch, first, curvature, .. } = *self else { return None };
+        Some((Spiral::new(pitch, direction), first, curvature))
+    }
+}
+
+/// Writes the length and the kind for people.
+impl fmt::Display for SegmentOutline {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        write!(text, "{:.3} m ", self.length)?;
+        match self.kind {
+            OutlineKind::Line => text.write_str("straight on"),
+            OutlineKind::Arc { curvature } => {
+                let side = if curvature > 0.0 { "left" } else { "right" };
+                write!(text, "to the {side} at radius {:.6} m", 1.0 / curvature.abs())
+            }
+            OutlineKind::Spiral { direction, pitch, .. } => {
+                let way = match direction {
+                    Direction::Inward => "inward",
+                    Direction::Outward => "outward",
+                };
+                write!(text, "{way} along a spiral of {pitch} m per turn")
+            }
+        }
+    }
 }
 
 impl Segment {
