@@ -5,7 +5,7 @@ use super::capsule::Span;
 use super::first_order::{FirstOrderBoard, FirstOrderHandle, Pace, When};
 use super::grid::{GridPoint, fine_place, place};
 use super::lines::Links;
-use super::path::{Curve, Place};
+use super::path::Place;
 use super::step::{Chain, Claim, Listed, Obstacle};
 
 /// The grid points of a step.
@@ -100,7 +100,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         let (first, last) = (handles[a].span, handles[b + 1].span);
         let segment = first.0.0;
         let same = [first.0, first.1, last.0, last.1].iter().all(|place| place.0 == segment);
-        same && matches!(self.chain.exact.segments[segment].curve, Curve::Arc { .. })
+        same && self.chain.exact.segments[segment].curve.arc_origin().is_some()
     }
 
     /// Returns the boards from `first` to the last as one, on the line of the last listed handle.

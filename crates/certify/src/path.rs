@@ -129,6 +129,26 @@ impl Curve {
         !matches!(self, Self::Inward { .. })
     }
 
+    /// Returns true for a line.
+    pub fn is_line(&self) -> bool {
+        matches!(self, Self::Line { .. })
+    }
+
+    /// Returns the point at 0 of an arc.
+    pub fn arc_origin(&self) -> Option<Vector> {
+        if let Self::Arc { origin, .. } = self { Some(*origin) } else { None }
+    }
+
+    /// Returns true for a spiral.
+    pub fn is_spiral(&self) -> bool {
+        matches!(self, Self::Inward { .. } | Self::Outward { .. })
+    }
+
+    /// Returns a and the shift of a spiral towards its centre.
+    pub fn inward_spiral(&self) -> Option<(Interval, Interval)> {
+        if let Self::Inward { a, shift, .. } = self { Some((*a, *shift)) } else { None }
+    }
+
     pub fn point(&self, place: Place) -> Vector {
         self.point_of([Interval::point(place.1), Interval::point(place.2)], sin_cos_at(place))
     }
@@ -322,6 +342,11 @@ impl ExactPath {
     /// Returns a place of the span between two: near the middle on one segment, else the first.
     pub fn middle(&self, first: Place, last: Place) -> Place {
         if first.0 == last.0 { first.middle(last) } else { first }
+    }
+
+    /// Returns true if the path begins on a spiral towards its centre.
+    pub fn begins_inward(&self) -> bool {
+        self.segments[0].curve.inward_spiral().is_some()
     }
 
     /// Returns the curve at a place.

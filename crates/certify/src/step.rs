@@ -9,7 +9,7 @@ use super::ground::Barrier;
 use super::interval::Interval;
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
-use super::path::{Curve, ExactPath, Place};
+use super::path::{ExactPath, Place};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
@@ -226,15 +226,15 @@ impl<'c, 'a> Listed<'c, 'a> {
     /// Returns true if a handle is on a straight line without a beginning.
     pub fn is_on_line(&self, handle: usize) -> bool {
         let Chain { exact, .. } = self.chain;
-        self.handles[handle].span.1.0 == 0 && matches!(exact.segments[0].curve, Curve::Line { .. })
+        self.handles[handle].span.1.0 == 0 && exact.segments[0].curve.is_line()
     }
 
     /// Returns a lower bound of the distance from the centre of all handles from this one on; minus infinity if
     /// unknown.
     fn ring(&self, handle: usize) -> f64 {
         let Place(segment, theta, _) = self.handles[handle].span.1;
-        match self.chain.exact.segments[0].curve {
-            Curve::Inward { a, shift, .. } if segment == 0 => (a * theta + a * shift).lo,
+        match self.chain.exact.segments[0].curve.inward_spiral() {
+            Some((a, shift)) if segment == 0 => (a * theta + a * shift).lo,
             _ => f64::NEG_INFINITY,
         }
     }
@@ -263,9 +263,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         }
         match claim.links {
             Links::Front if !claim.clear => true,
-            Links::Front if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) => {
-                self.is_beyond_front(0.0, last)
-            }
+            Links::Front if self.chain.exact.begins_inward() => self.is_beyond_front(0.0, last),
             _ => self.is_on_line(last),
         }
     }
@@ -281,11 +279,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let length = self.chain.link(link);
         let fine = self.is_fine();
         // A unit in the last place of a spiral's coordinate theta is theta times as many metres as one of its radius.
-        let turned = if !fine && matches!(exact.curve(front.span.0), Curve::Inward { .. } | Curve::Outward { .. }) {
-            front.span.0.1
-        } else {
-            0.0
-        };
+        let turned = if !fine && exact.curve(front.span.0).is_spiral() { front.span.0.1 } else { 0.0 };
         let radius = front.first[0].magnitude() + front.first[1].magnitude();
         let size = length.hi + radius * (1.0 + 0.1 * turned);
         let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);
@@ -322,7 +316,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let (chain, benches) = (self.chain, self.chain.team.benches);
         let listed = self.handles.len() - 1;
         let boards: Vec<_> = (0..listed).map(|bench| chain.board(&self.handles, bench)).collect();
-        let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
+        let is_spiral = chain.exact.begins_inward();
         let firsts = if links == Links::All { listed } else { listed.min(2) };
         let innermost: Vec<f64> = (0..=listed).map(|handle| self.innermost(handle)).collect();
         for (a, board) in boards[..firsts].iter().enumerate() {

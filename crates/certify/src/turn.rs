@@ -12,7 +12,7 @@ use super::first_order::{FirstOrderBoard, FirstOrderHandle, When};
 use super::grid::GridPoint;
 use super::interval::{Interval, Vector, dot, minus, norm, norm_squared, plus, scaled};
 use super::lines::{CertificateLine, CertifiedEvent, Links, Status};
-use super::path::{Curve, ExactPath, Place};
+use super::path::{ExactPath, Place};
 use super::pitch::clear_beyond;
 use super::search::{CertificateSearch, MOST_SPANS, path_end};
 use super::step::{Chain, Claim, Listed, links_of};
@@ -135,8 +135,8 @@ impl<'a> Turns<'a> {
         let Span(first, last) = handle.span;
         let around = |place: Place, reach: f64| {
             let point = self.exact.point(place);
-            let (velocity, rate) = match *self.exact.curve(place) {
-                Curve::Arc { origin, .. } => {
+            let (velocity, rate) = match self.exact.curve(place).arc_origin() {
+                Some(origin) => {
                     let square = self.radius.square() + self.a.square();
                     let a = if place.0 == 1 { self.a } else { -self.a };
                     let [x, y] = minus(point, origin);
@@ -144,7 +144,7 @@ impl<'a> Turns<'a> {
                     let own = origin.map(|part| part.over(self.radius));
                     (plus(own, turned), Interval::ONE.over(square.sqrt()))
                 }
-                _ => {
+                None => {
                     let distance = norm(point);
                     let nearest = distance - Interval::point(reach);
                     if !nearest.is_positive() {

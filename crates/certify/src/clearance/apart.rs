@@ -7,7 +7,6 @@ use crate::first_order::When;
 use crate::first_order_step::FirstOrderStep;
 use crate::grid::GridPoint;
 use crate::lines::Links;
-use crate::path::Curve;
 use crate::step::{Claim, Listed, sum_above};
 use bench_dragon_motion::event::Event;
 
@@ -60,9 +59,7 @@ impl Descent<'_, '_> {
         let chain = &self.chain;
         match links {
             Links::Front if !self.looks_at_boards() => true,
-            Links::Front if matches!(chain.exact.segments[0].curve, Curve::Inward { .. }) => {
-                listed.is_beyond_front(self.threshold().max(0.0), last)
-            }
+            Links::Front if chain.exact.begins_inward() => listed.is_beyond_front(self.threshold().max(0.0), last),
             _ => listed.is_on_line(last),
         }
     }
@@ -80,7 +77,7 @@ impl Descent<'_, '_> {
         let (chain, benches, threshold) = (&self.chain, self.chain.team.benches, self.threshold());
         let count = listed.handles.len() - 1;
         let boards: Vec<_> = (0..count).map(|bench| chain.board(&listed.handles, bench)).collect();
-        let is_spiral = matches!(chain.exact.segments[0].curve, Curve::Inward { .. });
+        let is_spiral = chain.exact.begins_inward();
         let firsts = if links == Links::All { count } else { count.min(2) };
         let far = threshold.max(0.0);
         let are_apart = |[a, b]: [usize; 2]| match first_order {
@@ -121,7 +118,7 @@ impl Descent<'_, '_> {
         next: usize,
     ) -> bool {
         let threshold = self.threshold();
-        if matches!(self.chain.exact.segments[0].curve, Curve::Inward { .. }) {
+        if self.chain.exact.begins_inward() {
             let outermost = sum_above(self.chain.shape.outermost(board), threshold.max(0.0));
             return listed.innermost(listed.handles.len() - 1) > outermost;
         }

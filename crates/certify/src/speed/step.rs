@@ -5,7 +5,7 @@ use super::super::capsule::{Capsule, Span, Spanned};
 use super::super::grid::{GridPoint, param, span};
 use super::super::interval::{Interval, cross, dot, minus, norm, scaled};
 use super::super::link::follower_within;
-use super::super::path::{Curve, Place};
+use super::super::path::Place;
 use super::super::step::Chain;
 use bench_dragon_motion::linkage::follower;
 
@@ -82,15 +82,15 @@ impl Speeds<'_> {
         if segment > 0 {
             return false;
         }
-        match self.chain.exact.segments[0].curve {
-            Curve::Line { .. } => true,
-            Curve::Inward { a, .. } => {
+        let first = &self.chain.exact.segments[0].curve;
+        match first.inward_spiral() {
+            None => first.is_line(),
+            Some((a, _)) => {
                 let longest = if last == 0 { self.chain.link(0).max(self.chain.link(1)) } else { self.chain.link(1) };
                 let square = Interval::point(at).square();
                 let turned = longest * (square + Interval::point(2.0));
                 turned.is_below(a * at * 2.0 * (square + Interval::ONE))
             }
-            _ => false,
         }
     }
 
@@ -122,10 +122,7 @@ impl Speeds<'_> {
         let Chain { path, exact, team, .. } = &self.chain;
         let rear = follower(path, param(front), team.link(link)).ok()?;
         let front = Spanned::new(exact, Span(front, front));
-        let turned = match exact.curve(front.span.0) {
-            Curve::Inward { .. } | Curve::Outward { .. } => front.span.0.1,
-            _ => 0.0,
-        };
+        let turned = if exact.curve(front.span.0).is_spiral() { front.span.0.1 } else { 0.0 };
         let length = self.chain.link(link);
         let size = length.hi + (front.first[0].magnitude() + front.first[1].magnitude()) * (1.0 + 0.1 * turned);
         PADS.iter().find_map(|pad| {
@@ -139,8 +136,8 @@ impl Speeds<'_> {
     /// Returns true if two handles are on one line or one circle throughout the step.
     fn is_rigid(&self, front: &Spanned, rear: &Spanned) -> bool {
         let segment = rear.span.0.0;
-        segment == front.span.1.0
-            && matches!(self.chain.exact.segments[segment].curve, Curve::Line { .. } | Curve::Arc { .. })
+        let curve = &self.chain.exact.segments[segment].curve;
+        segment == front.span.1.0 && (curve.is_line() || curve.arc_origin().is_some())
     }
 
     /// Returns the rate of the ratio of the rear handle's speed to the front's, per metre of the front.
