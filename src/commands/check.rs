@@ -55,16 +55,50 @@ pub struct CheckArguments {
     certify: Option<PathBuf>,
 }
 
+/// What is proved of a least clearance, in every line of `check --prove --json`.
+#[derive(Serialize)]
+struct ProvedBounds {
+    #[serde(rename = "least_clearance_lo")]
+    lo: Option<f64>,
+    #[serde(rename = "least_clearance_hi")]
+    hi: Option<f64>,
+    #[serde(rename = "least_clearance_status")]
+    status: &'static str,
+    /// Simulated seconds up to which that is proved, unless to the end of the show.
+    proved_until: Option<f64>,
+    time: Option<f64>,
+}
+
+impl ProvedBounds {
+    /// Creates the fields of a proof up to a time, or to the end of the show. The upper bound is that of a time.
+    fn new(lo: Option<f64>, hi: Option<f64>, until: Option<f64>, time: Option<f64>) -> Self {
+        let status = match (lo.is_some() && hi.is_some(), until.is_none()) {
+            (true, true) => "proved",
+            (true, false) => "given_up",
+            (false, _) => "searched",
+        };
+        Self { lo, hi, status, proved_until: until.map(rounded_down), time }
+    }
+
+    /// Creates the fields of an enclosure, if there is one: its bounds, and the metres of travel up to which they hold
+    /// and where the upper one does.
+    fn of(found: Option<([f64; 2], Option<f64>, f64)>, time_at: impl Fn(f64) -> f64) -> Self {
+        let Some(([lo, hi], until, travelled)) = found else { return Self::new(None, None, None, None) };
+        Self::new(Some(lo), Some(hi), until.map(&time_at), Some(time_at(travelled)))
+    }
+}
+
+/// Returns a time that is surely not after a proved one, although that is rounded.
+fn rounded_down(time: f64) -> f64 {
+    time.next_down().max(0.0)
+}
+
 /// The line of `check --prove --json`.
 #[derive(Serialize)]
 struct ClearanceLine {
     least_clearance: Option<f64>,
-    least_clearance_lo: Option<f64>,
-    least_clearance_hi: Option<f64>,
-    least_clearance_status: &'static str,
-    /// Simulated seconds up to which that is proved, unless to the end of the show.
-    proved_until: Option<f64>,
-    time: Option<f64>,
+    #[serde(flatten)]
+    proved: ProvedBounds,
     bench_a: Option<usize>,
     bench_b: Option<usize>,
 }
@@ -74,11 +108,8 @@ struct ClearanceLine {
 struct ProvedObstacleLine<'a> {
     obstacle: &'a str,
     least_clearance: f64,
-    least_clearance_lo: Option<f64>,
-    least_clearance_hi: Option<f64>,
-    least_clearance_status: &'static str,
-    proved_until: Option<f64>,
-    time: Option<f64>,
+    #[serde(flatten)]
+    proved: ProvedBounds,
     bench: Option<usize>,
 }
 
@@ -329,7 +360,7 @@ fn obstacle_proof(scene: &Scene, enclosure: Option<ObstacleEnclosure>) -> String
             format!(
                 "Proved: up to t = {} s it is not less than {lo} m; at t = {at} s it is at most {hi} m. Not decided \
                  beyond.",
-                until.next_down().max(0.0)
+                rounded_down(until)
             )
         }
     }
@@ -340,15 +371,11 @@ fn obstacle_line<'a>(
     found: &TimedObstacleClearance,
     enclosure: Option<ObstacleEnclosure>,
 ) -> ProvedObstacleLine<'a> {
-    let until = enclosure.and_then(|enclosure| enclosure.until);
+    let proved = enclosure.map(|found| ([found.lo, found.hi], found.until, found.travelled));
     ProvedObstacleLine {
         obstacle: &scene.ground().obstacles()[found.obstacle].name,
         least_clearance: found.least.value,
-        least_clearance_lo: enclosure.map(|enclosure| enclosure.lo),
-        least_clearance_hi: enclosure.map(|enclosure| enclosure.hi),
-        least_clearance_status: status(enclosure.is_some(), until.is_none()),
-        proved_until: until.map(|until| scene.motion.time_at(until).next_down().max(0.0)),
-        time: enclosure.map(|enclosure| scene.motion.time_at(enclosure.travelled)),
+        proved: ProvedBounds::of(proved, |travelled| scene.motion.time_at(travelled)),
         bench: enclosure.map(|enclosure| enclosure.bench),
     }
 }
@@ -359,28 +386,19 @@ fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> Strin
         return "Nothing of it could be proved.".to_owned();
     };
     let time_at = |travelled| scene.motion.time_at(travelled);
-    proved_sentence((lo, hi), until.map(time_at), time_at(travelled))
+    proved_sentence((lo, hi), until.map(time_at).map(rounded_down), time_at(travelled))
 }
 
-/// Returns a sentence for people on a least clearance that is proved up to a time, or to the end of the show.
+/// Returns a sentence for people on a least clearance that is proved up to a time, rounded down, or to the end of the
+/// show.
 fn proved_sentence((lo, hi): (f64, f64), until: Option<f64>, at: f64) -> String {
     match until {
         None if lo == hi => format!("Proved: it is {lo} m."),
         None => format!("Proved: it is between {lo} m and {hi} m."),
         Some(until) => format!(
-            "Proved: up to t = {} s no two boards are nearer than {lo} m; at t = {at} s two are no further apart than \
-             {hi} m. Not decided beyond.",
-            until.next_down().max(0.0)
+            "Proved: up to t = {until} s no two boards are nearer than {lo} m; at t = {at} s two are no further apart \
+             than {hi} m. Not decided beyond."
         ),
-    }
-}
-
-/// Returns the status of a least clearance, of which something or nothing is proved, to the end of the show or not.
-fn status(is_proved: bool, is_whole: bool) -> &'static str {
-    match (is_proved, is_whole) {
-        (true, true) => "proved",
-        (true, false) => "given_up",
-        (false, _) => "searched",
     }
 }
 
@@ -389,18 +407,10 @@ fn clearance_line(
     found: Option<TimedClearance>,
     enclosure: Option<ClearanceEnclosure>,
 ) -> ClearanceLine {
+    let proved = enclosure.map(|found| ([found.lo, found.hi], found.until, found.travelled));
     ClearanceLine {
         least_clearance: found.map(|found| found.least.value),
-        least_clearance_lo: enclosure.map(|enclosure| enclosure.lo),
-        least_clearance_hi: enclosure.map(|enclosure| enclosure.hi),
-        least_clearance_status: status(
-            enclosure.is_some(),
-            enclosure.is_none_or(|enclosure| enclosure.until.is_none()),
-        ),
-        proved_until: enclosure
-            .and_then(|enclosure| enclosure.until)
-            .map(|until| scene.motion.time_at(until).next_down().max(0.0)),
-        time: enclosure.map(|enclosure| scene.motion.time_at(enclosure.travelled)),
+        proved: ProvedBounds::of(proved, |travelled| scene.motion.time_at(travelled)),
         bench_a: enclosure.map(|enclosure| enclosure.bench_a),
         bench_b: enclosure.map(|enclosure| enclosure.bench_b),
     }

@@ -48,20 +48,23 @@ fn program(arguments: &[&str]) -> (String, String, Option<i32>) {
     (text(output.stdout), text(output.stderr), output.status.code())
 }
 
+/// Returns a dragon of three benches on a line of 50 m, behind other pieces.
+fn dragon(name: &str, origin: &str, delay: f64, pieces: &str) -> String {
+    format!(
+        "[[dragons]]\nname = \"{name}\"\nplacement = {{ {origin} }}\ndelay = {delay:?}\n[dragons.team]\n\
+         benches = 3\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n[dragons.path]\n\
+         kind = \"pieces\"\npieces = [{pieces} {{ kind = \"line\", length = 50.0 }}]\n[dragons.motion]\n\
+         head_speed = 1.0\n"
+    )
+}
+
 /// The events of each of several dragons and the contact of two are proved, verified, and named by their dragons.
 #[test]
 fn the_program_proves_the_contact_of_two_dragons() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("proof.jsonl");
-    let dragon = |name: &str, origin: &str, delay: f64| {
-        format!(
-            "[[dragons]]\nname = \"{name}\"\nplacement = {{ {origin} }}\ndelay = {delay:?}\n[dragons.team]\n\
-             benches = 3\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n[dragons.path]\n\
-             kind = \"pieces\"\npieces = [{{ kind = \"line\", length = 50.0 }}]\n[dragons.motion]\nhead_speed = 1.0\n"
-        )
-    };
-    let text = dragon("gold", "origin = [-20.0, 0.0]", 0.0)
-        + &dragon("jade", "origin = [20.0, 0.2], rotation_turns = 0.5", 4.0);
+    let text = dragon("gold", "origin = [-20.0, 0.0]", 0.0, "")
+        + &dragon("jade", "origin = [20.0, 0.2], rotation_turns = 0.5", 4.0, "");
     let scene = folder.path().join("two.toml");
     std::fs::write(&scene, &text).unwrap();
     let (file, scene) = (file.to_str().unwrap(), scene.to_str().unwrap());
@@ -95,6 +98,25 @@ fn the_program_proves_the_contact_of_two_dragons() {
     let (said, _, code) = program(&["verify", file]);
     assert!(code == Some(0) && said.contains("gold and jade, least clearance from the start"), "{said}");
     assert!(said.contains("no board of the one and board of the other are nearer than"), "{said}");
+}
+
+/// At a U-turn as wide as the head's link a proof gives up. The time before is rounded down, in JSON as in words.
+#[test]
+fn the_time_up_to_which_two_dragons_are_proved_is_rounded_down() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("two.toml");
+    let turn = "{ kind = \"line\", length = 5.0 }, { kind = \"arc\", radius = 1.43, side = \"left\", turns = 0.5 },";
+    let text = dragon("gold", "origin = [-30.0, 40.0]", 0.0, "") + &dragon("jade", "origin = [0.0, 0.0]", 0.3, turn);
+    std::fs::write(&scene, text).unwrap();
+    let [json, words] = [&["--json"][..], &[]].map(|form| {
+        let (said, errors, code) = program(&[&["--scene", scene.to_str().unwrap(), "check", "--prove"], form].concat());
+        assert_eq!((errors.as_str(), code), ("", Some(0)), "{said}");
+        said
+    });
+    let jade: Value = serde_json::from_str(json.lines().nth(1).unwrap()).unwrap();
+    assert_eq!(jade["least_clearance_status"], "given_up", "{json}");
+    let until = jade["proved_until"].as_f64().unwrap();
+    assert!(words.contains(&format!("jade: Proved: up to t = {until} s no two boards")), "{json}{words}");
 }
 
 /// A certificate is made, checked, refused after a change of one digit, and printed for its own scene only.

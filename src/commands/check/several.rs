@@ -12,7 +12,7 @@ use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
 use super::super::{CommandError, Common, Output, progress_bar};
-use super::{CertificateFile, proved_sentence, status};
+use super::{CertificateFile, ProvedBounds, proved_sentence};
 
 /// What is proved of one dragon, of one and an obstacle, or of two: a line of `check --prove --json`.
 #[derive(Serialize)]
@@ -20,12 +20,8 @@ pub(super) struct Part {
     dragons: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     obstacle: Option<String>,
-    least_clearance_lo: Option<f64>,
-    least_clearance_hi: Option<f64>,
-    least_clearance_status: &'static str,
-    /// Simulated seconds up to which that is proved, unless to the end of the show.
-    proved_until: Option<f64>,
-    time: Option<f64>,
+    #[serde(flatten)]
+    proved: ProvedBounds,
     bench_a: Option<usize>,
     bench_b: Option<usize>,
     /// True for a dragon of which no two benches could meet.
@@ -68,15 +64,11 @@ fn parts(scene: &Scene, ensemble: &Ensemble, found: &SeveralClearances) -> Vec<P
 fn own_part(ensemble: &Ensemble, k: usize, found: Option<ClearanceEnclosure>) -> Part {
     let Dragon { name, motion, .. } = &ensemble.dragons()[k];
     let (time_at, first) = (times_of(ensemble, k), ensemble.handles_of(k).start);
-    let until = found.and_then(|found| found.until);
+    let proved = found.map(|found| ([found.lo, found.hi], found.until, found.travelled));
     Part {
         dragons: vec![name.clone()],
         obstacle: None,
-        least_clearance_lo: found.map(|found| found.lo),
-        least_clearance_hi: found.map(|found| found.hi),
-        least_clearance_status: status(found.is_some(), until.is_none()),
-        proved_until: until.map(&time_at),
-        time: found.map(|found| time_at(found.travelled)),
+        proved: ProvedBounds::of(proved, time_at),
         bench_a: found.map(|found| first + found.bench_a),
         bench_b: found.map(|found| first + found.bench_b),
         is_empty: motion.team().benches < 3,
@@ -85,15 +77,11 @@ fn own_part(ensemble: &Ensemble, k: usize, found: Option<ClearanceEnclosure>) ->
 
 fn obstacle_part(ensemble: &Ensemble, k: usize, obstacle: &str, found: Option<ObstacleEnclosure>) -> Part {
     let (time_at, first) = (times_of(ensemble, k), ensemble.handles_of(k).start);
-    let until = found.and_then(|found| found.until);
+    let proved = found.map(|found| ([found.lo, found.hi], found.until, found.travelled));
     Part {
         dragons: vec![ensemble.dragons()[k].name.clone()],
         obstacle: Some(obstacle.to_owned()),
-        least_clearance_lo: found.map(|found| found.lo),
-        least_clearance_hi: found.map(|found| found.hi),
-        least_clearance_status: status(found.is_some(), until.is_none()),
-        proved_until: until.map(&time_at),
-        time: found.map(|found| time_at(found.travelled)),
+        proved: ProvedBounds::of(proved, time_at),
         bench_a: found.map(|found| first + found.bench),
         bench_b: None,
         is_empty: false,
@@ -106,11 +94,7 @@ fn between_part(ensemble: &Ensemble, found: &BetweenEnclosure) -> Part {
     Part {
         dragons: dragons.map(|dragon| ensemble.dragons()[dragon].name.clone()).to_vec(),
         obstacle: None,
-        least_clearance_lo: lo,
-        least_clearance_hi: hi,
-        least_clearance_status: status(lo.is_some() && hi.is_some(), until.is_none()),
-        proved_until: until,
-        time: hi.map(|_| time),
+        proved: ProvedBounds::new(lo, hi, until, hi.map(|_| time)),
         bench_a: number(0),
         bench_b: number(1),
         is_empty: false,
@@ -128,9 +112,9 @@ fn times_of(ensemble: &Ensemble, k: usize) -> impl Fn(f64) -> f64 {
 pub(super) fn of_boards(parts: &[Part]) -> (Option<f64>, Option<f64>, bool) {
     let of_boards = || parts.iter().filter(|part| part.obstacle.is_none() && !part.is_empty);
     let least = |of: fn(&Part) -> Option<f64>| of_boards().filter_map(of).reduce(f64::min);
-    let is_whole = of_boards().all(|part| part.least_clearance_status == "proved");
-    let lo = least(|part| part.least_clearance_lo).filter(|_| is_whole);
-    (lo, least(|part| part.least_clearance_hi), is_whole)
+    let is_whole = of_boards().all(|part| part.proved.status == "proved");
+    let lo = least(|part| part.proved.lo).filter(|_| is_whole);
+    (lo, least(|part| part.proved.hi), is_whole)
 }
 
 /// Prints what is proved.
@@ -141,9 +125,9 @@ pub(super) fn print(parts: &[Part], output: &mut Output) -> Result<(), CommandEr
     for part in parts.iter().filter(|part| !part.is_empty) {
         let with = part.obstacle.iter().map(|name| format!("the {}", printable(name)));
         let names: Vec<String> = part.dragons.iter().cloned().chain(with).collect();
-        let bounds = part.least_clearance_lo.zip(part.least_clearance_hi).zip(part.time);
+        let bounds = part.proved.lo.zip(part.proved.hi).zip(part.proved.time);
         let sentence = match bounds {
-            Some((bounds, time)) => proved_sentence(bounds, part.proved_until, time),
+            Some((bounds, time)) => proved_sentence(bounds, part.proved.proved_until, time),
             None => "Nothing of it could be proved.".to_owned(),
         };
         output.line(&format!("  The least clearance of {}: {sentence}", names.join(" and ")))?;
