@@ -335,21 +335,6 @@ pub struct Route {
     remainders: Option<Remainders>,
 }
 
-/// A curve between two of its places: a piece of a route.
-#[derive(Debug, Clone, Copy)]
-pub struct RoutePiece {
-    /// The curve.
-    pub segment: Segment,
-    /// The place where the piece begins.
-    pub first: Coordinate,
-    /// The place where it ends.
-    pub last: Coordinate,
-    /// Metres along it.
-    pub length: f64,
-    /// Turns by which its direction changes, positive to the left.
-    pub turned: f64,
-}
-
 /// The rounding errors of the end, the heading and the length of a route so far.
 #[derive(Debug, Clone, Copy, Default)]
 struct Remainders {
@@ -367,29 +352,18 @@ impl Route {
 
     /// Adds a straight line of `length` metres.
     pub fn line(self, length: f64) -> Self {
-        self.piece(|origin, direction| {
-            let last = Coordinate { high: length, low: 0.0 };
-            RoutePiece {
-                segment: Segment::Line(Line { origin, direction }),
-                first: Coordinate::ZERO,
-                last,
-                length,
-                turned: 0.0,
-            }
-        })
+        let line = Line { origin: self.end, direction: self.direction() };
+        self.piece(Segment::Line(line), Coordinate::ZERO, Coordinate { high: length, low: 0.0 }, length, 0.0)
     }
 
     /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
     pub fn arc(self, side: Side, radius: f64, turns: impl Into<DoubleDouble>) -> Self {
         let around = turns.into();
         let turns = around.high;
-        self.piece(|origin, direction| RoutePiece {
-            segment: Segment::Arc(Arc::new(origin, direction, side, radius)),
-            first: Coordinate::ZERO,
-            last: DoubleDouble::from_turns(around),
-            length: radius * TAU * turns,
-            turned: if side == Side::Left { turns } else { -turns },
-        })
+        let arc = Arc::new(self.end, self.direction(), side, radius);
+        let turned = if side == Side::Left { turns } else { -turns };
+        let last = DoubleDouble::from_turns(around);
+        self.piece(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
     }
 
     /// Adds an Archimedean spiral of `pitch` metres per turn. It begins `radius` metres from its centre, which is on
@@ -410,18 +384,20 @@ impl Route {
         let first = DoubleDouble::from_turns(high).plus(TAU * low);
         let around = DoubleDouble::from_turns(turns);
         let last = first.plus(spiral.sign() * around.high).plus(spiral.sign() * around.low);
+        let placed = PlacedSpiral::new(self.end, self.direction(), side, spiral, first);
         let inclined = atan(around.high / (1.0 + first.high * last.high)) / TAU;
         let turned = turns.high + inclined;
-        self.piece(|origin, direction| RoutePiece {
-            segment: Segment::PlacedSpiral(PlacedSpiral::new(origin, direction, side, spiral, first)),
-            first,
-            last,
-            length: spiral.arc_length(first, last),
-            turned: if side == Side::Left { turned } else { -turned },
-        })
+        let turned = if side == Side::Left { turned } else { -turned };
+        self.piece(Segment::PlacedSpiral(placed), first, last, spiral.arc_length(first, last), turned)
     }
 
-    fn direction(&self) -> Vector {
+    /// Returns the point at the route's end.
+    pub fn end(&self) -> Point {
+        self.end
+    }
+
+    /// Returns the unit direction at the route's end.
+    pub fn direction(&self) -> Vector {
         let rest = self.remainders.map_or(0.0, |remainders| remainders.heading_turns);
         let heading = DoubleDouble::from_turns(self.heading_turns);
         let heading = if rest == 0.0 { heading } else { heading.plus(TAU * rest) };
@@ -429,9 +405,9 @@ impl Route {
         Vector::new(cosine, sine)
     }
 
-    /// Adds the piece that begins at the route's end, a point, in the route's unit direction there.
-    pub fn piece(mut self, of: impl FnOnce(Point, Vector) -> RoutePiece) -> Self {
-        let RoutePiece { segment, first, last, length, turned } = of(self.end, self.direction());
+    /// Adds the `length` metres of a curve from one place to another. It begins at the route's end in the route's
+    /// direction there, and turns by `turned` turns to the left.
+    pub fn piece(mut self, segment: Segment, first: Coordinate, last: Coordinate, length: f64, turned: f64) -> Self {
         let before = self.path.length();
         self.path.push(segment, first, last, length);
         let Some(rest) = &mut self.remainders else {
