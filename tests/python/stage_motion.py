@@ -11,7 +11,8 @@ import time
 
 import numpy
 
-from stage_picture import CONTACT, PROGRAM, browser, drawn, play, publisher, server, until
+from chromium import at_rest
+from stage_picture import CONTACT, PROGRAM, STILL, browser, drawn, passes, play, publisher, server, until
 
 # Number of places of the drawn head in four seconds, and number of frames received.
 PLACES = """() => new Promise((done) => {
@@ -40,6 +41,13 @@ def motion_is_smooth_at_any_rate():
             received, pictures, published = (now - then for now, then in zip(page.evaluate(counts), first))
             assert 0 < received < published / 4, f"{received} of {published} frames: a page needs fewer"
             assert pictures > 0
+        until(page, "document.body.dataset.level === 'waiting'", "the publisher's end")
+        with publisher(*STILL):
+            drawn(page)
+            at_rest(page)
+            before = page.evaluate("picture.drawn")
+            passes(page, 30)
+            assert page.evaluate("picture.drawn") == before, "a show that is not seen to move is drawn"
         assert not complaints, complaints
 
 
