@@ -153,9 +153,8 @@ function paint(there) {
   if (lanterns) return light(there);
   const hasFocus = document.activeElement === canvas, pixels = camera.scale * camera.ratio;
   const look = [there.map((dragon) => dragon.lookKey(pixels)), camera.x, camera.y, camera.scale, camera.c, camera.s,
-      chosen, whose.name, palette.ground, measure.key, hasFocus && measure.on,
-      labels?.isDue(passedAt) && passedAt].join();
-  if (look === last) return;
+      chosen, whose.name, palette.ground, measure.key, hasFocus && measure.on].join();
+  if (look === last && !labels?.isDue(passedAt)) return;
   took(look);
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
