@@ -100,9 +100,9 @@ fn the_program_proves_the_contact_of_two_dragons() {
     assert!(said.contains("no board of the one and board of the other are nearer than"), "{said}");
 }
 
-/// At a U-turn as wide as the head's link a proof gives up. The time before is rounded down, in JSON as in words.
+/// At a U-turn as wide as the head's link a proof gives up. JSON and words name the same time before.
 #[test]
-fn the_time_up_to_which_two_dragons_are_proved_is_rounded_down() {
+fn the_time_up_to_which_two_dragons_are_proved_is_the_same_in_json_as_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let scene = folder.path().join("two.toml");
     let turn = "{ kind = \"line\", length = 5.0 }, { kind = \"arc\", radius = 1.43, side = \"left\", turns = 0.5 },";

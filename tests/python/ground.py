@@ -184,7 +184,7 @@ class Path:
 
 def greatest(function, low, high):
     """Returns places between `low` and `high` where functions with one maximum are not negative, and the values; without
-    such places, negative values. Functions grow by no more than their argument."""
+    such places, negative values. A function grows by at most 1 per unit of its argument."""
     share = 0.5 * (math.sqrt(5) - 1)
     inner = [high - share * (high - low), low + share * (high - low)]
     values = [function(place) for place in inner]

@@ -63,7 +63,7 @@ def browser(**context):
         yield opened(running, **context)
 
 
-# A screen of 20 pictures a second, on which a page costs a third. Tests of motion have a common one.
+# A screen of 20 pictures a second, on which a page costs less. Tests of motion and of the seat have an ordinary one.
 SLOW_SCREEN = """(() => {
     const next = window.requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 34);

@@ -44,7 +44,7 @@ def seat_shows_the_dragon():
     handles = truth_at(300.0)
     pixel = eye(numpy.round((handles.min(axis=0) + handles.max(axis=0)) / 2))
     view = {"viewport": {"width": WIDTH, "height": TALL}, "reduced_motion": "reduce", "has_touch": True}
-    with started("view", "--json", "--port", "0", "--control") as conducted, browser(**view) as (page, complaints):
+    with started("view", "--json", "--port", "0", "--control") as conducted, browser(screen=None, **view) as (page, complaints):
         url = json.loads(conducted.stdout.readline())["url"]
         with publisher(*STILL):
             page.goto(f"{url}#seat={TURNS},{DISTANCE},{HEIGHT}")
@@ -134,7 +134,7 @@ def cameras_are_kept():
     """Shift and a digit keep the camera, on this browser; the digit takes it, on the page and in the seat that hands may
     change."""
     corner = "[picture.toPixel(0, 0), picture.toPixel(1, 1)].flat().map((one) => one.toFixed(2)).join()"
-    with server() as url, publisher(*STILL), browser() as (page, complaints):
+    with server() as url, publisher(*STILL), browser(screen=None) as (page, complaints):
         for address, arrow in [("#keys", "ArrowLeft"), ("#seat,hands", "ArrowUp")]:
             page.goto("about:blank")
             page.goto(f"{url}{address}")

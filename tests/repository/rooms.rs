@@ -85,7 +85,7 @@ fn product_code() -> Vec<(PathBuf, String)> {
     let is_test = |path: &PathBuf| path.iter().any(|part| part == "tests" || part == "tests.rs");
     let read = |path: PathBuf| {
         let text = std::fs::read_to_string(&path).unwrap();
-        (path, text.split("#[cfg(test)]").next().unwrap().to_owned())
+        (path, text.split("#[cfg(test)]\nmod tests {").next().unwrap().to_owned())
     };
     files.filter(|path| !is_test(path)).map(read).collect()
 }

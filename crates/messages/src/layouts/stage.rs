@@ -71,8 +71,8 @@ impl StageSegment {
         }
     }
 
-    /// Returns the point, metres right and up, and the direction of travel, radians, at a share, from 0 to 1, of its
-    /// length or of a spiral's polar angle.
+    /// Returns the point, in metres, and the direction of travel, in radians, at a share of the length or of a spiral's
+    /// polar angle. The share is from 0 to 1.
     pub fn pose_at(&self, share: f64) -> (f64, f64, f64) {
         let Self { x, y, heading, length, curvature, theta_first, theta_last, .. } = *self;
         match self.kind {
@@ -103,12 +103,12 @@ impl StageSegment {
         (side * radius * cosine, side * radius * sine, along_y.atan2(along_x))
     }
 
-    /// Returns a pose of a spiral that is placed elsewhere, from its place on the spiral about the origin. Beginning
-    /// and heading say where the spiral lies; an inward one bends to the right unless it is mirrored, an outward one to
-    /// the left.
+    /// Returns a pose of a spiral that is placed elsewhere, from its pose on the spiral about the origin. Beginning and
+    /// heading say where the spiral lies. Without a mirror an inward spiral bends to the right, an outward one to the
+    /// left.
     fn placed(&self, (x, y, heading): (f64, f64, f64)) -> (f64, f64, f64) {
         let (first_x, first_y, first_heading) = self.about_origin(self.theta_first);
-        // By half the angle, as in the quaternion of a pose.
+        // This rounding keeps the bits of the poses that earlier versions published.
         let (half_sine, half_cosine) = (0.5 * first_heading).sin_cos();
         let first_heading = 2.0 * half_sine.atan2(half_cosine);
         let bend = if self.kind == SEGMENT_INWARD_SPIRAL { -1.0 } else { 1.0 };

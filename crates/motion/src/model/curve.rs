@@ -5,8 +5,8 @@
 //!
 //! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`. It also needs a variant of
 //! [`Segment`](super::segment::Segment) with its outline, and one of `description` that constructs it. No other code of
-//! `model` distinguishes kinds of curves. The methods with a default have one that is valid for every curve; the
-//! default of a bound costs time only.
+//! `model` matches on kinds of curves, but `Path::as_spiral`. The methods with a default have one that is valid for
+//! every curve; the default of a bound costs time only.
 
 use super::double_double::DoubleDouble;
 use super::team::Team;

@@ -1,5 +1,5 @@
-//! [`Segment`]: one of the curves of a path, and its outline for drawings. This is the only list of the kinds of curves
-//! that is matched on.
+//! [`Segment`]: one of the curves of a path, and its outline for drawings. The path calls it; drawings match on the
+//! kind of an outline.
 
 use std::f64::consts::TAU;
 use std::fmt;

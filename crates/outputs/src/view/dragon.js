@@ -7,9 +7,6 @@ import { SpeedScale } from "./palette.js";
 import { Show } from "./show.js";
 import { nameOf, say } from "./words.js";
 
-/** The part of a pixel by which a picture may lag behind. */
-const PART = 1 / 16;
-
 /** Returns the distance of the outermost bench from a place. */
 function reachOf(stage, handles, { x, y }) {
   let most = 0;
@@ -134,15 +131,14 @@ export class Dragon {
   }
 
   /**
-   * Returns a value that changes with its picture, by `PART` of a pixel or more, of which `pixels` are in a metre: a show
-   * that is slow enough costs as little as one that stands still.
+   * Returns a value that changes with its picture, at least once while a board moves by `least` metres.
    */
-  lookKey(pixels) {
-    const { frame, colours, marks, stage, publisher } = this, { shown, stream } = publisher;
-    const step = PART / (pixels * colours.head * (1 + colours.width));
-    const moment = step > 0 ? Math.floor(shown.time / step) : shown.time;
-    const texts = marks.map(({ kind, pair, text }) => [kind, pair, text]), light = [this.show?.phase, this.sight.stale];
+  lookKey(least) {
+    const { frame, colours, marks, stage, publisher, sight } = this, { shown, stream } = publisher;
+    const step = least / colours.fastest, moment = step > 0 ? Math.floor(shown.time / step) : shown.time;
+    const texts = marks.map(({ kind, pair, benches, text }) => [kind, pair, benches, text]);
     const show = [frame.run, frame.state, moment, shown.from.epoch, stream.alert?.level, stage.scene];
+    const light = [this.show?.phase, sight.stale, sight.trouble];
     return [show, colours.resting, this.path.reach, colours.step, colours.head, texts, light].join();
   }
 

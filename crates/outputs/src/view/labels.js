@@ -81,8 +81,10 @@ export class Labels {
 
   /** Moves the words of the last layout with their boards, and part of the way to a new place beside them. */
   move(now, items, camera, dragons) {
-    const passed = Math.min(100, now - this.drawnAt), part = this.isStill ? 1 : 1 - Math.exp((-3 * passed) / EASING),
-        kept = new Map();
+    // After a rest a word begins to move, however long the rest was.
+    const passed = this.isMoving ? Math.min(100, now - this.drawnAt) : 1000 / 60;
+    const part = this.isStill ? 1 : 1 - Math.exp((-3 * passed) / EASING);
+    const kept = new Map();
     this.drawnAt = now;
     [this.isMoving, this.isLate] = [false, this.laidAt !== now];
     const { unit } = camera;

@@ -120,6 +120,13 @@ class MeanSpeeds {
  * colour keeps its meaning within a run. A bench has the colour of its mean speed over one link passage. The scale
  * keeps the speeds of the last moving frame. The crate `drawing` has the same scale.
  */
+/** Returns a power of two that no speed of the handles exceeds, and that rounding of the speeds hardly changes. */
+function boundOf(handles) {
+  let most = 0;
+  for (let handle = 0; handle < handles.length / STRIDE; handle++) most = Math.max(most, speedOf(handles, handle));
+  return 2 ** (Math.round(Math.log2(most)) + 1);
+}
+
 export class SpeedScale {
   constructor() {
     this.clear();
@@ -127,6 +134,8 @@ export class SpeedScale {
 
   clear() {
     this.head = NaN;
+    /** A bound of the speeds of the newest frame's handles; NaN if these are not sent. */
+    this.fastest = NaN;
     this.step = 0;
     /** The mean speeds at the last moving frame. */
     this.speeds = null;
@@ -141,6 +150,7 @@ export class SpeedScale {
     if (this.frame === frame) return;
     this.frame = frame;
     const { handles } = frame, head = speedOf(handles, 0);
+    this.fastest = boundOf(handles);
     this.unsent = Number.isNaN(head);
     this.resting = !(head > 0);
     if (this.resting) return;

@@ -31,6 +31,8 @@ import { capital, say, setLanguage, translate } from "./words.js";
 const FIGURES_INTERVAL = 100;
 /** The seconds by which the countdown of another dragon must end earlier for the header to change to that dragon. */
 const HEADER_LEAD = 1;
+/** The part of a pixel by which a plan may be behind the show. */
+const PART = 1 / 16;
 
 const words = wordsOf(location.hash), root = document.documentElement,
     stillness = matchMedia("(prefers-reduced-motion: reduce)");
@@ -67,14 +69,15 @@ meet();
  * `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon of the figures, null for that of
  * the publisher of the header.
  */
-let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null, passedAt = 0,
-    drawn = { pass: 0, at: 0 };
+let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null;
+/** The moments of this pass of the page and of the one before, and of the pass that drew last. */
+let passedAt = 0, beforeAt = 0, drawnAt = -Infinity;
 
 /**
- * For tests and measurements: the received and drawn data. `shown` is the simulated time and the handles of the
- * latest picture, `range` speeds on the colour scale, `marks` and `labels` the marks and words on
- * it; `latency` and `ways` in ms since the frame was sent. With several dragons it is of the first, and `dragons`
- * has the same of each.
+ * For tests and measurements: the received and drawn data. `shown` is the simulated time and the handles at the latest
+ * pass, `range` speeds on the colour scale, `marks` and `labels` the marks and words on the latest picture; `latency`
+ * and `ways` in ms since the frame was sent. With several dragons it is of the first, and `dragons` has the same of
+ * each.
  */
 const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null,
     shown: null, range: null, marks: [], labels: [], latency: publishers[0].latency, ways: publishers[0].stream.ways,
@@ -124,7 +127,7 @@ function pass() {
   picture.passes++;
   fitCanvas();
   const now = performance.now(), passed = now - passedAt;
-  passedAt = now;
+  [beforeAt, passedAt] = [passedAt, now];
   const isOther = publishers.map((one) => one.update(now)).some(Boolean);
   meet();
   if (!dragons.includes(whose)) choose(-1, dragons[0]);
@@ -151,9 +154,10 @@ function pass() {
 /** Draws the picture, only if it has changed: a show that stands still costs nothing. */
 function paint(there) {
   if (lanterns) return light(there);
-  const hasFocus = document.activeElement === canvas, pixels = camera.scale * camera.ratio;
-  const look = [there.map((dragon) => dragon.lookKey(pixels)), camera.x, camera.y, camera.scale, camera.c, camera.s,
-      chosen, whose.name, palette.ground, measure.key, hasFocus && measure.on].join();
+  const hasFocus = document.activeElement === canvas, least = PART / (camera.scale * camera.ratio);
+  const [x, y] = [camera.x, camera.y].map((one) => Math.floor(one / least));
+  const look = [there.map((dragon) => dragon.lookKey(least)), x, y, camera.scale, camera.c, camera.s, chosen,
+      whose.name, palette.ground, measure.key, hasFocus && measure.on].join();
   if (look === last && !labels?.isDue(passedAt)) return;
   took(look);
   const allStale = there.every(({ sight }) => sight.stale);
@@ -174,15 +178,14 @@ function paint(there) {
 
 /** Notes what is drawn now, and measures the time of a picture if the last pass drew one too. */
 function took(look) {
-  if (last && !seat && picture.passes === drawn.pass + 1) resolution.take(passedAt - drawn.at);
-  [last, drawn] = [look, { pass: picture.passes, at: passedAt }];
+  if (last && !seat && drawnAt === beforeAt) resolution.take(passedAt - drawnAt);
+  [last, drawnAt] = [look, passedAt];
 }
 
 /** Draws the show look. */
 function light(there) {
-  const isDue = pace?.begin(passedAt) ?? true, pixels = seat ? Infinity : camera.scale * camera.ratio;
-  const look = [there.map((dragon) => dragon.lookKey(pixels)), camera.x, camera.y, camera.scale, camera.c, camera.s,
-      seat?.key].join();
+  const isDue = pace?.begin(passedAt) ?? true, look = [there.map((dragon) => dragon.lookKey(0)), camera.x,
+      camera.y, camera.scale, camera.c, camera.s, seat?.key].join();
   if (look === last || !isDue) return;
   took(look);
   lanterns.draw(context, camera, there);
