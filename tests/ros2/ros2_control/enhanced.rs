@@ -1,6 +1,6 @@
 //! A client of the control services that calls as `rmw_fastrtps_cpp` does: ros2-client's own.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ros2_client::{
     Client, Context, ContextOptions, DEFAULT_PUBLISHER_QOS, Message, Name, NodeName, NodeOptions, ServiceMapping,
@@ -55,7 +55,7 @@ impl<T: Serialize + DeserializeOwned> Message for Fields<T> {}
 
 /// Calls a service as a new client with its own participant. Returns `None` if no answer comes within `seconds`.
 ///
-/// A participant of this library may wait without end for a service on a busy machine: then another one is tried.
+/// A participant of ros2-client may wait without end for a service on a busy machine: then another one is tried.
 pub fn first_call<Request, Response>(
     name: &str,
     service: &str,
@@ -67,11 +67,17 @@ where
     Request: Serialize + DeserializeOwned + Clone + 'static,
     Response: Serialize + DeserializeOwned + 'static,
 {
-    let mut attempts = (0..3).filter_map(|_| discovered_call(name, service, kind, request.clone(), seconds));
-    attempts.next().unwrap_or_else(|| panic!("{service} was not discovered"))
+    let deadline = Instant::now() + crate::harness::patience();
+    loop {
+        if let Some(answer) = discovered_call(name, service, kind, request.clone(), seconds) {
+            return answer;
+        }
+        assert!(Instant::now() < deadline, "{service} was not discovered");
+    }
 }
 
-/// Calls a service as [`first_call`] does. Returns `None` if the service is not discovered within a minute.
+/// Calls a service as [`first_call`] does. Returns `None` if the service is not discovered within 10 s: ros2-client
+/// holds eight events of discovery, and loses further ones.
 fn discovered_call<Request, Response>(
     name: &str,
     service: &str,
@@ -95,7 +101,7 @@ where
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let answer = runtime.block_on(async {
         let call = async {
-            tokio::time::timeout(crate::harness::patience(), client.wait_for_service(&node)).await.ok()?;
+            tokio::time::timeout(Duration::from_secs(10), client.wait_for_service(&node)).await.ok()?;
             Some(tokio::time::timeout(Duration::from_secs(seconds), client.async_call_service(Fields(request))).await)
         };
         tokio::select! {
