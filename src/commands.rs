@@ -202,6 +202,11 @@ impl Output {
         Ok(Self { writer: BufWriter::new(Destination::File(NewFile::create(file)?)) })
     }
 
+    /// Writes lines that have their line feeds.
+    pub fn text(&mut self, lines: &str) -> Result<(), CommandError> {
+        Ok(self.writer.write_all(lines.as_bytes())?)
+    }
+
     /// Writes a line.
     pub fn line(&mut self, text: &str) -> Result<(), CommandError> {
         Ok(writeln!(self.writer, "{text}")?)

@@ -1,6 +1,6 @@
 //! The file of a certificate that a command writes with `--certify`.
 
-use std::io::{self, BufWriter, Write as _};
+use std::io::{self, BufWriter};
 use std::path::Path;
 
 use bench_dragon::certify::CertificateLine;
@@ -25,8 +25,7 @@ impl CertificateFile {
     /// # Errors
     /// The line cannot be written.
     pub fn write(&mut self, line: &CertificateLine) -> io::Result<()> {
-        serde_json::to_writer(&mut self.0, line).map_err(io::Error::from)?;
-        self.0.write_all(b"\n")
+        line.write(&mut self.0)
     }
 
     /// Completes the file under its name.

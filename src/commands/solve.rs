@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::solve::Chain;
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::show::solve_at_or_just_before;
-use serde::Serialize;
+use bench_dragon::show::{solve_at_or_just_before, table};
 
 use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
 
@@ -31,14 +30,6 @@ pub struct SolveArguments {
     output: Option<PathBuf>,
 }
 
-/// One line of `solve --json`.
-#[derive(Serialize)]
-struct TimeLine {
-    t: f64,
-    /// x, y, heading, vx, vy, speed; NaN becomes null.
-    handles: Vec<[f64; 6]>,
-}
-
 /// Solves the scene at the requested times and prints the table.
 pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandError> {
     let scene = common.load_scene()?;
@@ -53,31 +44,25 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
         None => Output::standard(),
     };
     if !common.json {
-        output.line("t,handle,x,y,heading,vx,vy,speed")?;
+        output.text(table::CSV_HEADER)?;
     }
     let bar = progress_bar(count, common);
+    let mut text = String::new();
     for time in times {
         if solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
             return Err(CommandError::Failed(format!("there is no solution at {} s", figure(time))));
         }
+        text.clear();
         if common.json {
-            output.json(&TimeLine { t: time, handles: (0..chain.handles()).map(|i| numbers(&chain, i)).collect() })?;
+            table::json_line(time, &chain, &mut text)
         } else {
-            for handle in 0..chain.handles() {
-                let columns =
-                    numbers(&chain, handle).map(|value| if value.is_nan() { String::new() } else { number(value) });
-                output.line(&format!("{},{handle},{}", number(time), columns.join(",")))?;
-            }
+            table::csv_rows(time, &chain, &mut text)
         }
+        output.text(&text)?;
         bar.inc(1);
     }
     bar.finish_and_clear();
     output.finish()
-}
-
-fn numbers(chain: &Chain, handle: usize) -> [f64; 6] {
-    let Chain { x, y, heading, speed, vx, vy } = chain;
-    [x, y, heading, vx, vy, speed].map(|column| column[handle])
 }
 
 impl SolveArguments {

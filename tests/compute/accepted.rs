@@ -164,11 +164,7 @@ fn accepted(text: &str, search: impl FnOnce(&mut dyn FnMut(&CertificateLine) -> 
 /// Returns the lines that a search writes.
 fn written(search: impl FnOnce(&mut dyn FnMut(&CertificateLine) -> io::Result<()>)) -> Vec<u8> {
     let mut lines = Vec::new();
-    search(&mut |line| {
-        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
-        lines.push(b'\n');
-        Ok(())
-    });
+    search(&mut |line| line.write(&mut lines));
     lines
 }
 
@@ -239,11 +235,7 @@ fn speed_certified(text: &str) -> bool {
     let timeline = scene.motion.timeline(&mut |_| ());
     let mut found = None;
     let mut lines = Vec::new();
-    let mut write = |line: &CertificateLine| {
-        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
-        lines.push(b'\n');
-        Ok(())
-    };
+    let mut write = |line: &CertificateLine| line.write(&mut lines);
     if let Ok(Ok(speed)) = certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, &mut write, &mut |_| ()) {
         found = Some(speed);
     }

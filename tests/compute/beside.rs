@@ -3,8 +3,6 @@
 //!
 //! `BENCH_DRAGON_LONG=1` makes 3,000 scenes in place of 120, `BENCH_DRAGON_CASES=few` 30.
 
-use std::io;
-
 use bench_dragon::certify::{
     CertificateLine, ClearanceEnclosures, ClearanceHints, ObstacleEnclosure, certify_least_clearance,
 };
@@ -44,11 +42,7 @@ fn enclosed(text: &str) -> Enclosed {
     let found = scene.motion.obstacle_clearances(&freeze, &mut |_| ());
     let hints = ClearanceHints { boards: boards.as_ref(), obstacles: &found };
     let mut lines = Vec::new();
-    let mut write = |line: &CertificateLine| {
-        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
-        lines.push(b'\n');
-        Ok(())
-    };
+    let mut write = |line: &CertificateLine| line.write(&mut lines);
     let motion = &scene.motion;
     let enclosures =
         certify_least_clearance(motion, &freeze, hints, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();

@@ -3,8 +3,6 @@
 //!
 //! `BENCH_DRAGON_LONG=1` makes 600 pairs in place of 40, `BENCH_DRAGON_CASES=few` 12.
 
-use std::io;
-
 use bench_dragon::certify::{BetweenEnclosure, CertificateLine, SeveralClearances, certify_several_clearances};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ensemble::Ensemble;
@@ -22,11 +20,7 @@ const ROUNDING: f64 = 1e-10;
 
 fn certificate(text: &str, scene: &Scene) -> (SeveralClearances, String) {
     let mut lines = Vec::new();
-    let mut write = |line: &CertificateLine| {
-        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
-        lines.push(b'\n');
-        Ok(())
-    };
+    let mut write = |line: &CertificateLine| line.write(&mut lines);
     let (ensemble, timeline) = (scene.ensemble.as_ref().unwrap(), scene.timeline(&mut |_| ()));
     let freeze = timeline.freeze(scene.stops_at_contact());
     let found = certify_several_clearances(ensemble, freeze, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();

@@ -3,8 +3,6 @@
 //!
 //! `BENCH_DRAGON_LONG=1` makes 1,000 pairs in place of 60, `BENCH_DRAGON_CASES=few` 15.
 
-use std::io;
-
 use bench_dragon::certify::{CertificateLine, certify_several};
 use bench_dragon::messages::state::EventKind as Kind;
 use bench_dragon::proof::{EventKind, Proved, ProvedEvent, Refused, Status, verify};
@@ -18,11 +16,7 @@ const MOST_STEPS: u64 = 20_000;
 
 fn certificate(text: &str, scene: &Scene) -> String {
     let mut lines = Vec::new();
-    let mut write = |line: &CertificateLine| {
-        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
-        lines.push(b'\n');
-        Ok(())
-    };
+    let mut write = |line: &CertificateLine| line.write(&mut lines);
     let ensemble = scene.ensemble.as_ref().unwrap();
     certify_several(ensemble, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
     String::from_utf8(lines).unwrap()

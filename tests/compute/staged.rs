@@ -4,7 +4,6 @@
 //! `BENCH_DRAGON_LONG=1` makes 5,000 scenes in place of 200, `BENCH_DRAGON_CASES=few` 40.
 
 use std::fmt::Write;
-use std::io;
 
 use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::messages::state::EventKind as Kind;
@@ -20,11 +19,7 @@ const MOST_STEPS: u64 = 3000;
 fn certificate(text: &str, scene: &Scene) -> String {
     let timeline = scene.motion.timeline(&mut |_| ());
     let mut lines = Vec::new();
-    let mut write = |line: &CertificateLine| {
-        serde_json::to_writer(&mut lines, line).map_err(io::Error::other)?;
-        lines.push(b'\n');
-        Ok(())
-    };
+    let mut write = |line: &CertificateLine| line.write(&mut lines);
     certify(&scene.motion, &timeline, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
     String::from_utf8(lines).unwrap()
 }

@@ -253,8 +253,7 @@ fn certificate() {
     let timeline = motion.timeline_without_contact();
     let mut lines = Vec::new();
     let mut search = |steps: u64| {
-        let mut write =
-            |line: &CertificateLine| Ok(serde_json::to_writer(&mut lines, line).map(|()| lines.push(b'\n'))?);
+        let mut write = |line: &CertificateLine| line.write(&mut lines);
         certify(&motion, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
     };
     counted(&mut search, STEPS);

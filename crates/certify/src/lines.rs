@@ -1,6 +1,8 @@
 //! The lines of a certificate: see "The file" in `docs/proofs.md`. The search writes them; the `events` command prints
 //! their results.
 
+use std::io::{self, Write};
+
 use serde::Serialize;
 
 use super::capsule::Span;
@@ -254,6 +256,18 @@ pub enum CertificateLine<'a> {
     },
     /// The result for the least pitch.
     LeastPitch(CertifiedPitch),
+}
+
+impl CertificateLine<'_> {
+    /// Writes the line as JSON, with a line feed.
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write(&self, output: &mut dyn Write) -> io::Result<()> {
+        let mut line = serde_json::to_vec(self)?;
+        line.push(b'\n');
+        output.write_all(&line)
+    }
 }
 
 /// The certified least pitch with which a team reaches a radius.

@@ -139,12 +139,17 @@ pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
 /// # Errors
 /// [`Refused`] for the first wrong line.
 pub fn verify(mut lines: impl BufRead, progress: &mut dyn FnMut(u64)) -> Result<Proved, Refused> {
+    verify_lines(&mut lines, progress)
+}
+
+/// Not generic: compiled, and optimised, with this crate.
+fn verify_lines(lines: &mut dyn BufRead, progress: &mut dyn FnMut(u64)) -> Result<Proved, Refused> {
     let mut bytes = 0;
     let mut checker: Option<Checker> = None;
     for line in 1.. {
         let form = |problem: String| Refused::Form { line, problem };
         let mut text = Vec::new();
-        let read = (&mut lines).take(LONGEST_LINE).read_until(b'\n', &mut text).map_err(Refused::Unreadable)?;
+        let read = (&mut *lines).take(LONGEST_LINE).read_until(b'\n', &mut text).map_err(Refused::Unreadable)?;
         if read == 0 {
             break;
         }

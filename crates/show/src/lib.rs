@@ -10,6 +10,7 @@ mod dancer;
 mod playback;
 pub mod scene;
 mod several;
+pub mod table;
 #[cfg(test)]
 mod tests;
 
