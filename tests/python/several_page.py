@@ -183,6 +183,8 @@ def one_dies_alone():
                 page.goto(url)
                 both_drawn(page)
                 first = page.evaluate("picture.dragons[1].run")
+                is_cut = "(({scrollWidth, clientWidth}) => scrollWidth > clientWidth)(document.getElementById('dragons'))"
+                assert not page.evaluate(is_cut), f"a row is cut off: {words(page)}"
                 # The line between the nearest boards, and its words, come to rest.
                 at_rest(page)
                 before = light(page, handles)
@@ -225,11 +227,14 @@ def shows(page, name, expected):
 
 def light(page, handles):
     """Returns the lightness of the boards of each dragon, where no word lies on them."""
-    pixels, to_pixel, _ = canvas_pixels(page)
+    (pixels, to_pixel, _), boxes, ratio = canvas_pixels(page), page.evaluate("picture.labels"), page.evaluate("devicePixelRatio")
+    is_under = lambda x, y: any(abs(x - box["x"] * ratio) <= box["half"] * ratio + 2 and abs(y - box["y"] * ratio) <= box["tall"] * ratio + 2 for box in boxes)
     mean = {}
     for name, places in handles.items():
         benches = range(60, 180) if name == A else range(15, 45)
         at = to_pixel(numpy.array([(places[bench] + places[bench + 1]) / 2 for bench in benches]))
+        at = numpy.array([place for place in at if not is_under(*place)])
+        assert len(at) > 3, f"{name} is covered by {boxes}"
         mean[name] = float(numpy.median(luminance(pixels[at[:, 1], at[:, 0]])))
     return mean
 
