@@ -120,8 +120,9 @@ pub struct Chase<'a> {
     leader: Leader,
     inputs: Receiver<Input>,
     steering: Steering,
-    commands: CommandClient<()>,
-    answers: Receiver<ActionResult>,
+    /// A command is known by the moment at which it was sent.
+    commands: CommandClient<u64>,
+    answers: Receiver<(u64, ActionResult)>,
     port: StatusPort,
     shares_clock: bool,
     status: ChaseStatus,
@@ -155,7 +156,7 @@ impl<'a> Chase<'a> {
     ) -> Result<Self, ChaseError> {
         let port = StatusPort::open(name)?;
         let (sender, answers) = channel();
-        let commands = CommandClient::start(name, move |(), result| drop(sender.send(result)))?;
+        let commands = CommandClient::start(name, move |sent_ns, result| drop(sender.send((sent_ns, result))))?;
         let (limits, tracker): (Limits, u32) = match &leader {
             Leader::Timecode(timecode) => (timecode.schedule.limits(), 0),
             Leader::Tracker(tracker) => (tracker.track.limits(), tracker.tracker.into()),
@@ -180,7 +181,7 @@ impl<'a> Chase<'a> {
         if self.status.state == ChaseState::Locked as u32 && self.status.rate > 0.0 {
             while self.answers.try_recv().is_ok() {}
             let last = Action::Send(Command::Rate(self.status.rate));
-            if self.commands.request((), last).is_ok() {
+            if self.commands.request(monotonic_ns(), last).is_ok() {
                 let _ = self.answers.recv_timeout(LAST_COMMAND);
             }
         }
@@ -264,9 +265,9 @@ impl<'a> Chase<'a> {
         let now_ns = monotonic_ns();
         let (goal, state) = self.goal(now_ns);
         if let Some(command) = self.steering.command(goal, now_ns)
-            && self.commands.request((), Action::Send(command)).is_err()
+            && self.commands.request(now_ns, Action::Send(command)).is_err()
         {
-            self.steering.answered(None);
+            self.steering.answered(now_ns, None);
         }
         let state = match self.steering.waiting() {
             Some(Waiting::Held) => ChaseState::Held,
@@ -317,9 +318,9 @@ impl Handler for Chase<'_> {
     }
 
     fn polled(&mut self, now: Instant) {
-        while let Ok(result) = self.answers.try_recv() {
+        while let Ok((sent_ns, result)) = self.answers.try_recv() {
             let answer = result.ok().and_then(|(_, response)| Some((response.result()?, response.tick)));
-            self.steering.answered(answer);
+            self.steering.answered(sent_ns, answer);
         }
         while let Ok(input) = self.inputs.try_recv() {
             self.input(input);

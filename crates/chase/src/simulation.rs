@@ -110,9 +110,9 @@ fn play(sender: &Sender, schedule: Schedule, paused: bool, others: &[(f64, Comma
     let mut steering = Steering::new(schedule.limits());
     steering.set_end(412.0);
     let mut others: VecDeque<_> = others.iter().copied().collect();
-    // Commands on their way to the loop, and answers on their way back.
-    let mut commands: VecDeque<(u64, Command, bool)> = VecDeque::new();
-    let mut answers: VecDeque<(u64, Code, u64)> = VecDeque::new();
+    // Commands on their way to the loop, and answers on their way back, with the moments at which the chase sent them.
+    let mut commands: VecDeque<(u64, Command, Option<u64>)> = VecDeque::new();
+    let mut answers: VecDeque<(u64, u64, Code, u64)> = VecDeque::new();
     let mut run = Run { frames: Vec::new(), motions: Vec::new(), waits: Vec::new() };
     let (mut now, mut tick, mut newest, mut was_locked) = (BEGIN_NS, 0u64, None, false);
     while now < BEGIN_NS + (seconds * 1e9) as u64 {
@@ -121,13 +121,14 @@ fn play(sender: &Sender, schedule: Schedule, paused: bool, others: &[(f64, Comma
             let deadline = BEGIN_NS + (tick as f64 * 1e9 / rate) as u64;
             let moment = tick as f64 / rate;
             if others.front().is_some_and(|(at, _)| *at <= moment) {
-                commands.extend(others.pop_front().map(|(_, command)| (deadline, command, false)));
+                commands.extend(others.pop_front().map(|(_, command)| (deadline, command, None)));
             }
-            if let Some((_, command, is_own)) = commands.front().copied().filter(|(arrives, ..)| *arrives <= deadline) {
+            if let Some((_, command, sent_ns)) = commands.front().copied().filter(|(arrives, ..)| *arrives <= deadline)
+            {
                 commands.pop_front();
                 let code = clock.apply(tick, command).unwrap_or(Code::Done);
-                if is_own {
-                    answers.push_back((deadline + random.u64(1..3) * MILLISECOND, code, tick));
+                if let Some(sent_ns) = sent_ns {
+                    answers.push_back((deadline + random.u64(1..3) * MILLISECOND, sent_ns, code, tick));
                 }
             }
             let time = clock.advance(tick);
@@ -153,15 +154,15 @@ fn play(sender: &Sender, schedule: Schedule, paused: bool, others: &[(f64, Comma
             readings.pop_front();
             synchronizer.read(reading);
         }
-        if let Some((_, code, tick)) = answers.front().copied().filter(|(at, ..)| *at <= now) {
+        if let Some((_, sent_ns, code, tick)) = answers.front().copied().filter(|(at, ..)| *at <= now) {
             answers.pop_front();
-            steering.answered(Some((code, tick)));
+            steering.answered(sent_ns, Some((code, tick)));
         }
         let motion = synchronizer.motion(now);
         was_locked |= matches!(motion, Motion::Locked { .. });
         let goal = schedule.goal(motion, sender.rate, was_locked);
         if let Some(command) = steering.command(goal, now) {
-            commands.push_back((now + random.u64(0..2 * MILLISECOND) + MILLISECOND / 2, command, true));
+            commands.push_back((now + random.u64(0..2 * MILLISECOND) + MILLISECOND / 2, command, Some(now)));
         }
         let moment = (now - BEGIN_NS) as f64 * 1e-9;
         run.motions.push((moment, motion));

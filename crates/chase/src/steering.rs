@@ -187,11 +187,12 @@ impl Steering {
         show.is_new &= !show.plays;
     }
 
-    /// Handles the answer to the pending command: its code and the tick at which it took hold; `None` if no answer
-    /// comes.
-    pub fn answered(&mut self, answer: Option<(Code, u64)>) {
+    /// Handles the answer to the command of the moment `sent_ns`: its code and the tick at which it took hold; `None` if
+    /// no answer comes. Late answers, and those of a publisher that has ended, are ignored.
+    pub fn answered(&mut self, sent_ns: u64, answer: Option<(Code, u64)>) {
         let Some(show) = &mut self.show else { return };
-        let Some(Pending { command, sent_ns }) = show.pending.take() else { return };
+        let pending = show.pending.take_if(|pending| pending.sent_ns == sent_ns);
+        let Some(Pending { command, .. }) = pending else { return };
         let Some((code, tick)) = answer else {
             show.unanswered = Some(command);
             return;
@@ -227,7 +228,7 @@ impl Steering {
         Some((frame.sim_time + frame.time_scale * elapsed).min(self.end))
     }
 
-    /// Returns the next command towards a goal, and counts it as sent.
+    /// Returns the next command towards a goal, and counts it as sent at `now_ns`.
     pub fn command(&mut self, goal: Goal, now_ns: u64) -> Option<Command> {
         let time = self.show_time(now_ns)?;
         let (waiting, latency, limits, end) = (self.waiting, self.latency, self.limits, self.end);
@@ -323,11 +324,29 @@ mod tests {
         let mut steering = steering();
         let command = steering.command(Goal::Follow { time: 50.0, rate: 1.0 }, at(2));
         assert!(matches!(command, Some(Command::Seek(_))), "{command:?}");
-        steering.answered(None);
+        steering.answered(at(2), None);
         steering.frame_came(&playing(3, 1, 50.0), at(3));
         assert_eq!(steering.waiting(), None);
         steering.frame_came(&playing(4, 2, 70.0), at(4));
         assert_eq!(steering.waiting(), Some(Waiting::Sought));
+    }
+
+    #[test]
+    fn an_answer_to_a_command_of_another_run_is_ignored() {
+        let mut steering = steering();
+        let goal = Goal::Follow { time: 50.0, rate: 1.0 };
+        assert!(matches!(steering.command(goal, at(2)), Some(Command::Seek(_))));
+        steering.gone();
+        let of_next = |header: FrameHeader| FrameHeader { run_id: 2, ..header };
+        let waits = FrameHeader { playback: PlaybackState::Paused as u32, ..of_next(playing(0, 0, 0.0)) };
+        steering.frame_came(&waits, at(3));
+        assert!(matches!(steering.command(goal, at(4)), Some(Command::Go)));
+        steering.answered(at(2), None);
+        assert_eq!(steering.command(goal, at(5)), None, "a second command before the answer to the first");
+        steering.answered(at(4), Some((Code::Done, 1)));
+        steering.frame_came(&of_next(playing(1, 0, 0.0)), at(6));
+        assert!(matches!(steering.command(goal, at(6)), Some(Command::Seek(_))));
+        assert_eq!(steering.waiting(), None);
     }
 
     #[test]
@@ -340,7 +359,7 @@ mod tests {
         steering.frame_came(&paused(201), at(201));
         assert_eq!(steering.waiting(), None);
         assert!(matches!(steering.command(Goal::Follow { time: 3.0, rate: 1.0 }, at(202)), Some(Command::Resume)));
-        steering.answered(Some((Code::Done, 203)));
+        steering.answered(at(202), Some((Code::Done, 203)));
         steering.frame_came(&playing(203, 0, 3.0), at(203));
         steering.frame_came(&paused(204), at(204));
         assert_eq!(steering.waiting(), Some(Waiting::Paused));
