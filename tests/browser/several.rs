@@ -164,6 +164,7 @@ fn one_desk_hears_two_dragons_under_numbers_that_stay() {
     sender.signal(Signal::SIGTERM);
     said.rest();
     ended(second);
+    UdpSocket::bind("127.0.0.1:0").unwrap().send_to(&[], format!("127.0.0.1:{port}")).unwrap();
     let last = lines.rest().pop();
     let output = peer.output();
     assert!(output.status.success(), "{}", text(&output.stderr));

@@ -5,7 +5,9 @@
 pub mod hosts;
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
@@ -92,7 +94,8 @@ impl Process {
             let lines = BufReader::new(stdout).lines().map_while(Result::ok);
             lines.take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
         });
-        Lines(lines)
+        let errors = self.0.stderr.as_ref().and_then(|errors| errors.as_fd().try_clone_to_owned().ok());
+        Lines { lines, errors }
     }
 
     /// Returns the first line that the process prints.
@@ -128,7 +131,11 @@ impl Process {
 }
 
 /// Lines that a process prints while it runs.
-pub struct Lines(Receiver<String>);
+pub struct Lines {
+    lines: Receiver<String>,
+    /// Standard error, for the report of an early end.
+    errors: Option<OwnedFd>,
+}
 
 impl Lines {
     /// Returns the next line that contains `what`; earlier lines are dropped.
@@ -148,9 +155,11 @@ impl Lines {
         let mut lines = Vec::new();
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
-            lines.push(self.0.recv_timeout(left).unwrap_or_else(|error| match error {
+            lines.push(self.lines.recv_timeout(left).unwrap_or_else(|error| match error {
                 RecvTimeoutError::Timeout => panic!("no \"{what}\" within {:?}", patience()),
-                RecvTimeoutError::Disconnected => panic!("the process printed no \"{what}\", and its output has ended"),
+                RecvTimeoutError::Disconnected => {
+                    panic!("the output ended without \"{what}\" after {lines:?}; standard error: {}", self.complaint())
+                }
             }));
             if lines.last().is_some_and(|line| is_it(line)) {
                 return lines;
@@ -158,12 +167,24 @@ impl Lines {
         }
     }
 
+    /// Returns the beginning of standard error, if it comes at once.
+    fn complaint(&self) -> String {
+        let (sender, receiver) = channel();
+        let errors = self.errors.as_ref().and_then(|errors| errors.try_clone().ok());
+        std::thread::spawn(move || {
+            let mut bytes = vec![0; 1 << 16];
+            let length = errors.and_then(|errors| File::from(errors).read(&mut bytes).ok()).unwrap_or(0);
+            sender.send(String::from_utf8_lossy(&bytes[..length]).into_owned())
+        });
+        receiver.recv_timeout(Duration::from_secs(2)).unwrap_or_default()
+    }
+
     /// Returns all lines until the process ends.
     pub fn rest(&self) -> Vec<String> {
         let deadline = Instant::now() + patience();
         let mut lines = Vec::new();
         loop {
-            match self.0.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
                 Ok(line) => lines.push(line),
                 Err(RecvTimeoutError::Disconnected) => return lines,
                 Err(RecvTimeoutError::Timeout) => panic!("the process did not end within {:?}", patience()),

@@ -3,8 +3,8 @@
     psn_peer.py --name NAME... --port P [--group 236.10.10.10] [--axes x,up,y] [--first-id N] [--id-step N] [--npm FOLDER]
                 [--progress] [--samples]
 
-Listens to UDP port P and subscribes to the publishers NAME, the first of which must be running. Ends when no packet has
-come for two seconds after the first. The numbers of a frame's trackers, STEP apart, tell their publisher. Every frame
+Listens to UDP port P and subscribes to the publishers NAME, the first of which must be running. Ends with an empty
+packet, or when no packet has come for two seconds after the first, with --progress for two minutes. The numbers of a frame's trackers, STEP apart, tell their publisher. Every frame
 must decode completely. Each is compared, every tracker, to float32, with the frame of the shared memory that has the
 same head. Prints a line when it listens, and one with the counts. With --npm, the decoder of that folder (npm's
 @jwetzell/posistagenet) gets the same packets and must decode the same. With --progress, prints a line five times a
@@ -214,13 +214,14 @@ def main():
     sock.settimeout(120)
     progress = Progress(memories, arguments.axes, arguments.first_id, arguments.id_step) if arguments.progress else None
     try:
-        while True:
-            packets.append(sock.recv(65536))
-            sock.settimeout(2)
+        while packet := sock.recv(65536):
+            packets.append(packet)
+            sock.settimeout(120 if progress else 2)
             if progress:
-                progress.take(packets[-1])
+                progress.take(packet)
     except TimeoutError:
-        assert packets, "nothing was sent"
+        pass
+    assert packets, "nothing was sent"
     for memory in memories:
         memory.stop = True
         memory.join()
