@@ -13,7 +13,6 @@ use bench_dragon::chase::live::{Chase, ChaseError, Leader, Notice, TimecodeLeade
 use bench_dragon::chase::psn::USUAL_GROUP;
 use bench_dragon::chase::schedule::Schedule;
 use bench_dragon::chase::sources::{self, Input, SourceError};
-use bench_dragon::chase::status::StatusError;
 use bench_dragon::chase::timecode::{FrameRate, Label};
 use bench_dragon::chase::track::Track;
 use bench_dragon::client::connection::Wake;
@@ -26,6 +25,7 @@ use bench_dragon::messages::sentence::chase_sentence;
 use bench_dragon::motion::Motion;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::proof::scene_hash;
+use bench_dragon::publisher::transports::iceoryx2::chase_status::ChaseStatusError;
 use bench_dragon::show::scene::{Scene, SceneText};
 
 use super::{CommandError, Common, Output, expect_exact_motion, stop_on_signals, wall_seconds};
@@ -307,7 +307,7 @@ impl From<SourceError> for CommandError {
 impl From<ChaseError> for CommandError {
     fn from(error: ChaseError) -> Self {
         match error {
-            ChaseError::Status(StatusError::Open(error)) => error.into(),
+            ChaseError::Status(ChaseStatusError::Open(error)) => error.into(),
             other => Self::Failed(other.to_string()),
         }
     }

@@ -3,8 +3,8 @@
 //! [`artnet`], [`mtc`], [`ltc`] and [`psn`] decode bytes from outside, [`timecode`] counts labels.
 //! [`synchronizer`] and [`filter`] turn readings into a position that runs evenly, [`schedule`] turns that into a
 //! simulated time, [`steering`] into commands. All of these are pure.
-//! [`track`] projects a tracked performer on the path. [`sources`] has the sockets and streams, [`status`] the service
-//! of the chase's status, [`live`] the chase itself. The command `chase` calls this crate.
+//! [`track`] projects a tracked performer on the path. [`sources`] has the sockets and streams, [`live`] the chase
+//! itself, which publishes its status. The command `chase` calls this crate.
 
 pub mod artnet;
 pub mod filter;
@@ -14,7 +14,6 @@ pub mod mtc;
 pub mod psn;
 pub mod schedule;
 pub mod sources;
-pub mod status;
 pub mod steering;
 pub mod synchronizer;
 pub mod timecode;

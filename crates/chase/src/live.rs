@@ -13,10 +13,10 @@ use bench_dragon_messages::chase::{ChaseSource, ChaseState};
 use bench_dragon_messages::control::Command;
 use bench_dragon_messages::{ChaseStatus, FrameHeader};
 use bench_dragon_motion::model::Point;
+use bench_dragon_publisher::transports::iceoryx2::chase_status::{ChaseStatusError, ChaseStatusSender};
 
 use crate::schedule::Schedule;
 use crate::sources::Input;
-use crate::status::{StatusError, StatusPort};
 use crate::steering::{Goal, Limits, Steering, Waiting};
 use crate::synchronizer::{Motion, Options, Reading, Synchronizer};
 use crate::timecode::{FrameRate, Label};
@@ -123,7 +123,7 @@ pub struct Chase<'a> {
     /// A command is known by the moment at which it was sent.
     commands: CommandClient<u64>,
     answers: Receiver<(u64, ActionResult)>,
-    port: StatusPort,
+    port: ChaseStatusSender,
     shares_clock: bool,
     status: ChaseStatus,
     next_status: Instant,
@@ -135,7 +135,7 @@ pub struct Chase<'a> {
 pub enum ChaseError {
     /// The status cannot be published, or another chase runs.
     #[error(transparent)]
-    Status(#[from] StatusError),
+    Status(#[from] ChaseStatusError),
     /// The system has no thread left.
     #[error("no thread can be started: {0}")]
     Thread(#[from] std::io::Error),
@@ -154,7 +154,7 @@ impl<'a> Chase<'a> {
         inputs: Receiver<Input>,
         notify: &'a mut dyn FnMut(Notice),
     ) -> Result<Self, ChaseError> {
-        let port = StatusPort::open(name)?;
+        let port = ChaseStatusSender::open(name)?;
         let (sender, answers) = channel();
         let commands = CommandClient::start(name, move |sent_ns, result| drop(sender.send((sent_ns, result))))?;
         let (limits, tracker): (Limits, u32) = match &leader {

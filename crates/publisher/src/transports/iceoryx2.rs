@@ -9,6 +9,7 @@
 //! block the name, and a stopped process keeps it. The other services admit a second publisher: a tunnel to other
 //! machines.
 
+pub mod chase_status;
 mod control;
 mod frames;
 mod held_slice;
