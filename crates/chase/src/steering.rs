@@ -163,8 +163,10 @@ impl Steering {
         let is_paused = playback == Some(PlaybackState::Paused);
         let is_own_seek = has_jumped && matches!(show.unanswered, Some(Command::Seek(_)));
         let is_own_pause = is_paused && show.plays && matches!(show.unanswered, Some(Command::Pause));
+        let is_playing = matches!(playback, Some(PlaybackState::Playing | PlaybackState::Ended));
+        let is_own_start = is_playing && !show.plays && matches!(show.unanswered, Some(Command::Resume | Command::Go));
         let is_sought = has_jumped && !is_own_seek;
-        show.unanswered = show.unanswered.filter(|_| !is_own_seek && !is_own_pause);
+        show.unanswered = show.unanswered.filter(|_| !is_own_seek && !is_own_pause && !is_own_start);
         show.epoch = header.epoch;
         match playback {
             Some(PlaybackState::Held) => self.waiting = Some(Waiting::Held),
@@ -173,8 +175,7 @@ impl Steering {
             Some(PlaybackState::Paused) if show.plays || self.waiting.is_some() => self.waiting = Some(Waiting::Paused),
             Some(PlaybackState::Paused) if is_sought => self.waiting = Some(Waiting::Sought),
             Some(PlaybackState::Playing | PlaybackState::Ended) if !show.plays => {
-                // Another client has resumed the show.
-                (self.waiting, show.is_released) = (None, true);
+                (self.waiting, show.is_released) = (None, !is_own_start);
             }
             Some(PlaybackState::Playing | PlaybackState::Ended) => match self.waiting {
                 Some(Waiting::Held | Waiting::Paused) => self.waiting = None,
@@ -347,6 +348,27 @@ mod tests {
         steering.frame_came(&of_next(playing(1, 0, 0.0)), at(6));
         assert!(matches!(steering.command(goal, at(6)), Some(Command::Seek(_))));
         assert_eq!(steering.waiting(), None);
+    }
+
+    /// A show that another client makes play is left alone while the source stands, one that the chase has started late
+    /// is paused again.
+    #[test]
+    fn a_start_whose_answer_is_lost_is_no_start_of_another_client() {
+        for is_own in [false, true] {
+            let mut steering = steering();
+            assert!(matches!(steering.command(Goal::Stand(None), at(2)), Some(Command::Pause)));
+            steering.answered(at(2), Some((Code::Done, 3)));
+            let paused = FrameHeader { playback: PlaybackState::Paused as u32, ..playing(3, 0, 3.0) };
+            steering.frame_came(&paused, at(3));
+            if is_own {
+                let resumed = steering.command(Goal::Follow { time: 3.0, rate: 1.0 }, at(4));
+                assert!(matches!(resumed, Some(Command::Resume)));
+                steering.answered(at(4), None);
+            }
+            steering.frame_came(&playing(5, 0, 3.0), at(5));
+            let command = steering.command(Goal::Stand(None), at(6));
+            assert_eq!(matches!(command, Some(Command::Pause)), is_own, "{command:?}");
+        }
     }
 
     #[test]
