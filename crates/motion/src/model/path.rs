@@ -391,11 +391,6 @@ impl Route {
         self.piece(Segment::PlacedSpiral(placed), first, last, spiral.arc_length(first, last), turned)
     }
 
-    /// Returns the point at the route's end.
-    pub fn end(&self) -> Point {
-        self.end
-    }
-
     /// Returns the unit direction at the route's end.
     pub fn direction(&self) -> Vector {
         let rest = self.remainders.map_or(0.0, |remainders| remainders.heading_turns);

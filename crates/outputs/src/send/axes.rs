@@ -60,11 +60,6 @@ impl Axes {
         let signs = first.sign * second.sign * third.sign;
         if cyclic { signs } else { -signs }
     }
-
-    /// Returns true if the axes are right-handed.
-    pub fn are_right_handed(&self) -> bool {
-        self.handedness() > 0.0
-    }
 }
 
 impl std::fmt::Display for Axes {
@@ -144,7 +139,7 @@ mod tests {
         assert_eq!((axes, axes.to_string()), ("x,up,y".parse().unwrap(), "x,up,y".to_owned()));
         assert_eq!(axes.vector([1.0, 2.0, 3.0]), [1.0, 3.0, 2.0]);
         assert_eq!(axes.rotation(0.5), [0.0, -0.5, 0.0], "left-handed: clockwise from above is positive");
-        assert!(!axes.are_right_handed() && Axes::from_str("x,y,up").unwrap().are_right_handed());
+        assert!(axes.handedness() < 0.0 && Axes::from_str("x,y,up").unwrap().handedness() > 0.0);
         assert_eq!(Axes::from_str("-x, up,-y").unwrap().vector([1.0, 2.0, 0.0]), [-1.0, 0.0, -2.0]);
         assert!(Axes::from_str("x,-up,y").unwrap().vector([1.0, 2.0, 0.0])[1].is_sign_positive());
     }

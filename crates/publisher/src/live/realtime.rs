@@ -12,13 +12,10 @@ use thread_priority::unix::{
 };
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
-/// The real-time priorities that Linux has.
-pub const PRIORITIES: std::ops::RangeInclusive<u8> = 1..=99;
-
 /// The scheduling that is requested for the loop's thread.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Scheduling {
-    /// The priority under SCHED_FIFO, one of [`PRIORITIES`].
+    /// The priority under SCHED_FIFO, 1 to 99.
     pub realtime: Option<u8>,
     /// The CPU to stay on.
     pub cpu: Option<usize>,
@@ -53,7 +50,7 @@ fn set_timer_slack() {
 /// Without the right to either, a warning states how to get it. Memory that is mapped later, such as the queues in
 /// shared memory, is not locked: locking would allocate all of it, used or not.
 fn become_realtime(priority: u8) {
-    // Every priority of PRIORITIES is a valid value.
+    // Every priority that Linux has is a valid value.
     let value = ThreadPriorityValue::try_from(priority).unwrap_or(ThreadPriorityValue::MIN);
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let set = set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy);
