@@ -49,7 +49,7 @@ def main():
     services = [open_service(node, f"{name}/poses", HandlePose), open_service(node, f"{name}/poses32", HandlePose32)]
     ports = [service.subscriber_builder().create() for service in services]
     frames = [{}, {}]
-    while services[0].dynamic_config.number_of_publishers > 0:
+    while not frames[0] or services[0].dynamic_config.number_of_publishers > 0:
         list(map(take, ports, frames))
         time.sleep(0.01)
     list(map(take, ports, frames))

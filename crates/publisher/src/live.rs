@@ -262,6 +262,7 @@ pub fn run_loop<C: Clock>(
         let deadline_ns = deadlines.of(tick);
         let reached = wait(clock, deadline_ns, stop, publishers, &mut maintenance_due_ns, &reports);
         let woke_ns = clock.monotonic_ns();
+        let counts_before = counts;
         // The first period that has not wholly passed. After a stop, too, the periods before it count as skipped.
         let current = deadlines.latest_at(woke_ns).max(tick).min(periods);
         if current > tick {
@@ -290,10 +291,8 @@ pub fn run_loop<C: Clock>(
                 tick += 1;
                 continue;
             }
-            Period::Over => {
-                counts.end = End::Recording;
-                return Ok(counts);
-            }
+            // No period after the last frame counts as skipped.
+            Period::Over => return Ok(LoopCounts { end: End::Recording, ..counts_before }),
         };
         for publisher in publishers.iter_mut() {
             if let Err(error) = publisher.publish(outgoing) {

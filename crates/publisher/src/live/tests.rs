@@ -48,10 +48,15 @@ struct FakeFrames {
     cost_ns: VecDeque<u64>,
     frame: Frame,
     messages: FrameMessages,
+    /// The number of its frames.
+    most: usize,
 }
 
 impl FrameSource for FakeFrames {
     fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
+        if self.log.borrow().computed.len() >= self.most {
+            return Period::Over;
+        }
         self.log.borrow_mut().computed.push((tick, self.clock.monotonic_ns()));
         self.clock.advance(self.cost_ns.pop_front().unwrap_or(0));
         self.frame.tick = tick;
@@ -160,11 +165,12 @@ struct Setup {
     periods: Option<u64>,
     stop_at_ns: u64,
     lasts: usize,
+    most_frames: usize,
 }
 
 impl Setup {
     fn new(rate: Rate, script: Script) -> Self {
-        Self { rate, script, periods: None, stop_at_ns: u64::MAX, lasts: usize::MAX }
+        Self { rate, script, periods: None, stop_at_ns: u64::MAX, lasts: usize::MAX, most_frames: usize::MAX }
     }
 
     fn run(self) -> Observed {
@@ -172,8 +178,8 @@ impl Setup {
         let clock = Rc::new(SimulatedClock::new(START_NS, wakes).stopping_at(self.stop_at_ns));
         let log = Rc::new(RefCell::new(Log::default()));
         let frame = Frame { sim_time: 1.5, ..Frame::new(1) };
-        let (messages, cost_ns) = (FrameMessages::default(), frame_ns.into());
-        let mut frames = FakeFrames { clock: clock.clone(), log: log.clone(), cost_ns, frame, messages };
+        let (messages, cost_ns, most) = (FrameMessages::default(), frame_ns.into(), self.most_frames);
+        let mut frames = FakeFrames { clock: clock.clone(), log: log.clone(), cost_ns, frame, messages, most };
         let publisher = FakePublisher {
             clock: clock.clone(),
             log: log.clone(),
@@ -285,6 +291,15 @@ proptest! {
         let (lost, _) = observed.log.computed.pop().unwrap();
         prop_assert_eq!(lost, counts.frames + counts.skipped);
         check(rate, &observed, counts, lost)?;
+    }
+
+    #[test]
+    fn no_period_after_the_last_frame_is_skipped((rate, script, _) in runs(), most_frames in 1usize..40) {
+        let observed = Setup { most_frames, ..Setup::new(rate, script) }.run();
+        let counts = *observed.result.as_ref().unwrap();
+        prop_assert_eq!((counts.end, counts.frames), (End::Recording, most_frames as u64));
+        let (last, _) = observed.log.computed[most_frames - 1];
+        check(rate, &observed, counts, last + 1)?;
     }
 
     #[test]
