@@ -4,20 +4,17 @@
 
 use crate::harness;
 
-use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
-use bench_dragon::client::shared_memory::{node, service_name};
-use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, StageMessage};
+use bench_dragon::messages::{CollisionAlert, FrameHeader, StageMessage};
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::convert::stage;
 use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 use harness::{Process, program, summary, unique, wait};
-use iceoryx2::prelude::PortFactory;
 use nix::sys::signal::Signal::SIGKILL;
 
 /// Events handed over by a feed, in order: frames by their run and sequence, and the number missed before each.
@@ -191,38 +188,6 @@ fn a_scene_with_more_cues_finds_its_services_open() {
     let open = |cues| opened(&name, &scene, cues, stage(cues as u64, 0, [0; 32], &scene.motion, &show));
     let _few = open(3);
     let _more = open(40);
-}
-
-/// A subscriber connects once there are poses. Of a service that it does not find then, it would lose the first messages.
-#[test]
-fn the_poses_are_opened_last() {
-    let scene = &Scene::paper();
-    let node = node().unwrap();
-    for attempt in 0..3 {
-        let name = &unique(&format!("opened_last_{attempt}"));
-        let [poses, tick] = ["poses", "tick"].map(|service| service_name(name, service).unwrap());
-        std::thread::scope(|threads| {
-            let (found, is_found) = channel::<()>();
-            threads.spawn(move || {
-                let show = Show::new(scene, scene.motion.timeline(&mut |_| ()), Playback::of(scene)).unwrap();
-                let _publisher = opened(name, scene, 3, stage(1, 0, [0; 32], &scene.motion, &show));
-                // Until the test has ended.
-                let _ = is_found.recv();
-            });
-            let deadline = Instant::now() + Duration::from_secs(300);
-            let has_publisher = || {
-                let builder = node.service_builder(&poses).publish_subscribe::<[HandlePose]>();
-                let service = builder.user_header::<FrameHeader>().open();
-                service.is_ok_and(|service| service.dynamic_config().number_of_publishers() > 0)
-            };
-            while !has_publisher() {
-                assert!(Instant::now() < deadline, "no publisher");
-            }
-            let has_tick = node.service_builder(&tick).event().open().is_ok();
-            drop(found);
-            assert!(has_tick, "attempt {attempt}");
-        });
-    }
 }
 
 /// Of two publishers the first sends no frames, and has a stage. Nothing is taken for the show's data before a frame

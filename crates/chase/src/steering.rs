@@ -175,6 +175,7 @@ impl Steering {
             Some(PlaybackState::Paused) if show.plays || self.waiting.is_some() => self.waiting = Some(Waiting::Paused),
             Some(PlaybackState::Paused) if is_sought => self.waiting = Some(Waiting::Sought),
             Some(PlaybackState::Playing | PlaybackState::Ended) if !show.plays => {
+                // Unless the chase has started the show late, another client has.
                 (self.waiting, show.is_released) = (None, !is_own_start);
             }
             Some(PlaybackState::Playing | PlaybackState::Ended) => match self.waiting {

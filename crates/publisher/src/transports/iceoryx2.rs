@@ -181,6 +181,14 @@ impl SharedMemoryPublisher {
         service_name(name, "poses")?;
         check_room(config)?;
         let node = node()?;
+        let whole = FrameService { service: "poses", poses: config.handles, every: None };
+        let poses = FrameSender::open(&node, config, &whole)?;
+        let open_32 = |decimation: Decimation| {
+            let every = Some(decimation.every());
+            let described = FrameService { service: "poses32", poses: decimation.handles().len(), every };
+            Ok((FrameSender::open(&node, config, &described)?, decimation))
+        };
+        let poses_32 = config.decimation().map(open_32).transpose()?;
         let open_alerts = || Repeated::open(&node, config, "alerts", SMALL_QUEUE);
         let alerts = config.alerts.then(open_alerts).transpose()?;
         // A large step can reach all cues in one frame. With a power of two, most changes of a scene keep the service.
@@ -207,15 +215,6 @@ impl SharedMemoryPublisher {
                 other => failed(name, "tick", other),
             })?;
         let tick = tick_service.notifier_builder().create().map_err(|error| failed(name, "tick", error))?;
-        let open_32 = |decimation: Decimation| {
-            let every = Some(decimation.every());
-            let described = FrameService { service: "poses32", poses: decimation.handles().len(), every };
-            Ok((FrameSender::open(&node, config, &described)?, decimation))
-        };
-        let poses_32 = config.decimation().map(open_32).transpose()?;
-        // Last: a subscriber that connects to the poses finds all other services.
-        let whole = FrameService { service: "poses", poses: config.handles, every: None };
-        let poses = FrameSender::open(&node, config, &whole)?;
         reserve_pages()?;
         Ok(Self { poses, poses_32, alerts, cues, stage, scene, tick, tick_service, _node: node })
     }
