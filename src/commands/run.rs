@@ -26,6 +26,9 @@ use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::soak::Parent;
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
 
+/// Nanoseconds that waiting subscribers have before the first frame: each tries to connect every 20 ms.
+const LEAD_NS: u64 = 100_000_000;
+
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
 pub struct RunArguments {
@@ -158,7 +161,7 @@ impl RunSession<'_> {
             rate: self.playback.rate,
             duration: self.arguments.duration,
             scene: &self.scene.name,
-            lead_ns: 0,
+            lead_ns: LEAD_NS,
             awaited: ros2.as_ref().map(Ros2Process::connected),
         };
         let mut source = ShowSource::new(show);

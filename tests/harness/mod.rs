@@ -15,6 +15,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use nix::sys::wait::{Id, WaitPidFlag, waitid};
+use nix::unistd::Pid;
 use serde_json::Value;
 
 /// The user id of a user without rights.
@@ -95,7 +97,7 @@ impl Process {
             lines.take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
         });
         let errors = self.0.stderr.as_ref().and_then(|errors| errors.as_fd().try_clone_to_owned().ok());
-        Lines { lines, errors }
+        Lines { lines, errors, process: self.id() }
     }
 
     /// Returns the first line that the process prints.
@@ -133,8 +135,9 @@ impl Process {
 /// Lines that a process prints while it runs.
 pub struct Lines {
     lines: Receiver<String>,
-    /// Standard error, for the report of an early end.
+    /// Standard error and the process, for the report of an early end.
     errors: Option<OwnedFd>,
+    process: u32,
 }
 
 impl Lines {
@@ -158,7 +161,7 @@ impl Lines {
             lines.push(self.lines.recv_timeout(left).unwrap_or_else(|error| match error {
                 RecvTimeoutError::Timeout => panic!("no \"{what}\" within {:?}", patience()),
                 RecvTimeoutError::Disconnected => {
-                    panic!("the output ended without \"{what}\" after {lines:?}; standard error: {}", self.complaint())
+                    panic!("the output ended without \"{what}\" after {lines:?}; {}", self.complaint())
                 }
             }));
             if lines.last().is_some_and(|line| is_it(line)) {
@@ -167,7 +170,7 @@ impl Lines {
         }
     }
 
-    /// Returns the beginning of standard error, if it comes at once.
+    /// Returns the end of the process and the beginning of standard error, if they come at once.
     fn complaint(&self) -> String {
         let (sender, receiver) = channel();
         let errors = self.errors.as_ref().and_then(|errors| errors.try_clone().ok());
@@ -176,7 +179,11 @@ impl Lines {
             let length = errors.and_then(|errors| File::from(errors).read(&mut bytes).ok()).unwrap_or(0);
             sender.send(String::from_utf8_lossy(&bytes[..length]).into_owned())
         });
-        receiver.recv_timeout(Duration::from_secs(2)).unwrap_or_default()
+        let errors = receiver.recv_timeout(Duration::from_secs(2)).unwrap_or_default();
+        // The process is still there for its owner to wait for.
+        let flags = WaitPidFlag::WEXITED | WaitPidFlag::WNOHANG | WaitPidFlag::WNOWAIT;
+        let end = waitid(Id::Pid(Pid::from_raw(self.process as i32)), flags);
+        format!("{end:?}; standard error: {errors}")
     }
 
     /// Returns all lines until the process ends.

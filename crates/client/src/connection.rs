@@ -293,6 +293,11 @@ impl Connection {
         open.filter(|open| !open).count()
     }
 
+    /// Returns true if the stage and the scene of a run can be received.
+    pub fn describes_frames(&self) -> bool {
+        self.stage.is_some() && self.scene.is_some()
+    }
+
     /// Waits until a frame is announced, or for `timeout` but at least 1 ms. Does not wait if `timeout` is zero.
     pub fn wait(&self, timeout: Duration) {
         if timeout.is_zero() {

@@ -20,7 +20,7 @@ use sequence::SequenceTracker;
 
 /// The interval of connection attempts while there is no publisher.
 const CONNECT_INTERVAL: Duration = Duration::from_millis(20);
-/// The interval at which missing services are opened.
+/// The interval at which missing services are opened once anything has come.
 const OPEN_INTERVAL: Duration = Duration::from_millis(100);
 /// How long a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come once a
 /// second.
@@ -193,17 +193,19 @@ impl Feed {
     /// connects again: the obstacle may have gone.
     pub fn poll(&mut self, timeout: Duration, handle: &mut dyn FnMut(FeedEvent<'_>)) -> Result<(), OpenError> {
         let Some(connected) = &mut self.connected else { return self.connect(timeout) };
-        connected.connection.wait(timeout.min(OPEN_INTERVAL));
-        connected.receive(self.frames, &mut self.sequence, handle);
-        if connected.connection.follows_another() {
-            connected.shares_clock = shares_clock(&self.subscription, &connected.connection);
-        }
-        if connected.last_open.elapsed() >= OPEN_INTERVAL {
+        // A publisher that starts creates its services within milliseconds and sends its first frame soon after.
+        let open_interval = if connected.received { OPEN_INTERVAL } else { CONNECT_INTERVAL };
+        connected.connection.wait(timeout.min(open_interval));
+        if connected.last_open.elapsed() >= open_interval {
             connected.last_open = Instant::now();
             if let Err(error) = self.subscription.open_missing_services(&mut connected.connection) {
                 self.connected = None;
                 return Err(error);
             }
+        }
+        connected.receive(self.frames, &mut self.sequence, handle);
+        if connected.connection.follows_another() {
+            connected.shares_clock = shares_clock(&self.subscription, &connected.connection);
         }
         let is_alive = |connection: &Connection| {
             self.subscription.publisher_is_alive(connection) && !self.subscription.passes_over_the_show(connection)
@@ -238,6 +240,12 @@ impl Feed {
     /// there is no publisher. For another publisher the value is right after the poll that brings its first frame.
     pub fn shares_clock(&self) -> Option<bool> {
         self.connected.as_ref().map(|connected| connected.shares_clock)
+    }
+
+    /// Returns true if the publisher's next frame will be received, and its stage and scene before it.
+    pub fn is_ready(&self) -> bool {
+        let is_ready = |connected: &Connected| connected.received || connected.connection.describes_frames();
+        self.connected.as_ref().is_some_and(is_ready)
     }
 
     /// Closes the services, so that the next publisher can create them again.

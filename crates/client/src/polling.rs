@@ -38,6 +38,9 @@ pub trait Handler {
     /// Handles the clock of a running publisher: `shares_clock` is true if it is that of this process. Called before
     /// the first frame and after each poll. Handlers that compare no moments can ignore it.
     fn clock(&mut self, _publisher: usize, _shares_clock: bool) {}
+    /// Handles that the publisher's next frame will be received, and its stage and scene before it. Called after each
+    /// poll while that is so.
+    fn ready(&mut self, _publisher: usize) {}
     /// Does periodic work, after every poll.
     fn polled(&mut self, now: Instant);
 }
@@ -74,6 +77,9 @@ pub fn poll_until(
             let polled = source.feed.poll(Duration::ZERO, &mut |event| handler.handle(publisher, event));
             if let Some(shares_clock) = source.feed.shares_clock() {
                 handler.clock(publisher, shares_clock);
+            }
+            if source.feed.is_ready() {
+                handler.ready(publisher);
             }
             if source.obstacle.is_met(polled) {
                 source.next = Instant::now() + Obstacle::RETRY_INTERVAL;

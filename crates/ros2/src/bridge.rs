@@ -55,7 +55,7 @@ pub struct BridgeCounters {
 /// A change of a bridge, for the user.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Notice {
-    /// The bridge is connected to a publisher, whose next frame it receives.
+    /// The bridge is connected to a publisher, whose next frame it sends.
     Connected,
     /// The topics of a show are open.
     Opened {
@@ -181,7 +181,7 @@ impl Handler for Bridge<'_> {
         }
     }
 
-    fn clock(&mut self, publisher: usize, _shares_clock: bool) {
+    fn ready(&mut self, publisher: usize) {
         if !std::mem::replace(&mut self.shows[publisher].connected, true) {
             (self.notify)(publisher, Notice::Connected);
         }
