@@ -180,7 +180,7 @@ impl Lines {
             sender.send(String::from_utf8_lossy(&bytes[..length]).into_owned())
         });
         let errors = receiver.recv_timeout(Duration::from_secs(2)).unwrap_or_default();
-        // The process is still there for its owner to wait for.
+        // WNOWAIT leaves the process to its owner.
         let flags = WaitPidFlag::WEXITED | WaitPidFlag::WNOHANG | WaitPidFlag::WNOWAIT;
         let end = waitid(Id::Pid(Pid::from_raw(self.process as i32)), flags);
         format!("{end:?}; standard error: {errors}")

@@ -41,7 +41,7 @@ pub struct Connection {
     poses_service: PortFactory<ipc::Service, [HandlePose], FrameHeader>,
     alerts: Option<Receiver<CollisionAlert, ()>>,
     cues: Option<Receiver<Cue, ()>>,
-    /// True if the show has cues: a show without cues has no such service.
+    /// False if the stage has no cues: such a show has no such service.
     expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,
@@ -149,7 +149,7 @@ impl Subscription {
             poses_service,
             alerts: self.receiver("alerts")?,
             cues: self.receiver("cues")?,
-            expects_cues: false,
+            expects_cues: true,
             status: self.receiver("status")?,
             status_service: self.service("status")?,
             stage: self.slice_receiver("stage")?,

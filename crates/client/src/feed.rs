@@ -20,7 +20,7 @@ use sequence::SequenceTracker;
 
 /// The interval of connection attempts while there is no publisher.
 const CONNECT_INTERVAL: Duration = Duration::from_millis(20);
-/// The interval at which missing services are opened once anything has come.
+/// The interval at which missing services are opened. Until anything has come, it is that of connection attempts.
 const OPEN_INTERVAL: Duration = Duration::from_millis(100);
 /// How long a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come once a
 /// second.
@@ -196,16 +196,16 @@ impl Feed {
         // A publisher that starts creates its services within milliseconds and sends its first frame soon after.
         let open_interval = if connected.received { OPEN_INTERVAL } else { CONNECT_INTERVAL };
         connected.connection.wait(timeout.min(open_interval));
+        connected.receive(self.frames, &mut self.sequence, handle);
+        if connected.connection.follows_another() {
+            connected.shares_clock = shares_clock(&self.subscription, &connected.connection);
+        }
         if connected.last_open.elapsed() >= open_interval {
             connected.last_open = Instant::now();
             if let Err(error) = self.subscription.open_missing_services(&mut connected.connection) {
                 self.connected = None;
                 return Err(error);
             }
-        }
-        connected.receive(self.frames, &mut self.sequence, handle);
-        if connected.connection.follows_another() {
-            connected.shares_clock = shares_clock(&self.subscription, &connected.connection);
         }
         let is_alive = |connection: &Connection| {
             self.subscription.publisher_is_alive(connection) && !self.subscription.passes_over_the_show(connection)
@@ -242,7 +242,8 @@ impl Feed {
         self.connected.as_ref().map(|connected| connected.shares_clock)
     }
 
-    /// Returns true if the publisher's next frame will be received, and its stage and scene before it.
+    /// Returns true if frames have come, or if the services of the stage and the scene are open. A publisher that has
+    /// sent no frame delivers both before the first.
     pub fn is_ready(&self) -> bool {
         let is_ready = |connected: &Connected| connected.received || connected.connection.describes_frames();
         self.connected.as_ref().is_some_and(is_ready)

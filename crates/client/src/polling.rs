@@ -38,8 +38,7 @@ pub trait Handler {
     /// Handles the clock of a running publisher: `shares_clock` is true if it is that of this process. Called before
     /// the first frame and after each poll. Handlers that compare no moments can ignore it.
     fn clock(&mut self, _publisher: usize, _shares_clock: bool) {}
-    /// Handles that the publisher's next frame will be received, and its stage and scene before it. Called after each
-    /// poll while that is so.
+    /// Handles that the feed [is ready](Feed::is_ready). Called after each poll of a feed that is.
     fn ready(&mut self, _publisher: usize) {}
     /// Does periodic work, after every poll.
     fn polled(&mut self, now: Instant);

@@ -55,7 +55,7 @@ pub struct BridgeCounters {
 /// A change of a bridge, for the user.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Notice {
-    /// The bridge is connected to a publisher, whose next frame it sends.
+    /// The bridge is connected to a publisher, and receives what it needs to open the topics.
     Connected,
     /// The topics of a show are open.
     Opened {
