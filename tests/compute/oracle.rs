@@ -49,8 +49,8 @@ fn program_events(scene_toml: &str) -> Result<Vec<Event>, String> {
     Ok(timeline.events().iter().map(event).collect())
 }
 
-/// Time after which a scene is given up. The program's searches take a few seconds at most.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Time after which a scene is given up. The program's searches take a few seconds at most, on a processor of their own.
+const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Runs [`program_events`] with a watchdog; returns `None` if the search hangs or panics.
 fn program_answers(scene_toml: &str) -> Option<Result<Vec<Event>, String>> {
