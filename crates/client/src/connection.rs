@@ -41,7 +41,7 @@ pub struct Connection {
     poses_service: PortFactory<ipc::Service, [HandlePose], FrameHeader>,
     alerts: Option<Receiver<CollisionAlert, ()>>,
     cues: Option<Receiver<Cue, ()>>,
-    /// False if the stage has no cues: such a show has no such service.
+    /// False once the stage is known to have no cues: its show has no service of cues.
     expects_cues: bool,
     status: Option<Receiver<LoopStatus, ()>>,
     status_service: Option<PortFactory<ipc::Service, LoopStatus, ()>>,

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
+use std::time::Duration;
 
 use bench_dragon_client::clock::Clock;
 
@@ -22,8 +23,8 @@ use crate::transports::{self, Transport, TransportConfig, TransportError};
 /// Nanoseconds between two calls of [`Publisher::maintain`] before the first frame.
 const LEAD_INTERVAL_NS: u64 = 10_000_000;
 
-/// The longest wait for [`Publishing::awaited`], nanoseconds.
-const LONGEST_WAIT_NS: u64 = 5_000_000_000;
+/// The longest wait for [`Publishing::awaited`].
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
 /// The reason why a publisher could not run.
 #[derive(Debug, thiserror::Error)]
@@ -72,7 +73,7 @@ pub struct Publishing<'a> {
     pub scene: &'a str,
     /// Nanoseconds that waiting subscribers have to connect before the first frame.
     pub lead_ns: u64,
-    /// A flag that a subscriber sets when it is connected. The first frame waits for the flag, some seconds at most.
+    /// A flag that the process of ROS 2 sets when it is connected. The first frame waits for the flag, 5 s at most.
     pub awaited: Option<&'a AtomicBool>,
 }
 
@@ -134,7 +135,12 @@ impl Publishing<'_> {
             let looping = threads.spawn(|| {
                 let (mut publishers, _awake) = match self.prepare_loop(transports) {
                     Ok((mut publishers, transports, awake)) => {
-                        self.wait_for_subscribers(clock, &mut publishers, stop);
+                        if !self.wait_for_subscribers(clock, &mut publishers, stop) {
+                            let waited = LONGEST_WAIT.as_secs();
+                            log::warn!(
+                                "the process of ROS 2 has not connected in {waited} s: the show starts without it"
+                            );
+                        }
                         let _ = opened.send(Ok(transports));
                         (publishers, awake)
                     }
@@ -179,18 +185,25 @@ impl Publishing<'_> {
         Ok((publishers, transports, awake))
     }
 
-    /// Waits for [`lead_ns`](Self::lead_ns) and for [`awaited`](Self::awaited), or until `stop` is set.
-    fn wait_for_subscribers(&self, clock: &impl Clock, publishers: &mut [Box<dyn Publisher>], stop: &AtomicBool) {
+    /// Waits for [`lead_ns`](Self::lead_ns) and for [`awaited`](Self::awaited), or until `stop` is set. Returns false
+    /// if the wait for `awaited` was in vain.
+    fn wait_for_subscribers(
+        &self,
+        clock: &impl Clock,
+        publishers: &mut [Box<dyn Publisher>],
+        stop: &AtomicBool,
+    ) -> bool {
         let began_ns = clock.monotonic_ns();
+        let is_awaited = || self.awaited.is_some_and(|connected| !connected.load(Ordering::Relaxed));
         let is_early = || {
-            let waited_ns = clock.monotonic_ns() - began_ns;
-            let is_awaited = self.awaited.is_some_and(|connected| !connected.load(Ordering::Relaxed));
-            waited_ns < self.lead_ns || is_awaited && waited_ns < LONGEST_WAIT_NS
+            let waited = Duration::from_nanos(clock.monotonic_ns() - began_ns);
+            waited < Duration::from_nanos(self.lead_ns) || is_awaited() && waited < LONGEST_WAIT
         };
         while is_early() && !stop.load(Ordering::Relaxed) {
             publishers.iter_mut().for_each(|publisher| publisher.maintain());
             clock.sleep_until(clock.monotonic_ns() + LEAD_INTERVAL_NS);
         }
+        !is_awaited() || stop.load(Ordering::Relaxed)
     }
 
     fn loop_options(&self) -> LoopOptions {
@@ -223,6 +236,7 @@ mod tests {
     use bench_dragon_messages::control::Command;
     use bench_dragon_show::convert::Stamps;
     use bench_dragon_show::{Frame, Outcome};
+    use bench_dragon_testing::simulated::SimulatedClock;
 
     use super::*;
     use crate::live::show_source::FrameMessages;
@@ -293,18 +307,23 @@ mod tests {
         }
     }
 
-    /// Publishes at 1000 Hz, for three periods or until a failure.
-    fn run(has_status: bool, periods: Option<f64>) -> (Result<Published, RunError>, Vec<&'static str>) {
-        let log = Log::default();
-        let publishing = Publishing {
+    /// At 1000 Hz, without an end, and without a wait for subscribers.
+    fn publishing() -> Publishing<'static> {
+        Publishing {
             scheduling: Scheduling::default(),
             run_id: 1,
             rate: 1000.0,
-            duration: periods.map(|periods| periods / 1000.0),
+            duration: None,
             scene: "test",
             lead_ns: 0,
             awaited: None,
-        };
+        }
+    }
+
+    /// Publishes for three periods or until a failure.
+    fn run(has_status: bool, periods: Option<f64>) -> (Result<Published, RunError>, Vec<&'static str>) {
+        let log = Log::default();
+        let publishing = Publishing { duration: periods.map(|periods| periods / 1000.0), ..publishing() };
         let hooks = Hooks {
             opened: Box::new(|_| log.lock().unwrap().push("opened")),
             announce: Box::new(|_| ()),
@@ -324,6 +343,23 @@ mod tests {
             hooks,
         );
         (published, Arc::into_inner(log).unwrap().into_inner().unwrap())
+    }
+
+    /// Returns the milliseconds until the first frame, and whether that frame had no need to wait longer.
+    fn wait(lead_ms: u64, connected: bool, stop_at_ms: u64) -> (u64, bool) {
+        let connected = AtomicBool::new(connected);
+        let publishing = Publishing { lead_ns: lead_ms * 1_000_000, awaited: Some(&connected), ..publishing() };
+        let clock = SimulatedClock::new(0, []).stopping_at(stop_at_ms * 1_000_000);
+        let was_enough = publishing.wait_for_subscribers(&clock, &mut [], &clock.stop);
+        (clock.monotonic_ns() / 1_000_000, was_enough)
+    }
+
+    #[test]
+    fn the_first_frame_waits_for_the_lead_and_five_seconds_at_most_for_ros_2() {
+        assert_eq!(wait(100, true, 60_000), (100, true));
+        assert_eq!(wait(100, false, 60_000), (5_000, false));
+        // A show that is stopped while it waits has missed nothing.
+        assert_eq!(wait(100, false, 300), (300, true));
     }
 
     #[test]
