@@ -135,13 +135,8 @@ impl Publishing<'_> {
             let looping = threads.spawn(|| {
                 let (mut publishers, _awake) = match self.prepare_loop(transports) {
                     Ok((mut publishers, transports, awake)) => {
-                        if !self.wait_for_subscribers(clock, &mut publishers, stop) {
-                            let waited = LONGEST_WAIT.as_secs();
-                            log::warn!(
-                                "the process of ROS 2 has not connected in {waited} s: the show starts without it"
-                            );
-                        }
-                        let _ = opened.send(Ok(transports));
+                        let was_enough = self.wait_for_subscribers(clock, &mut publishers, stop);
+                        let _ = opened.send(Ok((transports, was_enough)));
                         (publishers, awake)
                     }
                     Err(error) => {
@@ -153,7 +148,11 @@ impl Publishing<'_> {
             });
             // The thread sends exactly once, or nothing if it panicked.
             let transports = opening.recv().unwrap_or(Err(RunError::Thread("loop's")));
-            let collected = transports.and_then(|transports| {
+            let collected = transports.and_then(|(transports, was_enough)| {
+                if !was_enough {
+                    let waited = LONGEST_WAIT.as_secs();
+                    log::warn!("the process of ROS 2 has not connected in {waited} s: the show starts without it");
+                }
                 when_open(&transports);
                 let collecting = threads.spawn(|| {
                     // A loop without statistics could not be watched.
