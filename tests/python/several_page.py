@@ -187,26 +187,25 @@ def one_dies_alone():
                 assert not page.evaluate(is_cut), f"a row is cut off: {words(page)}"
                 # The line between the nearest boards, and its words, come to rest.
                 at_rest(page)
-                before = light(page, handles)
+                before = live_light(page, handles)
             until(page, "picture.dragons[1].head === null", "its death")
             notice = until(page, "!document.getElementById('notice').hidden && document.getElementById('notice').textContent", "a notice")
             assert notice == f"{B}: No publisher. The picture is from t = 20.0 s.", notice
             assert page.evaluate("document.body.dataset.stale") == "false", "the whole picture is dimmed"
             assert "no publisher" in row(page, B).inner_text().lower() and "moving" in row(page, A).inner_text(), words(page)
-            deadline = time.monotonic() + 30
+            deadline = time.monotonic() + 120
             while (after := light(page, handles))[B] <= before[B] + 0.1:
                 assert time.monotonic() < deadline, f"{B} is not dimmed: {before} became {after}"
-                time.sleep(0.05)
+                passes(page)
             assert abs(after[A] - before[A]) < 0.02, f"{A} is dimmed: {before} became {after}"
             labels = page.evaluate("picture.labels.map((one) => one.text)")
             assert f"{B}: HEAD (waiting for a publisher)" in labels and f"{A}: HEAD" in labels, labels
             with publisher(B, STILL_B):
                 until(page, f"picture.dragons[1].run !== null && picture.dragons[1].run !== '{first}'", "its return")
                 until(page, "document.getElementById('notice').hidden", "no notice")
-                deadline = time.monotonic() + 30
-            while abs(light(page, handles)[B] - before[B]) >= 0.02:
-                assert time.monotonic() < deadline, "it is dimmed still"
-                time.sleep(0.05)
+                at_rest(page)
+                after = live_light(page, handles)
+                assert abs(after[B] - before[B]) < 0.02, f"{B} is dimmed still: {before} became {after}"
             assert not complaints, complaints
         until(page, "document.body.dataset.stale === 'true'", "the server's death")
         port = int(url.rstrip("/").rsplit(":", 1)[1])
@@ -239,6 +238,18 @@ def light(page, handles):
     return mean
 
 
+def live_light(page, handles):
+    """Returns the lightness while frames of both dragons arrive: a busy machine can hold a publisher up."""
+    is_stale = "picture.labels.some((one) => one.text.includes('HEAD ('))"
+    deadline = time.monotonic() + 120
+    while True:
+        passes(page)
+        before, seen, after = page.evaluate(is_stale), light(page, handles), page.evaluate(is_stale)
+        if not before and not after:
+            return seen
+        assert time.monotonic() < deadline, f"frames of a dragon do not arrive: {words(page)}"
+
+
 def state(name):
     asked = subprocess.run([PROGRAM, "--name", name, "--json", "control", "state"], capture_output=True)
     return json.loads(asked.stdout) if asked.returncode == 0 else {"playback": None}
@@ -269,7 +280,7 @@ def bar_conducts_one_or_all():
         for name, words_of_row in ((A, "❚❚ Paused"), (B, "▶ moving")):
             shows(page, name, words_of_row)
         page.locator("#conduct-rate").select_option("2 ×")
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 120
         while state(B)["time_scale"] != 2.0:
             assert time.monotonic() < deadline, "the speed of one"
         assert state(A)["playback"] == "paused"

@@ -72,6 +72,8 @@ SLOW_SCREEN = """(() => {
 
 def opened(running, screen=SLOW_SCREEN, **context):
     page = running.new_context(**{"viewport": {"width": 1280, "height": 720}, "color_scheme": "light", **context}).new_page()
+    # Another test's processes can hold a page up for longer than Playwright's 30 s.
+    page.set_default_timeout(120_000)
     if screen:
         page.add_init_script(screen)
     complaints = []
