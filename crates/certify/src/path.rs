@@ -129,9 +129,14 @@ impl Curve {
         !matches!(self, Self::Inward { .. })
     }
 
-    /// Returns true for a line.
-    pub fn is_line(&self) -> bool {
+    /// Returns true if the curve has no curvature anywhere.
+    pub fn is_straight(&self) -> bool {
         matches!(self, Self::Line { .. })
+    }
+
+    /// Returns true if the curvature is the same everywhere, so that two handles on the curve move as a rigid body.
+    pub fn has_constant_curvature(&self) -> bool {
+        matches!(self, Self::Line { .. } | Self::Arc { .. })
     }
 
     /// Returns the point at 0 of an arc.
@@ -139,14 +144,31 @@ impl Curve {
         if let Self::Arc { origin, .. } = self { Some(*origin) } else { None }
     }
 
-    /// Returns true for a spiral.
-    pub fn is_spiral(&self) -> bool {
-        matches!(self, Self::Inward { .. } | Self::Outward { .. })
+    /// Returns the polar angle at a coordinate, or 0 where the coordinate is an arc length.
+    pub fn polar_angle(&self, coordinate: f64) -> f64 {
+        if matches!(self, Self::Inward { .. } | Self::Outward { .. }) { coordinate } else { 0.0 }
     }
 
-    /// Returns a and the shift of a spiral towards its centre.
-    pub fn inward_spiral(&self) -> Option<(Interval, Interval)> {
-        if let Self::Inward { a, shift, .. } = self { Some((*a, *shift)) } else { None }
+    /// Returns a lower bound of the distance from the centre at a coordinate and before it, metres; minus infinity if
+    /// unknown.
+    pub fn distance_from_centre(&self, coordinate: f64) -> f64 {
+        match self {
+            Self::Inward { a, shift, .. } => (*a * coordinate + *a * *shift).lo,
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Returns true if no handle before a coordinate is faster than the handle there, for links of at most `longest`
+    /// metres: "Lemma 7" in `docs/proofs.md`.
+    pub fn slows_followers(&self, coordinate: f64, longest: Interval) -> bool {
+        match self {
+            Self::Inward { a, .. } => {
+                let square = Interval::point(coordinate).square();
+                let turned = longest * (square + Interval::point(2.0));
+                turned.is_below(*a * coordinate * 2.0 * (square + Interval::ONE))
+            }
+            _ => self.is_straight(),
+        }
     }
 
     pub fn point(&self, place: Place) -> Vector {
@@ -346,7 +368,7 @@ impl ExactPath {
 
     /// Returns true if the path begins on a spiral towards its centre.
     pub fn begins_inward(&self) -> bool {
-        self.segments[0].curve.inward_spiral().is_some()
+        matches!(self.segments[0].curve, Curve::Inward { .. })
     }
 
     /// Returns the curve at a place.

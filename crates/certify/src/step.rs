@@ -226,17 +226,17 @@ impl<'c, 'a> Listed<'c, 'a> {
     /// Returns true if a handle is on a straight line without a beginning.
     pub fn is_on_line(&self, handle: usize) -> bool {
         let Chain { exact, .. } = self.chain;
-        self.handles[handle].span.1.0 == 0 && exact.segments[0].curve.is_line()
+        self.handles[handle].span.1.0 == 0 && exact.segments[0].curve.is_straight()
     }
 
     /// Returns a lower bound of the distance from the centre of all handles from this one on; minus infinity if
     /// unknown.
     fn ring(&self, handle: usize) -> f64 {
         let Place(segment, theta, _) = self.handles[handle].span.1;
-        match self.chain.exact.segments[0].curve.inward_spiral() {
-            Some((a, shift)) if segment == 0 => (a * theta + a * shift).lo,
-            _ => f64::NEG_INFINITY,
+        if segment > 0 {
+            return f64::NEG_INFINITY;
         }
+        self.chain.exact.segments[0].curve.distance_from_centre(theta)
     }
 
     /// Returns a lower bound of the distance from the centre of all boards from a handle on, which is not the head's;
@@ -279,7 +279,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let length = self.chain.link(link);
         let fine = self.is_fine();
         // A unit in the last place of a spiral's coordinate theta is theta times as many metres as one of its radius.
-        let turned = if !fine && exact.curve(front.span.0).is_spiral() { front.span.0.1 } else { 0.0 };
+        let turned = if fine { 0.0 } else { exact.curve(front.span.0).polar_angle(front.span.0.1) };
         let radius = front.first[0].magnitude() + front.first[1].magnitude();
         let size = length.hi + radius * (1.0 + 0.1 * turned);
         let rear_cosine = ends[0].rear_cosine.min(ends[1].rear_cosine).max(1e-12);

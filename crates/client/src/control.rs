@@ -274,9 +274,8 @@ fn failed(name: &str, reason: String) -> OpenError {
 /// Returns the state of the show after a command, as a sentence.
 pub fn standing(response: &ControlResponse) -> String {
     let playback = response.playback_state().map_or("unknown", PlaybackState::name);
-    let ControlResponse { tick, sim_time, time_scale, .. } = *response;
-    let rate = if time_scale > 0.0 { format!(" at {time_scale} x") } else { String::new() };
-    format!("{playback}{rate}, t = {sim_time:.3} s, tick {tick}")
+    let rate = if response.time_scale > 0.0 { format!(" at {} x", response.time_scale) } else { String::new() };
+    format!("{playback}{rate}, t = {:.3} s, tick {}", response.sim_time, response.tick)
 }
 
 /// Returns the reason why a command was refused, as a sentence; `None` if it was done.

@@ -48,25 +48,44 @@ pub struct AlertObject {
 
 impl From<&CollisionAlert> for AlertObject {
     fn from(alert: &CollisionAlert) -> Self {
+        let CollisionAlert {
+            run_id,
+            tick,
+            stamp_ns,
+            sim_time,
+            event_time,
+            time_to_event,
+            clearance,
+            x,
+            y,
+            event_x,
+            event_y,
+            level: _,
+            bench_a,
+            bench_b,
+            event: _,
+            event_bench_a,
+            event_bench_b,
+        } = *alert;
         let bench = |bench: u32| (bench != NO_BENCH).then_some(bench);
         Self {
-            run_id: Exact(alert.run_id),
-            tick: alert.tick,
-            stamp_ns: Exact(alert.stamp_ns),
-            sim_time: alert.sim_time,
-            event_time: alert.event_time,
-            time_to_event: alert.time_to_event,
-            clearance: alert.clearance,
-            x: alert.x,
-            y: alert.y,
-            event_x: alert.event_x,
-            event_y: alert.event_y,
+            run_id: Exact(run_id),
+            tick,
+            stamp_ns: Exact(stamp_ns),
+            sim_time,
+            event_time,
+            time_to_event,
+            clearance,
+            x,
+            y,
+            event_x,
+            event_y,
             level: alert.alert_level().map_or("unknown", Level::name),
-            bench_a: bench(alert.bench_a),
-            bench_b: bench(alert.bench_b),
+            bench_a: bench(bench_a),
+            bench_b: bench(bench_b),
             event: alert.event_kind().map(EventKind::name),
-            event_bench_a: bench(alert.event_bench_a),
-            event_bench_b: bench(alert.event_bench_b),
+            event_bench_a: bench(event_bench_a),
+            event_bench_b: bench(event_bench_b),
         }
     }
 }
@@ -114,7 +133,24 @@ pub struct ChaseObject {
 
 impl From<&ChaseStatus> for ChaseObject {
     fn from(status: &ChaseStatus) -> Self {
-        let ChaseStatus { run_id, stamp_ns, readings, ignored, jumps, error, rate, distance, tracker, .. } = *status;
+        let ChaseStatus {
+            run_id,
+            stamp_ns,
+            readings,
+            ignored,
+            jumps,
+            error,
+            rate,
+            distance,
+            source: _,
+            state: _,
+            hours: _,
+            minutes: _,
+            seconds: _,
+            frames: _,
+            frame_rate,
+            tracker,
+        } = *status;
         const RATES: [&str; 5] = ["24", "25", "29.97", "29.97df", "30"];
         Self {
             run_id: Exact(run_id),
@@ -122,7 +158,7 @@ impl From<&ChaseStatus> for ChaseObject {
             source: status.chase_source().map_or("unknown", ChaseSource::name),
             state: status.chase_state().map_or("unknown", ChaseState::name),
             timecode: status.label(),
-            frame_rate: RATES.get((status.frame_rate as usize).wrapping_sub(1)).copied(),
+            frame_rate: RATES.get((frame_rate as usize).wrapping_sub(1)).copied(),
             tracker: (tracker > 0).then_some(tracker),
             error,
             rate,
@@ -205,7 +241,8 @@ struct StageCueObject {
 
 impl From<&StageSegment> for SegmentObject {
     fn from(segment: &StageSegment) -> Self {
-        let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, pitch, .. } = *segment;
+        let StageSegment { x, y, heading, length, curvature, theta_first, theta_last, pitch, kind: _, reserved: _ } =
+            *segment;
         Self { kind: segment.kind_name(), x, y, heading, length, curvature, theta_first, theta_last, pitch }
     }
 }
@@ -227,10 +264,32 @@ impl From<&StageCue> for StageCueObject {
 
 impl From<&StageMessage> for StageObject {
     fn from(message: &StageMessage) -> Self {
-        let Stage { run_id, freeze_time, ref dragons, ref obstacles, ref events, ref cue_list, .. } = message.stage;
+        let Stage {
+            run_id,
+            stamp_ns: _,
+            freeze_time,
+            cues: _,
+            reserved: _,
+            scene_hash: _,
+            ref dragons,
+            ref obstacles,
+            ref events,
+            ref cue_list,
+        } = message.stage;
         let dragon = |dragon: &StageDragon| {
-            let StageDragon { head_length, body_length, width, hole_inset, pitch, start_turn, .. } = *dragon;
-            let StageDragon { first_handle, benches, first_segment: _, segments: _, ref name, .. } = *dragon;
+            let StageDragon {
+                head_length,
+                body_length,
+                width,
+                hole_inset,
+                pitch,
+                start_turn,
+                first_handle,
+                benches,
+                first_segment: _,
+                segments: _,
+                ref name,
+            } = *dragon;
             let (name, path) = (name.as_str().to_owned(), message.path(dragon).iter().map(Into::into).collect());
             DragonObject {
                 name,
@@ -245,11 +304,11 @@ impl From<&StageMessage> for StageObject {
                 path,
             }
         };
-        let obstacle = |obstacle: &StageObstacle| ObstacleObject {
-            name: obstacle.name.as_str().to_owned(),
-            kind: obstacle.kind_name(),
-            keep_out: obstacle.keep_out,
-            outline: message.outline(obstacle).iter().map(Into::into).collect(),
+        let obstacle = |obstacle: &StageObstacle| {
+            let StageObstacle { keep_out, kind: _, first_segment: _, segments: _, reserved: _, ref name } = *obstacle;
+            let (name, outline) =
+                (name.as_str().to_owned(), message.outline(obstacle).iter().map(Into::into).collect());
+            ObstacleObject { name, kind: obstacle.kind_name(), keep_out, outline }
         };
         Self {
             run_id: Exact(run_id),

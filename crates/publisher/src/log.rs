@@ -60,7 +60,7 @@ const NO_CODE: u64 = u64::MAX;
 const NEVER: u64 = u64::MAX;
 
 /// The state that the ends share besides the queue.
-struct Shared {
+struct LogState {
     stop: AtomicBool,
     /// The first tick for which the queue had no room at all. Nothing is queued from there on.
     missing_from: AtomicU64,
@@ -77,7 +77,7 @@ pub struct LogPublisher {
     reserved: usize,
     /// Words of the latest frame.
     frame_words: usize,
-    shared: Arc<Shared>,
+    shared: Arc<LogState>,
 }
 
 /// The thread's end.
@@ -88,13 +88,13 @@ pub(super) struct LogReader {
 
 /// The result of a log.
 #[derive(Clone)]
-pub struct LogOutcome(Arc<Shared>);
+pub struct LogOutcome(Arc<LogState>);
 
 /// The log of a run.
 struct Log {
     file: PathBuf,
     publisher: Option<LogPublisher>,
-    shared: Arc<Shared>,
+    shared: Arc<LogState>,
     thread: JoinHandle<()>,
 }
 
@@ -146,7 +146,7 @@ pub(super) fn queue_of(words: usize, reserved: usize) -> (LogPublisher, LogReade
     // Touches each page, so that the loop's thread has no page fault.
     while queue.push(0.0).is_ok() {}
     while consumer.pop().is_ok() {}
-    let shared = Arc::new(Shared {
+    let shared = Arc::new(LogState {
         stop: AtomicBool::new(false),
         missing_from: AtomicU64::new(NEVER),
         frames: AtomicU64::new(0),
@@ -177,7 +177,8 @@ impl LogPublisher {
 
 impl Publisher for LogPublisher {
     fn publish(&mut self, outgoing: Outgoing<'_>) -> Result<(), PublishError> {
-        let Outgoing { header, chain, commands, .. } = outgoing;
+        // Alerts, cues and counts follow from the scene and the commands.
+        let Outgoing { header, chain, alerts: _, cues: _, commands, counts: _ } = outgoing;
         let tick = header.tick;
         if self.shared.missing_from.load(Ordering::Relaxed) != NEVER {
             return Ok(());
@@ -260,12 +261,12 @@ impl Transport for Log {
 }
 
 /// Keeps the first failure.
-fn fail(shared: &Shared, sentence: String) {
+fn fail(shared: &LogState, sentence: String) {
     shared.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(sentence);
 }
 
 /// Writes the contents of the queue until the run is over.
-fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &Shared, file: &str) {
+fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &LogState, file: &str) {
     loop {
         // Read before the queue is emptied, so that everything queued before it was set is written.
         let ending = shared.stop.load(Ordering::Acquire);

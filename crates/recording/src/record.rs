@@ -39,7 +39,7 @@ enum Item {
 
 /// The state that both ends share.
 #[derive(Default)]
-struct Shared {
+struct RecordState {
     queued_bytes: AtomicUsize,
     ended: AtomicBool,
     recorded: Mutex<Recorded>,
@@ -50,12 +50,12 @@ pub struct RecordQueue {
     items: Sender<Item>,
     /// The memory of written frames, for reuse.
     free: Receiver<Vec<HandlePose>>,
-    shared: Arc<Shared>,
+    shared: Arc<RecordState>,
 }
 
 /// The thread.
 pub struct RecordThread {
-    shared: Arc<Shared>,
+    shared: Arc<RecordState>,
     handle: JoinHandle<(Recorded, Option<RecordError>)>,
 }
 
@@ -80,7 +80,7 @@ pub enum UnfinishedError {
 pub fn start(recorder: Recorder) -> std::io::Result<(RecordQueue, RecordThread)> {
     let (items, inbox) = channel();
     let (used, free) = channel();
-    let shared = Arc::new(Shared::default());
+    let shared = Arc::new(RecordState::default());
     let serving = Arc::clone(&shared);
     let thread = move || {
         let done = serve(recorder, &inbox, &used, &serving);
@@ -170,7 +170,7 @@ fn serve(
     mut recorder: Recorder,
     inbox: &Receiver<Item>,
     used: &Sender<Vec<HandlePose>>,
-    shared: &Shared,
+    shared: &RecordState,
 ) -> (Recorded, Option<RecordError>) {
     let done = loop {
         let item = match inbox.recv_timeout(MAINTAIN_INTERVAL) {

@@ -71,7 +71,7 @@ struct QueuedFrame {
 
 /// The state that both ends share besides the queue.
 #[derive(Default)]
-struct Shared {
+struct ReplayState {
     stop: AtomicBool,
     /// Periods in which the due frame had not been read.
     waited: AtomicU64,
@@ -87,12 +87,12 @@ pub struct Replay {
     next: Option<Box<QueuedFrame>>,
     /// Periods by which all frames are later than recorded.
     behind: u64,
-    shared: Arc<Shared>,
+    shared: Arc<ReplayState>,
 }
 
 /// The thread that reads. Dropping this value ends the thread.
 pub struct ReplayThread {
-    shared: Arc<Shared>,
+    shared: Arc<ReplayState>,
     handle: Option<JoinHandle<()>>,
 }
 
@@ -148,7 +148,7 @@ impl Prepared {
             // The ring has room for all of them.
             let _ = loop_free.push(Box::new(QueuedFrame::new(handles)));
         }
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(ReplayState::default());
         let reading = Arc::clone(&shared);
         let thread = move || {
             let mut queue = Queue { filled, free, shared: &reading };
@@ -218,7 +218,7 @@ impl Prepared {
 struct Queue<'a> {
     filled: Producer<Box<QueuedFrame>>,
     free: Consumer<Box<QueuedFrame>>,
-    shared: &'a Shared,
+    shared: &'a ReplayState,
 }
 
 impl Queue<'_> {
@@ -344,7 +344,7 @@ impl FrameSource for Replay {
         }
         let Some(sent) = self.sent.as_deref_mut() else { return Period::Empty };
         sent.stamp(tick, stamps, self.behind);
-        let QueuedFrame { header, chain, alerts, cues, shows_played, .. } = sent;
+        let QueuedFrame { due: _, header, playback: _, chain, alerts, cues, shows_played } = sent;
         let counts = ShowCounts { shows_played: *shows_played, ..ShowCounts::default() };
         Period::Frame(Outgoing { header, chain, alerts, cues, commands: &[], counts })
     }
@@ -353,8 +353,9 @@ impl FrameSource for Replay {
     fn command(&mut self, tick: u64, command: Command) -> Option<Outcome> {
         let code = if command == Command::State { Code::Done } else { Code::Refused };
         // Before the first frame, the next frame has the state.
-        let QueuedFrame { header, playback, .. } = self.sent.as_deref().or(self.next.as_deref())?;
-        let (FrameHeader { sim_time, time_scale, cue, .. }, playback) = (*header, *playback);
+        let frame = self.sent.as_deref().or(self.next.as_deref())?;
+        let (playback, header) = (frame.playback, &frame.header);
+        let (sim_time, time_scale, cue) = (header.sim_time, header.time_scale, header.cue);
         Some(Outcome { code, tick, sim_time, time_scale, playing_rate: time_scale, playback, cue })
     }
 

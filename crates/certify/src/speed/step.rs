@@ -82,16 +82,8 @@ impl Speeds<'_> {
         if segment > 0 {
             return false;
         }
-        let first = &self.chain.exact.segments[0].curve;
-        match first.inward_spiral() {
-            None => first.is_line(),
-            Some((a, _)) => {
-                let longest = if last == 0 { self.chain.link(0).max(self.chain.link(1)) } else { self.chain.link(1) };
-                let square = Interval::point(at).square();
-                let turned = longest * (square + Interval::point(2.0));
-                turned.is_below(a * at * 2.0 * (square + Interval::ONE))
-            }
-        }
+        let longest = if last == 0 { self.chain.link(0).max(self.chain.link(1)) } else { self.chain.link(1) };
+        self.chain.exact.segments[0].curve.slows_followers(at, longest)
     }
 
     /// Returns the handles' speeds with the head at one place, from spans as narrow as rounding allows.
@@ -122,7 +114,7 @@ impl Speeds<'_> {
         let Chain { path, exact, team, .. } = &self.chain;
         let rear = follower(path, param(front), team.link(link)).ok()?;
         let front = Spanned::new(exact, Span(front, front));
-        let turned = if exact.curve(front.span.0).is_spiral() { front.span.0.1 } else { 0.0 };
+        let turned = exact.curve(front.span.0).polar_angle(front.span.0.1);
         let length = self.chain.link(link);
         let size = length.hi + (front.first[0].magnitude() + front.first[1].magnitude()) * (1.0 + 0.1 * turned);
         PADS.iter().find_map(|pad| {
@@ -137,7 +129,7 @@ impl Speeds<'_> {
     fn is_rigid(&self, front: &Spanned, rear: &Spanned) -> bool {
         let segment = rear.span.0.0;
         let curve = &self.chain.exact.segments[segment].curve;
-        segment == front.span.1.0 && (curve.is_line() || curve.arc_origin().is_some())
+        segment == front.span.1.0 && (curve.has_constant_curvature())
     }
 
     /// Returns the rate of the ratio of the rear handle's speed to the front's, per metre of the front.

@@ -196,8 +196,7 @@ impl SharedMemoryPublisher {
         let cues = (config.cues > 0).then(open_cues).transpose()?;
         let StageMessage { stage: header, segments } = &config.stage;
         let stage = HeldSlice::open(&node, config, "stage", *header, segments)?;
-        let Stage { run_id, scene_hash, .. } = *header;
-        let header = SceneHeader { run_id, hash: scene_hash };
+        let header = SceneHeader { run_id: header.run_id, hash: header.scene_hash };
         let scene = HeldSlice::open(&node, config, "scene", header, config.scene.as_bytes())?;
         let tick_service = node
             .service_builder(&service_name(name, "tick")?)

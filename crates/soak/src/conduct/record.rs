@@ -267,7 +267,7 @@ fn description(command: Command) -> String {
 }
 
 fn answer_in_words(answer: &ControlResponse) -> String {
-    let ControlResponse { tick, sim_time, time_scale, cue, .. } = answer;
+    let ControlResponse { id: _, tick, sim_time, time_scale, code: _, playback: _, cue, reserved: _ } = answer;
     let code = answer.result().map_or("unknown", Code::name);
     let playback = answer.playback_state().map_or("unknown", PlaybackState::name);
     format!("answered {code}, {playback} at {time_scale} x, t = {sim_time} s, cue {cue}, tick {tick}")

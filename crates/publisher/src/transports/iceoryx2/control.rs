@@ -157,7 +157,7 @@ fn serve(
 
 /// Passes a request to the loop. For a request that is no command, the loop returns the state of the show.
 fn pass_on(commands: &mut CommandSender, request: Request) -> Option<Pending> {
-    let ControlRequest { value, command, .. } = *request.payload();
+    let ControlRequest { id: _, value, command, reserved: _ } = *request.payload();
     let (command, instead) = match Command::of_number(command, value) {
         Ok(command) => (command, None),
         Err(code) => (Command::State, Some(code)),
