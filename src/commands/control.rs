@@ -5,7 +5,7 @@ use std::time::Duration;
 use bench_dragon::client::control::command_client::Action as StateAction;
 use bench_dragon::client::control::{ControlError, Controller, refusal, standing};
 use bench_dragon::messages::ControlResponse;
-use bench_dragon::messages::control::{Code, Command};
+use bench_dragon::messages::control::{Code, Command, MOST_PERIODS, RATES};
 use bench_dragon::messages::state::PlaybackState;
 use serde::Serialize;
 
@@ -23,49 +23,43 @@ pub struct ControlArguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::Subcommand)]
 enum Action {
-    #[command(about = help(0))]
+    #[command(about = Command::State.entry().help)]
     State,
-    #[command(about = help(1))]
+    #[command(about = Command::Pause.entry().help)]
     Pause,
-    #[command(about = help(2))]
+    #[command(about = Command::Resume.entry().help)]
     Resume,
     /// Pause a playing show, resume a paused one
     Toggle,
-    #[command(about = help(3), allow_negative_numbers = true)]
+    #[command(about = Command::Rate(1.0).entry().help, allow_negative_numbers = true)]
     Rate {
-        /// 1e-6 to 1e6
+        #[arg(help = format!("{:e} to {:e}", RATES.start(), RATES.end()))]
         rate: f64,
     },
-    #[command(about = help(4), allow_negative_numbers = true)]
+    #[command(about = Command::Seek(1.0).entry().help, allow_negative_numbers = true)]
     Seek {
         /// Seconds since the start of the scene
         time: f64,
     },
-    #[command(about = help(5), allow_negative_numbers = true)]
+    #[command(about = Command::Step(1).entry().help, allow_negative_numbers = true)]
     Step {
         /// Periods of the loop
         #[arg(default_value_t = 1, value_parser = periods)]
         periods: u64,
     },
-    #[command(about = help(6))]
+    #[command(about = Command::Restart.entry().help)]
     Restart,
-    #[command(about = help(7))]
+    #[command(about = Command::Hold.entry().help)]
     Hold,
-    #[command(about = help(8))]
+    #[command(about = Command::Release.entry().help)]
     Release,
-    #[command(about = help(9))]
+    #[command(about = Command::Go.entry().help)]
     Go,
 }
 
 fn periods(text: &str) -> Result<u64, String> {
-    const MOST: u64 = 1 << 53;
-    let periods = text.parse().ok().filter(|periods| (1..=MOST).contains(periods));
-    periods.ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
-}
-
-/// Returns the help of the command of a number.
-fn help(number: usize) -> &'static str {
-    Command::TABLE[number].help
+    let periods = text.parse().ok().filter(|periods| (1..=MOST_PERIODS).contains(periods));
+    periods.ok_or_else(|| format!("expected a whole number from 1 to {MOST_PERIODS}"))
 }
 
 /// The line of `control --json`.
@@ -119,7 +113,7 @@ pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), Comm
 fn print(common: &Common, response: &ControlResponse) -> Result<(), CommandError> {
     let code = response.result().map_or("unknown", Code::name);
     let playback = response.playback_state().map_or("unknown", PlaybackState::name);
-    let ControlResponse { tick, sim_time, time_scale, cue, .. } = *response;
+    let ControlResponse { id: _, tick, sim_time, time_scale, code: _, playback: _, cue, reserved: _ } = *response;
     let mut output = Output::standard();
     if common.json {
         output.json(&ResponseLine { code, tick, sim_time, time_scale, playback, cue })?;

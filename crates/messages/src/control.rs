@@ -9,7 +9,7 @@ use std::mem::discriminant;
 pub const RATES: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
 /// The most periods of a step: the greatest whole number up to which a double counts exactly.
-const MOST_STEPS: f64 = 9_007_199_254_740_992.0;
+pub const MOST_PERIODS: u64 = 1 << f64::MANTISSA_DIGITS;
 
 /// The value of a request for the state whose response has, as its `time_scale`, the rate at which the show plays or
 /// will play on: a show that is paused or held has another rate in force, 0.
@@ -140,7 +140,7 @@ impl Command {
         match entry.command {
             Self::Rate(_) => Ok(Self::Rate(value)),
             Self::Seek(_) => Ok(Self::Seek(value)),
-            Self::Step(_) if (1.0..=MOST_STEPS).contains(&value) && value.fract() == 0.0 => {
+            Self::Step(_) if (1.0..=MOST_PERIODS as f64).contains(&value) && value.fract() == 0.0 => {
                 Ok(Self::Step(value as u64))
             }
             Self::Step(_) => Err(Code::OutOfRange),
@@ -266,7 +266,7 @@ mod tests {
             assert_eq!(command.entry().value == CommandValue::None, value == 0.0, "{command:?}");
         }
         assert_eq!(Command::of_number(10, 0.0), Err(Code::NotUnderstood));
-        for periods in [0.0, 0.5, 1.5, MOST_STEPS * 2.0, f64::NAN] {
+        for periods in [0.0, 0.5, 1.5, MOST_PERIODS as f64 * 2.0, f64::NAN] {
             assert_eq!(Command::of_number(5, periods), Err(Code::OutOfRange), "{periods}");
         }
     }

@@ -10,7 +10,7 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use bench_dragon_client::control::command_client::{Action, ActionResult, CommandClient};
 use bench_dragon_client::control::refusal;
-use bench_dragon_messages::control::{Code, Command};
+use bench_dragon_messages::control::{Code, Command, CommandEntry, CommandValue};
 use bench_dragon_messages::state::PlaybackState;
 
 /// Commands of one browser that may be unanswered.
@@ -19,8 +19,6 @@ pub(super) const MOST_UNANSWERED: usize = 8;
 const TOKEN_BYTES: usize = 16;
 
 const OFF: &str = "this server was started without --control: it takes no commands";
-const EXPECTED: &str = "expected JSON such as {\"command\":\"seek\",\"value\":400}; the commands are toggle, state, pause, \
-                        resume, rate, seek, step, restart, hold, release and go, of which rate and seek have a value";
 
 /// The channel of an answer, and the browser's number of the command.
 pub(super) struct Tag {
@@ -121,7 +119,7 @@ impl<'a> Visitor<'a> {
     pub(super) fn receive(&mut self, text: &str) -> Option<String> {
         let request = match serde_json::from_str(text) {
             Ok(request) => request,
-            Err(_) => return Some(refused(&Value::Null, EXPECTED)),
+            Err(_) => return Some(refused(&Value::Null, &expected())),
         };
         match (request, self.authorization) {
             (Request::Command { id, .. }, None) => Some(refused(&id, OFF)),
@@ -134,7 +132,7 @@ impl<'a> Visitor<'a> {
                 Some(refused(&id, "commands need the token of the address that view printed"))
             }
             (Request::Command { command, value, id }, Some(authorization)) => match action(&command, value) {
-                Err(sentence) => Some(refused(&id, sentence)),
+                Err(sentence) => Some(refused(&id, &sentence)),
                 Ok(action) => self.pass_on(authorization, id, action),
             },
         }
@@ -158,20 +156,36 @@ impl<'a> Visitor<'a> {
     }
 }
 
+/// Returns true for a command that means nothing without a value.
+fn needs_value(entry: &CommandEntry) -> bool {
+    matches!(entry.value, CommandValue::Rate | CommandValue::Seconds)
+}
+
+/// Returns the sentence about a message that is no command.
+fn expected() -> String {
+    let names = Command::TABLE.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
+    let with_value = Command::TABLE.iter().filter(|entry| needs_value(entry)).map(|entry| entry.name);
+    let with_value = with_value.collect::<Vec<_>>().join(" and ");
+    format!(
+        "expected JSON such as {{\"command\":\"seek\",\"value\":400}}; the commands are toggle, {names}, of which \
+         {with_value} have a value"
+    )
+}
+
 /// Returns the action of a command's name and value.
-fn action(name: &str, value: Option<f64>) -> Result<Action, &'static str> {
+fn action(name: &str, value: Option<f64>) -> Result<Action, String> {
     if name == "toggle" {
         return Ok(Action::Toggle);
     }
-    let number = Command::named(name).ok_or(EXPECTED)?.number;
-    let value = match (name, value) {
-        ("step", None) => 1.0,
-        ("rate" | "seek", None) => return Err(EXPECTED),
-        (_, value) => value.unwrap_or_default(),
+    let entry = Command::named(name).ok_or_else(expected)?;
+    let value = match value {
+        None if needs_value(entry) => return Err(expected()),
+        None if entry.value == CommandValue::Periods => 1.0,
+        value => value.unwrap_or_default(),
     };
-    match Command::of_number(number, value) {
+    match Command::of_number(entry.number, value) {
         Ok(command) => Ok(Action::Send(command)),
-        Err(_) => Err("step is refused: expected a whole number of periods from 1"),
+        Err(_) => Err(format!("{name} is refused: expected a whole number of periods from 1")),
     }
 }
 
@@ -211,6 +225,9 @@ mod tests {
         assert_eq!(action("step", Some(3.0)), Ok(Action::Send(Command::Step(3))));
         assert_eq!(action("hold", None), Ok(Action::Send(Command::Hold)));
         assert_eq!(action("toggle", None), Ok(Action::Toggle));
+        let sentence = "expected JSON such as {\"command\":\"seek\",\"value\":400}; the commands are toggle, state, pause, \
+                        resume, rate, seek, step, restart, hold, release, go, of which rate and seek have a value";
+        assert_eq!(action("seek", None), Err(sentence.to_owned()));
         assert!(action("rate", None).is_err() && action("jump", None).is_err() && action("step", Some(0.5)).is_err());
     }
 }

@@ -3,6 +3,9 @@
 //! It knows no times, except those that follow from the scene: the [`record`](super::record) compares times with
 //! frames. A step or a cue may change the state between two responses. Every possible state is kept, and each response
 //! removes the states that would have answered otherwise.
+//!
+//! The tests' model of a show (`crates/testing/src/model.rs`) cannot check a soak: it needs the period of each command,
+//! which no client knows.
 
 use bench_dragon_messages::control::{Code, Command, RATES, Refusal};
 use bench_dragon_messages::state::PlaybackState;
