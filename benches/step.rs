@@ -8,7 +8,7 @@
 //! after the step.
 //!
 //! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the
-//! command queues alone: `cargo bench --bench step -- doors`, or the log: `cargo bench --bench step -- log`
+//! command queues alone: `cargo bench --bench step -- queues`, or the log: `cargo bench --bench step -- log`
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -47,7 +47,7 @@ const POLLS: usize = 1_000;
 const COPIES: usize = QUEUE + 2;
 
 fn main() {
-    if std::env::args().any(|argument| argument == "doors") {
+    if std::env::args().any(|argument| argument == "queues") {
         return measure_doors();
     }
     if std::env::args().any(|argument| argument == "log") {
@@ -183,7 +183,7 @@ fn measure_doors() {
         publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
     let mut show = ShowSource::new(show);
     // The outer ends stay: a queue without a sender behaves differently.
-    let (mut doors, outer): (Vec<CommandQueues>, Vec<Vec<CommandSender>>) = (0..3)
+    let (mut queues, outer): (Vec<CommandQueues>, Vec<Vec<CommandSender>>) = (0..3)
         .map(|count| {
             let (ports, outer): (Vec<_>, Vec<_>) = (0..count).map(|_| command_queue()).unzip();
             (CommandQueues::new(ports), outer)
@@ -193,24 +193,24 @@ fn measure_doors() {
     let mut takes: [Vec<f64>; 3] = Default::default();
     let began = Instant::now();
     let mut tick = 0;
-    for round in 0..MOST_ROUNDS / doors.len() {
-        for place in 0..doors.len() {
+    for round in 0..MOST_ROUNDS / queues.len() {
+        for place in 0..queues.len() {
             // The order of the three changes.
-            let count = (place + round) % doors.len();
-            let doors = &mut doors[count];
+            let count = (place + round) % queues.len();
+            let queues = &mut queues[count];
             for _ in 0..BATCH {
                 tick += 1;
                 timed(&mut times[count], || {
-                    doors.take_one(&mut show, tick);
+                    queues.take_one(&mut show, tick);
                     publisher.publish(show.outgoing(tick, stamps(tick))).expect("no other process uses this service");
-                    doors.finish_step(&mut show, tick);
+                    queues.finish_step(&mut show, tick);
                 });
                 drain(&mut connection);
             }
             timed(&mut takes[count], || {
                 for _ in 0..POLLS {
-                    black_box(&mut *doors).take_one(&mut show, tick);
-                    black_box(&mut *doors).finish_step(&mut show, tick);
+                    black_box(&mut *queues).take_one(&mut show, tick);
+                    black_box(&mut *queues).finish_step(&mut show, tick);
                 }
             });
         }
@@ -221,7 +221,7 @@ fn measure_doors() {
     drop(outer);
     let step = times.map(median);
     let take = takes.map(median);
-    println!("\n| doors | step | beside a step without | the doors alone |\n|---|---|---|---|");
+    println!("\n| queues | step | beside a step without | the queues alone |\n|---|---|---|---|");
     for count in 0..step.len() {
         let alone = take[count] * 1e3 / POLLS as f64;
         println!("| {count} | {:.3} us | {:.3} | {alone:.1} ns |", step[count], step[count] / step[0]);

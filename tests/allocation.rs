@@ -119,17 +119,17 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let mut connection = subscription.connect().unwrap().unwrap();
     let (reports, _inbox) = queues();
     let (port, _door) = command_queue();
-    let mut doors = CommandQueues::new(vec![port]);
+    let mut queues = CommandQueues::new(vec![port]);
     let options = LoopOptions { run_id: 1, rate: 500.0, periods: None };
     let stop = AtomicBool::new(false);
     let show = ShowSource::new(show);
     let mut watched = Watched { show, stop: &stop, frames: 0, before: None, loans: 0, states: [0; 6], shows_played: 0 };
-    let counts = run_loop(&SystemClock, &mut watched, &mut doors, &mut publishers, options, reports, &stop).unwrap();
+    let counts = run_loop(&SystemClock, &mut watched, &mut queues, &mut publishers, options, reports, &stop).unwrap();
     let during = allocations() - watched.before.unwrap();
     assert_eq!(during, watched.loans, "the loop allocates more than iceoryx2's loans do, in {counts:?}");
     drop(publishers);
-    for (name, deliveries) in transports.into_iter().filter_map(|transport| transport.finish()) {
-        assert!(deliveries.frames > 0, "{name}: {deliveries:?}");
+    for (name, counters) in transports.into_iter().filter_map(|transport| transport.finish()) {
+        assert!(counters.frames > 0, "{name}: {counters:?}");
     }
     // Without these the test would not cover alerts, contacts and loops.
     assert_eq!(counts.frames, FRAMES);

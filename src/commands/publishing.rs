@@ -41,7 +41,7 @@ pub fn publish(
     stage: &Stage,
     publishing: &Publishing,
     source: &mut (dyn FrameSource + Send),
-    (transports, doors): (Vec<Box<dyn Transport>>, CommandQueues),
+    (transports, queues): (Vec<Box<dyn Transport>>, CommandQueues),
     stop: &AtomicBool,
     hooks: Hooks,
 ) -> Result<Published, CommandError> {
@@ -52,7 +52,7 @@ pub fn publish(
         print.iter().zip(announced(announcement, &stage)).for_each(|(print, line)| print(line));
     };
     let hooks = managed(Hooks { announce: Box::new(announce), ..hooks });
-    let published = publishing.run(&SystemClock, source, transports, doors, stop, hooks);
+    let published = publishing.run(&SystemClock, source, transports, queues, stop, hooks);
     lines.into_iter().for_each(Lines::finish);
     Ok(published?)
 }
@@ -102,14 +102,14 @@ fn announced(announcement: &Announcement, stage: &Stage) -> Option<String> {
 pub fn print_summary(published: &Published, common: &Common) -> Result<(), CommandError> {
     let LoopCounts { frames, overruns, skipped, end } = published.counts;
     let Summary { wakeup_ns, step_ns, samples } = published.summary;
-    let deliveries = published.deliveries.clone();
+    let transport_counters = published.transport_counters.clone();
     let lost_samples = frames - samples;
     let mut output = Output::standard();
     if lost_samples > 0 {
         log::warn!("{lost_samples} frames are missing from the percentiles: the machine left them no time");
     }
     if common.json {
-        output.json(&RunSummary { frames, overruns, skipped, wakeup_ns, step_ns, end, deliveries })?;
+        output.json(&RunSummary { frames, overruns, skipped, wakeup_ns, step_ns, end, transport_counters })?;
     } else {
         output.line(&format!(
             "{frames} frames published, {overruns} overruns, {skipped} periods skipped (ended by {}).",
@@ -130,7 +130,7 @@ pub fn print_summary(published: &Published, common: &Common) -> Result<(), Comma
                 us(of.max)
             ))?;
         }
-        for (name, TransportCounters { frames, skipped, discarded }) in deliveries {
+        for (name, TransportCounters { frames, skipped, discarded }) in transport_counters {
             output
                 .line(&format!("  {name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded."))?;
         }

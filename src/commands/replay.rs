@@ -91,7 +91,7 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let of = prepared.contents().scene.clone().unwrap_or_else(stem);
     let StageMessage { stage: recorded, segments } = prepared.contents().stage.clone();
     let stage = StageMessage { stage: Stage { run_id, stamp_ns: realtime_ns(), ..recorded }, segments };
-    let (transports, doors) = open_transports(&config(common, &scene, &prepared, &stage))?;
+    let (transports, queues) = open_transports(&config(common, &scene, &prepared, &stage))?;
     let start = start_lines(&shown, &of, &prepared);
     let (mut frames, reading) = prepared.begin()?;
     let process = ros2.as_ref().map(Ros2Process::start).transpose()?;
@@ -118,8 +118,8 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         alive: Box::new(|| ()),
         ended: Box::new(|_| ()),
     };
-    let mut published = publish(common, &stage.stage, &publishing, &mut frames, (transports, doors), &stop, hooks)?;
-    published.deliveries.extend(process.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
+    let mut published = publish(common, &stage.stage, &publishing, &mut frames, (transports, queues), &stop, hooks)?;
+    published.transport_counters.extend(process.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
     let (waited, failure) = reading.finish();
     if waited > 0 {
         log::warn!("in {waited} periods a frame was due that had not been read from the disk: it went out later");

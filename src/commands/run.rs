@@ -147,7 +147,7 @@ impl RunSession<'_> {
         let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, self.scene, &show);
         let config =
             TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, &stage) };
-        let (mut transports, doors) = open_transports(&config)?;
+        let (mut transports, queues) = open_transports(&config)?;
         // The last transport, so that the log has only published frames.
         let log = self.open_log()?.map(|(transport, outcome)| {
             transports.push(transport);
@@ -172,9 +172,9 @@ impl RunSession<'_> {
             alive: Box::new(|| ()),
             ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
         };
-        let ends = (transports, doors);
+        let ends = (transports, queues);
         let mut published = publish(self.common, &stage.stage, &publishing, &mut source, ends, stop, hooks)?;
-        published.deliveries.extend(ros2.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
+        published.transport_counters.extend(ros2.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
         print_summary(&published, self.common)?;
         let log_failure = log.and_then(|outcome| outcome.failure());
         let failure = published.error.map(|error| error.to_string()).or(log_failure);

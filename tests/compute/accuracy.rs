@@ -24,7 +24,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 /// Requested accuracies from the finest to the coarsest, metres.
-const WISHES: [f64; 7] = [1e-18, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2];
+const ACCURACIES: [f64; 7] = [1e-18, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2];
 
 const VELOCITIES: [Velocities; 2] = [Velocities::Computed, Velocities::Omitted];
 
@@ -34,8 +34,8 @@ fn scene(name: &str) -> Scene {
     Scene::load(&Path::new("config").join(format!("{name}.toml"))).unwrap()
 }
 
-fn select(motion: &Motion, wish: f64, velocities: Velocities) -> Option<Selection> {
-    selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, wish)
+fn select(motion: &Motion, accuracy: f64, velocities: Velocities) -> Option<Selection> {
+    selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, accuracy)
 }
 
 /// Returns `count` times up to `end` that the selection has not used: multiples of the golden ratio, every third in the
@@ -58,37 +58,41 @@ fn floor(motion: &Motion, time: f64, (x, y): (f64, f64), speed: f64) -> f64 {
 }
 
 /// Compares the solver for a requested accuracy with the safe one on the stage: places, links, headings, velocities.
-fn assert_kept(motion: &Motion, wish: f64, solver: &mut dyn Solver, times: &[f64]) {
+fn assert_kept(motion: &Motion, accuracy: f64, solver: &mut dyn Solver, times: &[f64]) {
     let team = motion.team();
     let newton = Newton::new(motion.path().clone(), *team, motion.head_speed(), Velocities::Computed);
     let (mut found, mut truth) = (Chain::new(team.handles()), Chain::new(team.handles()));
-    let wish = wish.min(1e-3 * team.shortest_link());
+    let accuracy = accuracy.min(1e-3 * team.shortest_link());
     for &time in times {
         if newton.solve_at(motion.head_speed() * time, &mut truth).is_err() {
             continue;
         }
         motion.placement().chain(&mut truth.all_mut());
-        solver.solve(time, &mut found).unwrap_or_else(|none| panic!("{wish:e} at {time} s: {none}"));
+        solver.solve(time, &mut found).unwrap_or_else(|none| panic!("{accuracy:e} at {time} s: {none}"));
         let at =
-            |handle: usize| format!("{wish:e} m at {time} s, handle {handle}: {:?} {team:?}", motion.description());
+            |handle: usize| format!("{accuracy:e} m at {time} s, handle {handle}: {:?} {team:?}", motion.description());
         for k in 0..found.handles() {
             let floor = floor(motion, time, (truth.x[k], truth.y[k]), truth.speed[k]);
             let error = (found.x[k] - truth.x[k]).hypot(found.y[k] - truth.y[k]);
-            assert!(error <= wish.max(floor), "{error:e} m: {}", at(k));
+            assert!(error <= accuracy.max(floor), "{error:e} m: {}", at(k));
             let link = team.link(k.min(team.benches - 1));
             let turn = (found.heading[k] - truth.heading[k]).abs();
             let turn = turn.min(std::f64::consts::TAU - turn);
-            assert!(turn <= 2.0 * (wish / team.shortest_link()).max(1e-12 + floor / link), "{turn:e} rad: {}", at(k));
+            assert!(
+                turn <= 2.0 * (accuracy / team.shortest_link()).max(1e-12 + floor / link),
+                "{turn:e} rad: {}",
+                at(k)
+            );
             assert!(found.heading[k].abs() <= std::f64::consts::PI, "{}", at(k));
             let off = (found.vx[k] - truth.vx[k]).hypot(found.vy[k] - truth.vy[k]);
             let off = off.max((found.speed[k] - truth.speed[k]).abs()) / truth.speed[k].abs().max(motion.head_speed());
             let haste = (truth.speed[k] / motion.head_speed()).abs().max(1.0);
-            assert!(off <= 10.0 * (wish / team.shortest_link()).max(1e-9 * haste), "{off:e} of a speed: {}", at(k));
+            assert!(off <= 10.0 * (accuracy / team.shortest_link()).max(1e-9 * haste), "{off:e} of a speed: {}", at(k));
             if k < team.benches {
                 let length = (found.x[k] - found.x[k + 1]).hypot(found.y[k] - found.y[k + 1]);
                 let r = truth.x[k].hypot(truth.y[k]).max(truth.x[k + 1].hypot(truth.y[k + 1]));
                 let promised = 1e-12 * link + 4.0 * (r.next_up() - r);
-                let allowed = if wish <= EXACT_LINKS { promised } else { 2.0 * wish };
+                let allowed = if accuracy <= EXACT_LINKS { promised } else { 2.0 * accuracy };
                 assert!((length - link).abs() <= allowed, "link {:e}: {}", length - link, at(k));
             }
         }
@@ -96,23 +100,23 @@ fn assert_kept(motion: &Motion, wish: f64, solver: &mut dyn Solver, times: &[f64
 }
 
 #[test]
-fn every_wish_is_kept_on_every_scene_and_a_weaker_one_costs_no_more() {
+fn every_accuracy_is_kept_on_every_scene_and_a_coarser_one_costs_no_more() {
     for name in SCENES {
         let scene = scene(name);
         let end = scene.motion.timeline_without_contact().end().time;
         let times = other_times(&scene.motion, end, if scene.team().benches > 1000 { 12 } else { 120 });
         let mut cost = (f64::INFINITY, usize::MAX);
-        for wish in WISHES {
-            let motion = scene.motion.with_method(Method::Accuracy(wish)).unwrap();
+        for accuracy in ACCURACIES {
+            let motion = scene.motion.with_method(Method::Accuracy(accuracy)).unwrap();
             let mut choice = motion.solver(Velocities::Computed);
             println!("{name}: {}", choice.reason);
-            assert_kept(&motion, wish, choice.solver.as_mut(), &times);
-            let selection = select(&motion, wish, Velocities::Computed).unwrap();
+            assert_kept(&motion, accuracy, choice.solver.as_mut(), &times);
+            let selection = select(&motion, accuracy, Velocities::Computed).unwrap();
             // Along thousands of links roundings add up to more than 8 eps (r + distance travelled).
-            let met = selection.meets() || wish < 1e-12;
-            assert!(met, "{name} {wish:e}: {:e} of {:e}", selection.error, selection.allowed);
+            let met = selection.meets() || accuracy < 1e-12;
+            assert!(met, "{name} {accuracy:e}: {:e} of {:e}", selection.error, selection.allowed);
             let bytes = (selection.table.bytes_per_handle(), selection.table.memory_bytes());
-            assert!(bytes.0 <= cost.0, "{name}: {wish:e} m takes {bytes:?} bytes, a stronger wish {cost:?}");
+            assert!(bytes.0 <= cost.0, "{name}: {accuracy:e} m takes {bytes:?} bytes, a finer accuracy {cost:?}");
             cost = bytes;
         }
     }
@@ -121,7 +125,7 @@ fn every_wish_is_kept_on_every_scene_and_a_weaker_one_costs_no_more() {
 /// Both instruction sets and the portable path, with and without velocities, from every format of a table: each has its
 /// own machine code, so each is tested.
 #[test]
-fn every_instruction_set_keeps_every_wish_against_the_reference() {
+fn every_instruction_set_keeps_every_accuracy_against_the_reference() {
     let mut run = BTreeSet::new();
     for name in ["paper", "turnaround", "procession"] {
         let motion = scene(name).motion;
@@ -129,9 +133,11 @@ fn every_instruction_set_keeps_every_wish_against_the_reference() {
         let end = motion.timeline_without_contact().end().time;
         let moments = [0.0, 0.291, 0.613, 0.987].map(|share| (share * end, reference.handles(share * end).unwrap()));
         // The other accuracies select no table in mixed precision of order 3.
-        let wishes = WISHES.into_iter().chain([1e-5]);
-        for (wish, velocities) in wishes.flat_map(|wish| VELOCITIES.map(|velocities| (wish, velocities))) {
-            let table = select(&motion, wish, velocities).unwrap().table;
+        let accuracies = ACCURACIES.into_iter().chain([1e-5]);
+        for (accuracy, velocities) in
+            accuracies.flat_map(|accuracy| VELOCITIES.map(|velocities| (accuracy, velocities)))
+        {
+            let table = select(&motion, accuracy, velocities).unwrap().table;
             for instructions in Instructions::available() {
                 run.insert((instructions.name(), format!("{velocities:?}"), table.format()));
                 let mut solver = table.clone().with_instructions(instructions).unwrap();
@@ -142,13 +148,14 @@ fn every_instruction_set_keeps_every_wish_against_the_reference() {
                         let error = truth.x.error_of(chain.x[k]).hypot(truth.y.error_of(chain.y[k]));
                         // On a turnaround the place of the start is itself rounded several times.
                         let floor = floor(&motion, *time, (chain.x[k], chain.y[k]), truth.speed).max(1e-13);
-                        let at =
-                            || format!("{name} {} {wish:e} {velocities:?} at {time}, handle {k}", instructions.name());
-                        assert!(error <= wish.max(floor), "{}: {error:e} m", at());
+                        let at = || {
+                            format!("{name} {} {accuracy:e} {velocities:?} at {time}, handle {k}", instructions.name())
+                        };
+                        assert!(error <= accuracy.max(floor), "{}: {error:e} m", at());
                         if velocities == Velocities::Computed {
                             let off = (chain.speed[k] - truth.speed).abs() / truth.speed.abs().max(motion.head_speed());
                             let haste = (truth.speed / motion.head_speed()).abs().max(1.0);
-                            let allowed = 10.0 * (wish / motion.team().shortest_link()).max(1e-9 * haste);
+                            let allowed = 10.0 * (accuracy / motion.team().shortest_link()).max(1e-9 * haste);
                             assert!(off <= allowed, "{}: {off:e} of a speed", at());
                         }
                     }
@@ -186,8 +193,8 @@ fn every_instruction_set_of_this_processor_is_tested() {
 fn the_choice_is_the_same_every_time() {
     for name in ["paper", "procession"] {
         let motion = scene(name).motion;
-        for wish in WISHES {
-            let [mut one, mut other] = [(), ()].map(|()| select(&motion, wish, Velocities::Computed).unwrap());
+        for accuracy in ACCURACIES {
+            let [mut one, mut other] = [(), ()].map(|()| select(&motion, accuracy, Velocities::Computed).unwrap());
             assert_eq!(one.table.format(), other.table.format());
             assert_eq!((one.error, one.allowed, one.test_points), (other.error, other.allowed, other.test_points));
             let [mut first, mut second] = [(), ()].map(|()| Chain::new(motion.team().handles()));
@@ -195,17 +202,17 @@ fn the_choice_is_the_same_every_time() {
             for time in [0.0, 33.3, 150.0] {
                 one.table.solve(time, &mut first).unwrap();
                 other.table.solve(time, &mut second).unwrap();
-                assert_eq!(first, second, "{name} {wish:e} at {time} s");
+                assert_eq!(first, second, "{name} {accuracy:e} at {time} s");
             }
         }
     }
 }
 
 #[test]
-fn events_do_not_depend_on_the_wish() {
+fn events_do_not_depend_on_the_accuracy() {
     for name in ["school", "procession"] {
         let scene = scene(name);
-        let timeline = |wish| scene.motion.with_method(Method::Accuracy(wish)).unwrap().timeline(&mut |_| ());
+        let timeline = |accuracy| scene.motion.with_method(Method::Accuracy(accuracy)).unwrap().timeline(&mut |_| ());
         assert_eq!(timeline(1e-2), timeline(1e-18), "{name}");
     }
 }
@@ -216,8 +223,8 @@ fn the_live_clearance_is_that_of_the_frame() {
     for name in ["paper", "turnaround", "procession", "school"] {
         let scene = scene(name);
         let end = scene.motion.timeline_without_contact().end().time;
-        for wish in [1e-2, 1e-4, 1e-6] {
-            let motion = scene.motion.with_method(Method::Accuracy(wish)).unwrap();
+        for accuracy in [1e-2, 1e-4, 1e-6] {
+            let motion = scene.motion.with_method(Method::Accuracy(accuracy)).unwrap();
             let mut choice = motion.solver(Velocities::Omitted);
             let mut monitor = motion.clearance_monitor(&choice);
             let mut chain = Chain::new(motion.team().handles());
@@ -226,11 +233,15 @@ fn the_live_clearance_is_that_of_the_frame() {
                     let time = (0.083 * end * f64::from(run) + f64::from(frame) / 60.0).min(0.9999 * end);
                     choice.solver.solve(time, &mut chain).unwrap();
                     let live = monitor.least_clearance(&chain, motion.travelled_at(time));
-                    assert_eq!(live, least_clearance_all_pairs(&chain, motion.team()), "{name} {wish:e} at {time} s");
+                    assert_eq!(
+                        live,
+                        least_clearance_all_pairs(&chain, motion.team()),
+                        "{name} {accuracy:e} at {time} s"
+                    );
                 }
             }
             let counters = monitor.counters();
-            println!("{name} {wish:e}: {counters:?}");
+            println!("{name} {accuracy:e}: {counters:?}");
         }
     }
 }
@@ -270,7 +281,7 @@ fn motions() -> impl Strategy<Value = Motion> {
 }
 
 #[test]
-fn random_paths_keep_every_wish() {
+fn random_paths_keep_every_accuracy() {
     let config = Config { cases: 60, failure_persistence: None, ..Config::default() };
     let tables = std::cell::Cell::new(0);
     TestRunner::new(config)
@@ -278,9 +289,9 @@ fn random_paths_keep_every_wish() {
             let end = motion.timeline_without_contact().end().time;
             if end > 0.0 {
                 let times = other_times(&motion, end, 30);
-                for wish in [1e-9, 1e-6, 1e-4, 1e-2] {
-                    if let Some(mut selection) = select(&motion, wish, Velocities::Computed) {
-                        assert_kept(&motion, wish, &mut selection.table, &times);
+                for accuracy in [1e-9, 1e-6, 1e-4, 1e-2] {
+                    if let Some(mut selection) = select(&motion, accuracy, Velocities::Computed) {
+                        assert_kept(&motion, accuracy, &mut selection.table, &times);
                         tables.set(tables.get() + 1);
                     }
                 }

@@ -17,7 +17,7 @@ use std::sync::{Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 use chain::Chain;
-use comparison::{Comparison, Verdict, verdict};
+use comparison::{CheckerResult, Comparison, verdict};
 use scenes::{FAMILIES, Random, random_scene, read};
 
 /// One event as the program reports it.
@@ -171,7 +171,7 @@ fn the_program_agrees_with_brute_force() {
     assert!(tally.total("ambiguous") * 50 <= scenes, "{} scenes are ambiguous", tally.total("ambiguous"));
 }
 
-fn verdict_of(text: &str) -> Verdict {
+fn verdict_of(text: &str) -> CheckerResult {
     let (team, path) = read(text);
     verdict(&Chain::new(&path, &team))
 }

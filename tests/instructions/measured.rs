@@ -158,8 +158,8 @@ struct Step {
     frame: Frame,
     publisher: SharedMemoryPublisher,
     connection: Connection,
-    doors: CommandQueues,
-    door: CommandSender,
+    queues: CommandQueues,
+    sender: CommandSender,
 }
 
 impl Step {
@@ -182,7 +182,7 @@ impl Step {
         let connection = Subscription::new(&name, Wake::Never).unwrap().connect().unwrap().unwrap();
         let rules = LevelTracker::new(scene.alerts.unwrap(), playback.rate);
         let frame = show.frame(0).clone();
-        let (port, door) = command_queue();
+        let (port, sender) = command_queue();
         Self {
             show: ShowSource::new(show),
             messages: FrameMessages::new(0),
@@ -191,8 +191,8 @@ impl Step {
             frame,
             publisher,
             connection,
-            doors: CommandQueues::new(vec![port]),
-            door,
+            queues: CommandQueues::new(vec![port]),
+            sender,
         }
     }
 
@@ -209,8 +209,8 @@ impl Step {
     }
 
     fn poll(&mut self, number: u64) {
-        self.doors.take_one(&mut self.show, number);
-        self.doors.finish_step(&mut self.show, number);
+        self.queues.take_one(&mut self.show, number);
+        self.queues.finish_step(&mut self.show, number);
     }
 }
 
@@ -230,17 +230,17 @@ fn step(scene: &Scene, timeline: &Timeline) {
         "control poll with a command",
         on,
         |on, number| {
-            on.door.answer();
+            on.sender.answer();
             on.show.show.frame(number);
-            on.door.send(Command::Rate(1.0)).unwrap();
+            on.sender.send(Command::Rate(1.0)).unwrap();
         },
         Step::poll,
     );
     part("whole step", on, Step::receive, |on, number| {
         let tick = CALLS + number;
-        on.doors.take_one(&mut on.show, tick);
+        on.queues.take_one(&mut on.show, tick);
         on.publisher.publish(on.show.outgoing(tick, STAMPS)).unwrap();
-        on.doors.finish_step(&mut on.show, tick);
+        on.queues.finish_step(&mut on.show, tick);
     });
 }
 

@@ -55,7 +55,7 @@ impl StatusPublisher for Statuses {
 /// A client that sends commands through one queue: one at a time, several in one period, or a flood.
 pub struct Controller {
     pub number: usize,
-    pub door: Rc<RefCell<CommandSender>>,
+    pub sender: Rc<RefCell<CommandSender>>,
     pub oracle: Rc<RefCell<Oracle>>,
     /// Mean time between two commands.
     pub pause_ns: f64,
@@ -67,9 +67,9 @@ pub struct Controller {
 
 impl Controller {
     pub fn take_answers(&self) {
-        let mut door = self.door.borrow_mut();
-        while let Some(answer) = door.answer() {
-            self.oracle.borrow_mut().entrance.taken(self.number, &answer);
+        let mut sender = self.sender.borrow_mut();
+        while let Some(answer) = sender.answer() {
+            self.oracle.borrow_mut().queue_check.taken(self.number, &answer);
         }
     }
 
@@ -112,10 +112,10 @@ impl Actor for Controller {
         }
         for _ in 0..count {
             let command = self.command(world);
-            let result = self.door.borrow_mut().send(command);
-            self.oracle.borrow_mut().entrance.sent(self.number, command, result);
+            let result = self.sender.borrow_mut().send(command);
+            self.oracle.borrow_mut().queue_check.sent(self.number, command, result);
         }
-        if self.is_dead && self.door.borrow().waiting() >= MOST_WAITING {
+        if self.is_dead && self.sender.borrow().waiting() >= MOST_WAITING {
             return NEVER;
         }
         world.now_ns() + 1 + (2.0 * self.pause_ns * world.random.borrow_mut().share()) as u64

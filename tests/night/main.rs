@@ -7,7 +7,7 @@
 
 mod actors;
 mod collected;
-mod doors;
+mod command_queues;
 mod levels;
 mod night;
 mod oracle;

@@ -28,7 +28,7 @@ struct Cast {
     oracle: Rc<RefCell<Oracle>>,
     collected: Rc<RefCell<Collected>>,
     collector: Rc<RefCell<Collector<'static>>>,
-    doors: Vec<Rc<RefCell<CommandSender>>>,
+    senders: Vec<Rc<RefCell<CommandSender>>>,
     subscribers: Vec<Rc<RefCell<Subscriber>>>,
 }
 
@@ -65,8 +65,12 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
         Rc::new(RefCell::new(Subscriber::new(&receivers, origin, of.0, of.1, of.2, of.3)))
     };
     let subscribers: Vec<_> = plan.readers.iter().map(reader).collect();
-    let (ports, doors): (Vec<_>, Vec<_>) =
-        plan.doors.iter().map(|_| command_queue()).map(|(port, door)| (port, Rc::new(RefCell::new(door)))).unzip();
+    let (ports, senders): (Vec<_>, Vec<_>) = plan
+        .command_queues
+        .iter()
+        .map(|_| command_queue())
+        .map(|(port, sender)| (port, Rc::new(RefCell::new(sender))))
+        .unzip();
     let shared_memory = SharedMemory {
         world: Rc::clone(&world),
         oracle: Rc::clone(&oracle),
@@ -77,15 +81,15 @@ pub fn play(seed: u64, stages: &[Stage], trace: &Rc<Trace>) -> Tally {
         maintained: None,
     };
     let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(shared_memory)];
-    let cast = Cast { world, oracle, collected, collector, doors, subscribers };
+    let cast = Cast { world, oracle, collected, collector, senders, subscribers };
     cast.enter(&plan, stage);
 
     let mut frames =
         Checked { show: ShowSource::new(show), world: Rc::clone(&cast.world), oracle: Rc::clone(&cast.oracle) };
     let options = LoopOptions { run_id, rate: plan.rate, periods: plan.periods };
-    let mut doors = CommandQueues::new(ports);
+    let mut queues = CommandQueues::new(ports);
     let World { stop, .. } = &*cast.world;
-    let result = run_loop(&*cast.world, &mut frames, &mut doors, &mut publishers, options, reports, stop);
+    let result = run_loop(&*cast.world, &mut frames, &mut queues, &mut publishers, options, reports, stop);
     let counts = match result {
         Ok(counts) => counts,
         Err((counts, error)) => {
@@ -103,7 +107,7 @@ fn oracle(plan: &Plan, stage: &Stage, show: &Show, run_id: u64, collected: &Rc<R
     let model = ModelShow { start, end: stage.freeze(&plan.playback), end_hold, cues };
     let model = Model::new(model, Formula::new(rate), time_scale, paused);
     let levels = stage.rules().map(|rules| Levels::new(rules, rate));
-    Oracle::new(run_id, (rate, model), levels, stage.events(), plan.doors.len(), Rc::clone(collected))
+    Oracle::new(run_id, (rate, model), levels, stage.events(), plan.command_queues.len(), Rc::clone(collected))
 }
 
 impl Cast {
@@ -117,10 +121,10 @@ impl Cast {
             every_ns: plan.statistics_every_ns,
         };
         world.add(Box::new(statistics), soon(plan.statistics_every_ns));
-        for (number, (pause_ns, door)) in plan.doors.iter().zip(&self.doors).enumerate() {
+        for (number, (pause_ns, sender)) in plan.command_queues.iter().zip(&self.senders).enumerate() {
             let controller = Controller {
                 number,
-                door: Rc::clone(door),
+                sender: Rc::clone(sender),
                 oracle: Rc::clone(&self.oracle),
                 pause_ns: *pause_ns,
                 end: stage.freeze(&plan.playback),
@@ -141,25 +145,25 @@ impl Cast {
 
     /// Delivers the messages in flight after the end of the loop, and compares all counts.
     fn settle(self, plan: &Plan, counts: &LoopCounts) -> Tally {
-        let Self { world, oracle, collected, collector, doors, subscribers } = self;
+        let Self { world, oracle, collected, collector, senders, subscribers } = self;
         oracle.borrow_mut().pace.ended(&world, counts, plan.periods);
         let mut last = collector.borrow_mut();
         last.take();
         let now_ns = world.now_ns();
         last.report(now_ns, true, |status| bench_dragon::messages::LoopStatus { stamp_ns: now_ns, ..status });
         collected.borrow().ended(&last.summary(), counts.frames);
-        for (number, door) in doors.iter().enumerate() {
-            while let Some(answer) = door.borrow_mut().answer() {
-                oracle.borrow_mut().entrance.taken(number, &answer);
+        for (number, sender) in senders.iter().enumerate() {
+            while let Some(answer) = sender.borrow_mut().answer() {
+                oracle.borrow_mut().queue_check.taken(number, &answer);
             }
         }
-        oracle.borrow().entrance.ended();
+        oracle.borrow().queue_check.ended();
         let mut lost = 0;
         for subscriber in &subscribers {
             subscriber.borrow_mut().outlive(&world);
             lost += subscriber.borrow().receiver.borrow().lost;
         }
-        let (commands, too_many) = oracle.borrow().entrance.totals();
+        let (commands, too_many) = oracle.borrow().queue_check.totals();
         let tally = *world.tally.borrow();
         Tally {
             nights: 1,

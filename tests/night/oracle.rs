@@ -17,7 +17,7 @@ use bench_dragon::show::convert::Stamps;
 use bench_dragon_testing::model::{Formula, Model};
 
 use crate::collected::{Announced, Collected, Expected};
-use crate::doors::Entrance;
+use crate::command_queues::QueueCheck;
 use crate::levels::Levels;
 use crate::pace::Pace;
 use crate::world::{World, same};
@@ -32,7 +32,7 @@ pub struct Oracle {
     pub levels: Option<Levels>,
     /// Every event, in order: the state depends on it.
     pub events: Vec<(f64, FrameState)>,
-    pub entrance: Entrance,
+    pub queue_check: QueueCheck,
     pub collected: Rc<RefCell<Collected>>,
     /// Epoch of the frame before.
     epoch: u32,
@@ -49,7 +49,7 @@ impl Oracle {
         (rate, show): (f64, Model<Formula>),
         levels: Option<Levels>,
         events: Vec<(f64, FrameState)>,
-        doors: usize,
+        queues: usize,
         collected: Rc<RefCell<Collected>>,
     ) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl Oracle {
             show,
             levels,
             events,
-            entrance: Entrance::new(doors),
+            queue_check: QueueCheck::new(queues),
             collected,
             epoch: 0,
             shows_played: 0,
@@ -73,7 +73,7 @@ impl Oracle {
         self.pace.frame_begins(world, tick);
         // A step that a command cancels is answered before the command.
         same("a step that a command cancelled", self.show.step_outcome, None);
-        self.entrance.frame_begins(tick);
+        self.queue_check.frame_begins(tick);
         self.show.count_to(tick);
     }
 
@@ -150,7 +150,7 @@ impl Oracle {
     }
 
     fn command(&mut self, tick: u64, command: Command) -> Option<bench_dragon::messages::control::Code> {
-        self.entrance.executed(tick, command);
+        self.queue_check.executed(tick, command);
         self.show.count_to(tick);
         self.show.execute(command)
     }
@@ -193,7 +193,7 @@ impl FrameSource for Checked {
         let mut oracle = self.oracle.borrow_mut();
         same("the answer to a command", outcome.map(|outcome| outcome.code), expected);
         outcome.iter().for_each(|outcome| oracle.assert_outcome(tick, outcome));
-        oracle.entrance.answered(outcome);
+        oracle.queue_check.answered(outcome);
         outcome
     }
 
@@ -205,7 +205,7 @@ impl FrameSource for Checked {
         same("the end of a step", outcome.map(|outcome| outcome.code), expected);
         if let Some(outcome) = outcome {
             oracle.assert_outcome(tick, &outcome);
-            oracle.entrance.step_is_over(outcome);
+            oracle.queue_check.step_is_over(outcome);
         }
         outcome
     }

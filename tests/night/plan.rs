@@ -114,7 +114,7 @@ pub struct Plan {
     /// Mean number of sleeps, or frames, between two faults.
     pub faults_every: f64,
     /// Mean time between two commands at each queue.
-    pub doors: Vec<f64>,
+    pub command_queues: Vec<f64>,
     pub readers: Vec<Reader>,
     /// Room of the statistics: samples, and alerts and cues.
     pub queues: (usize, usize),
@@ -160,7 +160,7 @@ impl Plan {
             room,
             playback,
             faults_every: random.magnitude(5.0, 3000.0) * if fast { 1.0 } else { 10.0 / rate },
-            doors: (0..random.below(4)).map(|_| random.magnitude(0.5, 300.0) * period_ns).collect(),
+            command_queues: (0..random.below(4)).map(|_| random.magnitude(0.5, 300.0) * period_ns).collect(),
             readers: (0..random.below(4)).map(|_| reader(random)).collect(),
             queues: random.pick(&[(1, 1), (300, 20), (1 << 12, 1 << 8), (1 << 14, 1 << 10), (1 << 14, 1 << 10)]),
             statistics_every_ns: if fast { SECOND_NS / 50 } else { often(random, 200.0, 8000.0) },

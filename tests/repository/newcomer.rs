@@ -25,7 +25,7 @@ use reader::Reader;
 const READERS: usize = 4;
 
 /// The treatment of a command.
-enum Verdict {
+enum Treatment {
     Run(String),
     LookedUp,
     NotRun(String),
@@ -58,29 +58,29 @@ fn is_installed(program: &str) -> bool {
     std::env::split_paths(&reader::programs_path()).any(|folder| folder.join(program).exists())
 }
 
-fn verdict(printed: &Printed) -> Verdict {
+fn verdict(printed: &Printed) -> Treatment {
     let text = &printed.text;
     if is_mention(printed) {
-        return Verdict::Run(format!("{text} --help"));
+        return Treatment::Run(format!("{text} --help"));
     }
     if let Some((_, reason)) = line_for(text, NOT_HERE) {
-        return Verdict::NotRun(reason.to_owned());
+        return Treatment::NotRun(reason.to_owned());
     }
     if line_for(text, LOOKED_UP).is_some() {
-        return Verdict::LookedUp;
+        return Treatment::LookedUp;
     }
     match line_for(text, NEEDS) {
         Some((_, programs)) if !programs.split(' ').all(is_installed) => {
-            return Verdict::NotRun(format!("needs {programs}, which are not all installed"));
+            return Treatment::NotRun(format!("needs {programs}, which are not all installed"));
         }
         _ => (),
     }
     match line_for(text, LONG) {
-        Some((_, reason)) if !long() => return Verdict::NotRun(format!("{reason}: BENCH_DRAGON_LONG=1 runs it")),
+        Some((_, reason)) if !long() => return Treatment::NotRun(format!("{reason}: BENCH_DRAGON_LONG=1 runs it")),
         _ => (),
     }
     let replaced = INSTEAD.iter().fold(text.clone(), |text, (from, to, _)| text.replace(from, to));
-    Verdict::Run(replaced)
+    Treatment::Run(replaced)
 }
 
 /// Runs the commands of a page and returns the errors.
@@ -90,9 +90,9 @@ fn read(root: &Path, page: &str, sections: &[Section]) -> Vec<String> {
     for section in sections {
         for printed in &section.commands {
             let outcome = match verdict(printed) {
-                Verdict::Run(command) => reader.get_or_insert_with(|| Reader::new(root, page)).run(&command),
-                Verdict::LookedUp => targets::look_up(root, &printed.text),
-                Verdict::NotRun(_) => Ok(()),
+                Treatment::Run(command) => reader.get_or_insert_with(|| Reader::new(root, page)).run(&command),
+                Treatment::LookedUp => targets::look_up(root, &printed.text),
+                Treatment::NotRun(_) => Ok(()),
             };
             failures.extend(outcome.err().map(|what| format!("{}: {what}", printed.place)));
         }
@@ -106,13 +106,13 @@ fn report(commands: &[&Printed]) {
     let (mut run, mut looked_up, mut not_run) = (0, 0, Vec::new());
     for printed in commands {
         match verdict(printed) {
-            Verdict::Run(command) if command == printed.text => run += 1,
-            Verdict::Run(command) => {
+            Treatment::Run(command) if command == printed.text => run += 1,
+            Treatment::Run(command) => {
                 run += 1;
                 aloud(&format!("run as `{command}`: {}: {}", printed.place, printed.text));
             }
-            Verdict::LookedUp => looked_up += 1,
-            Verdict::NotRun(reason) => not_run.push((reason, &printed.place, &printed.text)),
+            Treatment::LookedUp => looked_up += 1,
+            Treatment::NotRun(reason) => not_run.push((reason, &printed.place, &printed.text)),
         }
     }
     not_run.sort();

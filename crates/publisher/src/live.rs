@@ -247,7 +247,7 @@ impl Reports {
 pub fn run_loop<C: Clock>(
     clock: &C,
     source: &mut dyn FrameSource,
-    doors: &mut CommandQueues,
+    queues: &mut CommandQueues,
     publishers: &mut [Box<dyn Publisher>],
     options: LoopOptions,
     mut reports: Reports,
@@ -283,11 +283,11 @@ pub fn run_loop<C: Clock>(
             stamp_ns: clock.realtime_ns(),
             deadline_ns: deadlines.of(tick),
         };
-        doors.take_one(source, tick);
+        queues.take_one(source, tick);
         let outgoing = match source.frame(tick, stamps) {
             Period::Frame(outgoing) => outgoing,
             Period::Empty => {
-                doors.finish_step(source, tick);
+                queues.finish_step(source, tick);
                 tick += 1;
                 continue;
             }
@@ -314,7 +314,7 @@ pub fn run_loop<C: Clock>(
             subscribers: publishers.iter().map(|publisher| publisher.subscribers()).sum(),
         };
         report(&mut reports, outgoing, sample);
-        doors.finish_step(source, tick);
+        queues.finish_step(source, tick);
         publishers.iter_mut().for_each(|publisher| publisher.prepare());
         tick += 1;
     }

@@ -101,7 +101,7 @@ pub struct Published {
     /// Lateness and step cost.
     pub summary: Summary,
     /// The counters of each transport with a queue, by the transport's name.
-    pub deliveries: BTreeMap<String, TransportCounters>,
+    pub transport_counters: BTreeMap<String, TransportCounters>,
     /// The transport's failure that ended the loop.
     pub error: Option<PublishError>,
 }
@@ -123,7 +123,7 @@ impl Publishing<'_> {
         clock: &C,
         source: &mut (dyn FrameSource + Send),
         transports: Vec<Box<dyn Transport>>,
-        mut doors: CommandQueues,
+        mut queues: CommandQueues,
         stop: &AtomicBool,
         hooks: Hooks,
     ) -> Result<Published, RunError> {
@@ -144,7 +144,7 @@ impl Publishing<'_> {
                         return None;
                     }
                 };
-                Some(run_loop(clock, source, &mut doors, &mut publishers, self.loop_options(), reports, stop))
+                Some(run_loop(clock, source, &mut queues, &mut publishers, self.loop_options(), reports, stop))
             });
             // The thread sends exactly once, or nothing if it panicked.
             let transports = opening.recv().unwrap_or(Err(RunError::Thread("loop's")));
@@ -172,9 +172,9 @@ impl Publishing<'_> {
         });
         let (counts, (summary, transports), error) = ended?;
         when_ended(counts);
-        let deliveries = transports.into_iter().filter_map(|transport| transport.finish());
-        let deliveries = deliveries.map(|(name, of)| (name.to_owned(), of)).collect();
-        Ok(Published { counts, summary, deliveries, error })
+        let transport_counters = transports.into_iter().filter_map(|transport| transport.finish());
+        let transport_counters = transport_counters.map(|(name, of)| (name.to_owned(), of)).collect();
+        Ok(Published { counts, summary, transport_counters, error })
     }
 
     /// Requests the scheduling of the calling thread, the loop's, and opens its ends of the transports.
@@ -366,7 +366,7 @@ mod tests {
         let (published, log) = run(true, Some(3.0));
         let published = published.unwrap();
         assert_eq!((published.counts.end, published.counts.frames + published.counts.skipped), (End::Duration, 3));
-        assert_eq!(published.deliveries["fake"].frames, 3);
+        assert_eq!(published.transport_counters["fake"].frames, 3);
         assert!(log.contains(&"opened") && log.ends_with(&["ended", "finish"]), "{log:?}");
     }
 

@@ -36,8 +36,8 @@ pub(super) struct Acknowledgements {
     depth: u64,
     /// Messages of the writer until now.
     written: u64,
-    /// Some of the last moments, the oldest first.
-    moments: VecDeque<Moment>,
+    /// Some of the last states, the oldest first.
+    states: VecDeque<WriterState>,
     /// The current subscribers.
     known: BTreeMap<GUID, Requests>,
     /// The time at which they were read.
@@ -47,7 +47,7 @@ pub(super) struct Acknowledgements {
 }
 
 /// The state of a writer at one time.
-struct Moment {
+struct WriterState {
     at: Instant,
     /// Messages until then.
     written: u64,
@@ -78,14 +78,14 @@ impl Acknowledgements {
         }
         self.read_at = Some(now);
         let before = std::mem::replace(&mut self.known, matches.subscribers(writer));
-        let is_due = self.moments.back().is_none_or(|last| now.duration_since(last.at) >= INTERVAL);
+        let is_due = self.states.back().is_none_or(|last| now.duration_since(last.at) >= INTERVAL);
         let (reliable, best_effort): (Vec<_>, Vec<_>) = self.known.iter().partition(|(_, requests)| requests.reliable);
         let best_effort = best_effort.into_iter().filter(|(reader, _)| is_due || !before.contains_key(reader));
         let mut due: Vec<(GUID, u64)> = best_effort.map(|(reader, _)| (*reader, self.written)).collect();
         if is_due {
             let readers = reliable.into_iter().map(|(reader, _)| *reader).collect();
-            self.moments.push_back(Moment { at: now, written: self.written, readers });
-            while let Some(old) = self.moments.pop_front_if(|first| now.duration_since(first.at) >= AGE) {
+            self.states.push_back(WriterState { at: now, written: self.written, readers });
+            while let Some(old) = self.states.pop_front_if(|first| now.duration_since(first.at) >= AGE) {
                 let readers = old.readers.into_iter().filter(|reader| self.known.contains_key(reader));
                 let written = old.written.min(self.written.saturating_sub(self.depth));
                 due.extend(readers.map(|reader| (reader, written)));

@@ -60,7 +60,8 @@ pub struct SubscriberReport {
     /// Its role.
     pub role: Role,
     /// The number of its processes.
-    pub incarnations: u64,
+    #[serde(rename = "incarnations")]
+    pub processes: u64,
     /// Counts and latencies, without those of the last second.
     pub seen: Observation,
 }
@@ -97,7 +98,7 @@ impl SubscriberReport {
         let report = |member: &Member| Self {
             label: member.label.clone(),
             role: member.role,
-            incarnations: member.starts,
+            processes: member.starts,
             seen: Observation { second: None, ..member.seen() },
         };
         fleet.members().iter().map(report).collect()
@@ -121,13 +122,13 @@ impl Report {
                     us(since_deadline.p99)
                 )
             });
-            let incarnations = match subscriber.incarnations {
+            let processes = match subscriber.processes {
                 1 => String::new(),
-                several => format!(" in {several} incarnations"),
+                several => format!(" by {several} processes"),
             };
-            format!("  {}: {} received{incarnations}, {} missed{latency}", subscriber.label, seen.received, seen.missed)
+            format!("  {}: {} received{processes}, {} missed{latency}", subscriber.label, seen.received, seen.missed)
         }));
-        lines.extend(self.deliveries().chain(self.conducting()).map(|sentence| format!("  {sentence}")));
+        lines.extend(self.transport_counters().chain(self.conducting()).map(|sentence| format!("  {sentence}")));
         lines
     }
 
@@ -144,8 +145,8 @@ impl Report {
     }
 
     /// Returns a sentence for each transport of the publisher with counters.
-    fn deliveries(&self) -> impl Iterator<Item = String> {
-        self.publisher.iter().flat_map(|summary| &summary.deliveries).map(
+    fn transport_counters(&self) -> impl Iterator<Item = String> {
+        self.publisher.iter().flat_map(|summary| &summary.transport_counters).map(
             |(name, TransportCounters { frames, skipped, discarded })| {
                 format!("{name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded")
             },
@@ -162,7 +163,7 @@ impl Report {
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Soak test: {verdict}</title>\n\
              <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}{dark}</style></head><body>\n<h1>Soak test: <span class=\"{verdict}\">{verdict}</span></h1>\n\
              <p><code>{command}</code></p>\n<p>{seconds:.1} s on {processor}, {cores} logical processors, Linux {kernel}; \
-             bench-dragon {version}.</p>\n{limits}{subscribers}{deliveries}{conducting}{plots}<p>Each point stands for {per_row} s and is the \
+             bench-dragon {version}.</p>\n{limits}{subscribers}{transport_counters}{conducting}{plots}<p>Each point stands for {per_row} s and is the \
              greatest value of its seconds. All latencies are CLOCK_MONOTONIC; those since the deadline include the \
              periods that were skipped.</p>\n</body></html>\n",
             verdict = self.verdict,
@@ -174,7 +175,8 @@ impl Report {
             version = self.version,
             limits = self.table_of_limits(),
             subscribers = self.table_of_subscribers(),
-            deliveries = self.deliveries().map(|sentence| format!("<p>{sentence}.</p>\n")).collect::<String>(),
+            transport_counters =
+                self.transport_counters().map(|sentence| format!("<p>{sentence}.</p>\n")).collect::<String>(),
             conducting = self.section_on_conducting(),
             dark = dark_rules(&plots),
             per_row = self.history.seconds_per_row(),
@@ -195,7 +197,7 @@ impl Report {
     fn table_of_subscribers(&self) -> String {
         let us = |ns: u64| format!("{:.1}", ns as f64 / 1e3);
         let rows = self.subscribers.iter().map(|subscriber| {
-            let SubscriberReport { label, incarnations, seen, .. } = subscriber;
+            let SubscriberReport { label, processes, seen, .. } = subscriber;
             let latencies = seen.total.map_or_else(
                 || "<td><td><td><td>".to_owned(),
                 |total| {
@@ -205,12 +207,12 @@ impl Report {
                 },
             );
             format!(
-                "<tr><td>{label}<td>{incarnations}<td>{}<td>{}<td>{}<td>{:.1e}{latencies}\n",
+                "<tr><td>{label}<td>{processes}<td>{}<td>{}<td>{}<td>{:.1e}{latencies}\n",
                 seen.received, seen.missed, seen.disordered, seen.worst_link_error
             )
         });
         format!(
-            "<table><tr><th>subscriber<th>incarnations<th>received<th>missed<th>out of order<th>worst link, m<th>latency p50, \
+            "<table><tr><th>subscriber<th>processes<th>received<th>missed<th>out of order<th>worst link, m<th>latency p50, \
              us<th>p99<th>max<th>since deadline p99\n{}</table>\n",
             rows.collect::<String>()
         )

@@ -15,7 +15,7 @@ use super::super::{CommandError, Common, Output};
 
 /// The line of `--json` for a valid certificate.
 #[derive(Serialize)]
-struct Verdict<'a> {
+struct ProvedLine<'a> {
     verdict: &'static str,
     scene_hash: String,
     #[serde(flatten)]
@@ -36,7 +36,7 @@ pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refuse
     let mut output = Output::standard();
     let scene_hash = hexadecimal(&scene_hash(&proved.scene));
     if common.json {
-        output.json(&Verdict { verdict: "proved", scene_hash, proved: &proved })?;
+        output.json(&ProvedLine { verdict: "proved", scene_hash, proved: &proved })?;
         return output.finish();
     }
     output.line(&format!("BLAKE3 of the scene's text: {scene_hash}"))?;

@@ -7,7 +7,7 @@ use super::contact::{Boards, Touch};
 use super::geometry::{Path, Vector};
 
 /// The checker's result for a scene. Times are metres of the head.
-pub struct Verdict {
+pub struct CheckerResult {
     pub contact: Result<Option<Touch>, String>,
     pub stall: Option<(f64, usize)>,
     pub lock: Option<(f64, usize)>,
@@ -17,7 +17,7 @@ pub struct Verdict {
 }
 
 /// Returns the checker's own events of a team on a path.
-pub fn verdict(chain: &Chain) -> Verdict {
+pub fn verdict(chain: &Chain) -> CheckerResult {
     let mut doubts = Vec::new();
     if !chain.is_complete() {
         doubts.push("stalls and jumps: searched in part only".to_owned());
@@ -34,7 +34,7 @@ pub fn verdict(chain: &Chain) -> Verdict {
     let stall = chain.stall(before);
     let contact = Boards { chain }.first_contact(before);
     doubts.extend(contact.clone().err());
-    Verdict { contact, stall, lock: lock.map(|(at, bench, _)| (at, bench)), end, doubts }
+    CheckerResult { contact, stall, lock: lock.map(|(at, bench, _)| (at, bench)), end, doubts }
 }
 
 /// The checker's events and the program's, compared.
@@ -81,7 +81,7 @@ impl Comparison {
         (one - other).abs() <= self.tolerance
     }
 
-    fn ends(&mut self, verdict: &Verdict, chain: &Chain, lock: Option<&Event>, path_end: Option<&Event>) {
+    fn ends(&mut self, verdict: &CheckerResult, chain: &Chain, lock: Option<&Event>, path_end: Option<&Event>) {
         match (verdict.lock, lock) {
             (Some((at, bench)), Some(event)) if self.near(at, event.time) => {
                 self.compared.push("lock");
@@ -107,7 +107,7 @@ impl Comparison {
         }
     }
 
-    fn stalls(&mut self, verdict: &Verdict, chain: &Chain, event: Option<&Event>) {
+    fn stalls(&mut self, verdict: &CheckerResult, chain: &Chain, event: Option<&Event>) {
         // Doubtful: a cosine that is zero within rounding, at a place that both find in the motion.
         let grazes =
             |at: f64| chain.pose(at.min(verdict.end)).handles.iter().any(|handle| handle.front_cosine.abs() < 1e-12);
@@ -137,7 +137,7 @@ impl Comparison {
         }
     }
 
-    fn contacts(&mut self, verdict: &Verdict, boards: &Boards, event: Option<&Event>) {
+    fn contacts(&mut self, verdict: &CheckerResult, boards: &Boards, event: Option<&Event>) {
         let Ok(contact) = &verdict.contact else { return };
         match (contact, event) {
             (Some(touch), Some(event)) if self.near(touch.head, event.time) => {

@@ -60,8 +60,8 @@ fn run(data: &[u8]) -> bool {
     };
     let show = Show::new(scene, timeline.clone(), playback).expect("a start before the end");
     let mut show = ShowSource::new(show);
-    let (port, mut door) = command_queue();
-    let mut doors = CommandQueues::new(vec![port]);
+    let (port, mut sender) = command_queue();
+    let mut queues = CommandQueues::new(vec![port]);
     let (mut tick, mut epoch, mut held_at) = (0u64, 0u32, None);
     // Unanswered commands, by their tickets.
     let mut sent: Vec<(u64, u64, Command, Option<Code>)> = Vec::new();
@@ -74,13 +74,13 @@ fn run(data: &[u8]) -> bool {
             Ok(command) => (command, None),
             Err(code) => (Command::State, Some(code)),
         };
-        if let Ok(ticket) = door.send(command) {
+        if let Ok(ticket) = sender.send(command) {
             sent.push((ticket, request.id, command, instead));
         }
         let periods = u64::from(step[REQUEST]);
         let before = tick;
         tick = tick.saturating_add(if periods < 200 { periods + 1 } else { 1 << (periods - 200).min(40) });
-        doors.take_one(&mut show, tick);
+        queues.take_one(&mut show, tick);
         let frame = show.show.frame(tick);
         assert!((0.0..=20.0).contains(&frame.sim_time), "{} s at tick {tick}", frame.sim_time);
         assert!(frame.chain.x.iter().chain(&frame.chain.y).all(|number| number.is_finite()));
@@ -98,8 +98,8 @@ fn run(data: &[u8]) -> bool {
         } else {
             assert!(held_at.take().is_none() || command == Command::Release, "{command:?} ends a hold");
         }
-        doors.finish_step(&mut show, tick);
-        while let Some(Answer { ticket, outcome }) = door.answer() {
+        queues.finish_step(&mut show, tick);
+        while let Some(Answer { ticket, outcome }) = sender.answer() {
             let of_ticket =
                 sent.iter().position(|(sent, ..)| *sent == ticket).expect("one answer to a command that was sent");
             let (_, id, command, instead) = sent.remove(of_ticket);

@@ -12,16 +12,16 @@ use crate::harness::text;
 const HEADER: &str = "t,handle,x,y,heading,vx,vy,speed";
 
 /// The handles at one time, as printed: x, y, heading, vx, vy, speed.
-struct Moment {
+struct SolvedTime {
     time: f64,
     handles: Vec<[f64; 6]>,
 }
 
 /// Reads the table, and fails unless it has its header and every handle of every time in order.
-fn read_csv(scene: &SceneFile, csv: &str) -> Vec<Moment> {
+fn read_csv(scene: &SceneFile, csv: &str) -> Vec<SolvedTime> {
     let mut lines = csv.lines();
     assert_eq!(lines.next(), Some(HEADER), "{}", scene.name);
-    let mut moments: Vec<Moment> = Vec::new();
+    let mut moments: Vec<SolvedTime> = Vec::new();
     for (row, line) in lines.enumerate() {
         let fields: Vec<&str> = line.split(',').collect();
         let [time, handle, ref numbers @ ..] = fields[..] else { panic!("{line}") };
@@ -30,7 +30,7 @@ fn read_csv(scene: &SceneFile, csv: &str) -> Vec<Moment> {
         let number = |field: &&str| if field.is_empty() { f64::NAN } else { field.parse().unwrap() };
         let numbers: Vec<f64> = numbers.iter().map(number).collect();
         if handle == 0 {
-            moments.push(Moment { time: time.parse().unwrap(), handles: Vec::new() });
+            moments.push(SolvedTime { time: time.parse().unwrap(), handles: Vec::new() });
         }
         let moment = moments.last_mut().unwrap();
         assert!(same_bits(time.parse().unwrap(), moment.time), "{line}");
@@ -40,7 +40,7 @@ fn read_csv(scene: &SceneFile, csv: &str) -> Vec<Moment> {
     moments
 }
 
-fn read_json(scene: &SceneFile, lines: &str) -> Vec<Moment> {
+fn read_json(scene: &SceneFile, lines: &str) -> Vec<SolvedTime> {
     let moment = |line: &str| {
         let object: serde_json::Value = serde_json::from_str(line).unwrap();
         assert_keys(&object, &["t", "handles"]);
@@ -50,13 +50,13 @@ fn read_json(scene: &SceneFile, lines: &str) -> Vec<Moment> {
         let numbers = numbers(line);
         let (time, rest) = (numbers[0], &numbers[1..]);
         let handles = rest.chunks(6).map(|handle| handle.try_into().unwrap());
-        Moment { time, handles: handles.collect() }
+        SolvedTime { time, handles: handles.collect() }
     };
     lines.lines().map(moment).collect()
 }
 
 /// Returns the results of the library's own solver at these times.
-fn solved(scene: &SceneFile, times: &[f64]) -> Vec<Moment> {
+fn solved(scene: &SceneFile, times: &[f64]) -> Vec<SolvedTime> {
     let loaded = scene.load();
     let mut solver = loaded.motion.solver(loaded.velocities).solver;
     let mut chain = Chain::new(scene.handles());
@@ -64,12 +64,12 @@ fn solved(scene: &SceneFile, times: &[f64]) -> Vec<Moment> {
         solve_at_or_just_before(solver.as_mut(), *time, &mut chain).unwrap();
         let Chain { x, y, heading, vx, vy, speed } = &chain;
         let handles = (0..chain.handles()).map(|i| [x[i], y[i], heading[i], vx[i], vy[i], speed[i]]);
-        Moment { time: *time, handles: handles.collect() }
+        SolvedTime { time: *time, handles: handles.collect() }
     };
     times.iter().map(&mut moment).collect()
 }
 
-fn assert_same(scene: &SceneFile, printed: &[Moment], expected: &[Moment]) {
+fn assert_same(scene: &SceneFile, printed: &[SolvedTime], expected: &[SolvedTime]) {
     assert_eq!(printed.len(), expected.len(), "{}", scene.name);
     for (a, b) in printed.iter().zip(expected) {
         assert!(same_bits(a.time, b.time), "{}: {} and {} s", scene.name, a.time, b.time);
@@ -134,7 +134,7 @@ fn handles_stand_on_the_path_a_link_apart() {
     for scene in scenes() {
         let (words, _) = times(&scene);
         let outline = Outline::of(&scene);
-        for Moment { time, handles } in read_csv(&scene, &scene.answer(&["solve", "--at", &words])) {
+        for SolvedTime { time, handles } in read_csv(&scene, &scene.answer(&["solve", "--at", &words])) {
             for (i, handle) in handles.iter().enumerate() {
                 let [x, y, heading, vx, vy, speed] = *handle;
                 let who = format!("{} at {time} s, handle {i}", scene.name);
@@ -169,7 +169,7 @@ fn followers_on_a_spiral_are_the_first_points_at_their_distance() {
         let radius_per_radian = scene.number("path", "pitch") / std::f64::consts::TAU;
         let end = scene.json(&["events"]).pop().unwrap()["time"].as_f64().unwrap();
         let times = format!("0,{},{}", 0.5 * end, 0.9 * end);
-        for Moment { time, handles } in read_csv(&scene, &scene.answer(&["solve", "--at", &times])) {
+        for SolvedTime { time, handles } in read_csv(&scene, &scene.answer(&["solve", "--at", &times])) {
             let lengths =
                 handles.iter().map(|[x, y, ..]| spiral_length(radius_per_radian, x.hypot(*y) / radius_per_radian));
             let lengths: Vec<f64> = lengths.collect();

@@ -70,7 +70,7 @@ pub struct RunSummary {
     pub end: End,
     /// The counters of each transport with a queue, by the transport's name.
     #[serde(flatten)]
-    pub deliveries: BTreeMap<String, TransportCounters>,
+    pub transport_counters: BTreeMap<String, TransportCounters>,
 }
 
 /// The run, and the destinations of its statistics.

@@ -18,7 +18,7 @@ use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::scene::AtEnd;
 use bench_dragon_show::{Playback, Show};
 use bench_dragon_testing::simulated::Wake;
-use setup::{File, NEWTON, RATE, Setup, Shared, conducted, forged, scene_text, verified};
+use setup::{File, NEWTON, RATE, Setup, SharedFile, conducted, forged, scene_text, verified};
 
 /// Every command, with values that are in range and some that are not.
 fn commands() -> impl Strategy<Value = Command> {
@@ -171,7 +171,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     }
     let file = File::default();
     let line = ShowLine::new(&scene_text(NEWTON, false), &playback, Arithmetic::of(&scene), "", (1, 2));
-    let mut writer = LogWriter::new(Shared(file.clone()), line);
+    let mut writer = LogWriter::new(SharedFile(file.clone()), line);
     reader.empty(&mut writer);
     let counts = writer.counts();
     // Four frames, the ticks of six, and of the next with its three commands; that of the one behind has no room whole.
@@ -191,7 +191,7 @@ fn a_frame_is_read_when_all_of_it_has_come() {
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
     let line = ShowLine::new(&text, &playback, Arithmetic::of(&scene), "", (1, 2));
-    let mut writer = LogWriter::new(Shared(File::default()), line);
+    let mut writer = LogWriter::new(SharedFile(File::default()), line);
     publisher.publish(Outgoing::new(&FrameHeader::default(), show.frame(0))).unwrap();
     let mut whole = vec![0.0; reader.queue.slots()];
     reader.queue.pop_entire_slice(&mut whole).unwrap();

@@ -39,20 +39,20 @@ pub const NEWTON: &str = "solver = \"newton\"";
 /// A show with commands: each frame sends the next command and takes the answers.
 pub struct Conducted {
     show: ShowSource,
-    door: CommandSender,
+    sender: CommandSender,
     commands: std::vec::IntoIter<Command>,
     answers: Rc<RefCell<Vec<Outcome>>>,
 }
 
 impl Conducted {
     fn exchange(&mut self) {
-        while let Some(answer) = self.door.answer() {
+        while let Some(answer) = self.sender.answer() {
             self.answers.borrow_mut().push(answer.outcome);
         }
-        if self.door.waiting() < 2
+        if self.sender.waiting() < 2
             && let Some(command) = self.commands.next()
         {
-            self.door.send(command).unwrap();
+            self.sender.send(command).unwrap();
         }
     }
 }
@@ -75,9 +75,9 @@ impl FrameSource for Conducted {
 pub type File = Rc<RefCell<Vec<u8>>>;
 
 /// A file in memory.
-pub struct Shared(pub File);
+pub struct SharedFile(pub File);
 
-impl std::io::Write for Shared {
+impl std::io::Write for SharedFile {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         self.0.borrow_mut().extend_from_slice(bytes);
         Ok(bytes.len())
@@ -92,7 +92,7 @@ impl std::io::Write for Shared {
 pub struct Inline {
     publisher: LogPublisher,
     reader: LogReader,
-    writer: LogWriter<Shared>,
+    writer: LogWriter<SharedFile>,
     held_up: fn(u64) -> bool,
     ended: Rc<Cell<Option<LoopCounts>>>,
 }
@@ -183,20 +183,20 @@ impl Setup {
         let file = File::default();
         let (publisher, reader) = queue_of(self.words, 200);
         let ended = Rc::new(Cell::new(None));
-        let writer = LogWriter::new(Shared(file.clone()), line);
+        let writer = LogWriter::new(SharedFile(file.clone()), line);
         let publisher = Inline { publisher, reader, writer, held_up: self.held_up, ended: ended.clone() };
-        let (port, door) = command_queue();
+        let (port, sender) = command_queue();
         let answers = Rc::new(RefCell::new(Vec::new()));
         let show = ShowSource::new(show);
-        let mut frames = Conducted { show, door, commands: self.commands.into_iter(), answers: answers.clone() };
+        let mut frames = Conducted { show, sender, commands: self.commands.into_iter(), answers: answers.clone() };
         let clock = SimulatedClock::new(5, self.wakes);
         let (samples, _inbox) = rtrb::RingBuffer::new(1);
         let (announcements, _lines) = rtrb::RingBuffer::new(1);
         let options = LoopOptions { run_id: 7, rate: playback.rate, periods: Some(self.periods) };
         let mut publishers: Vec<Box<dyn Publisher>> = vec![Box::new(Failing(self.fails_at)), Box::new(publisher)];
         let reports = Reports::new(samples, announcements);
-        let mut doors = CommandQueues::new(vec![port]);
-        let counts = run_loop(&clock, &mut frames, &mut doors, &mut publishers, options, reports, &clock.stop);
+        let mut queues = CommandQueues::new(vec![port]);
+        let counts = run_loop(&clock, &mut frames, &mut queues, &mut publishers, options, reports, &clock.stop);
         let counts = counts.unwrap_or_else(|(counts, _)| counts);
         frames.exchange();
         ended.set(Some(counts));

@@ -26,7 +26,7 @@ pub(super) struct Player {
     hasher: FrameHasher,
     /// The frames since the latest hash: the first tick, and their number.
     hashed: Option<(u64, u64)>,
-    latest: Sample,
+    latest: LatestFrame,
     difference: Option<Difference>,
     counts: VerifiedCounts,
     /// The part of the counts since the latest hash.
@@ -35,7 +35,7 @@ pub(super) struct Player {
 
 /// The latest frame, as in the line of a second.
 #[derive(Default)]
-struct Sample {
+struct LatestFrame {
     tick: u64,
     sim_time: f64,
     handles: Vec<(u32, f64, f64)>,
@@ -72,7 +72,7 @@ impl Player {
             command_line: 0,
             hasher: FrameHasher::default(),
             hashed: None,
-            latest: Sample::default(),
+            latest: LatestFrame::default(),
             difference: None,
             counts: VerifiedCounts::default(),
             uncompared: VerifiedCounts::default(),
@@ -292,7 +292,7 @@ impl Player {
     }
 }
 
-impl Sample {
+impl LatestFrame {
     fn note(&mut self, frame: &Frame) {
         (self.tick, self.sim_time) = (frame.tick, frame.sim_time);
         self.handles.clear();
