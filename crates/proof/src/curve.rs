@@ -338,9 +338,9 @@ pub(super) fn read_piece(
     }
 }
 
-/// Returns the polar angle `metres` of a spiral further out than `first`, further in if they are negative, by a step of
-/// Newton's method from a guess: the root is within an interval if the step from its middle leads there with every rate
-/// in it.
+/// Returns the polar angle `metres` of a spiral further out than `first`, further in if they are negative. The angle
+/// comes from a step of Newton's method from a guess. The root is within an interval if the step from its middle leads
+/// into the interval with every rate in it.
 fn last_angle(a: &Interval, first: &Interval, metres: &Interval) -> Result<Interval, String> {
     let outward = Curve::outward(*a);
     let step = |from: f64, within: &Interval| {

@@ -62,8 +62,8 @@ impl FirstOrder {
         Ok(Self::behind(scene, chain, at, (Interval::new(1.0), Interval::new(0.0), half_step)))
     }
 
-    /// Encloses the listed handles of a chain from one time of the show to another (Lemma 12, *Further apart*). tau is
-    /// the time from the middle of the two, in seconds.
+    /// Encloses the listed handles of a chain from one time of the show to another (Lemma 12, *Further apart*). Here
+    /// tau is the time from the middle of the two, in seconds.
     ///
     /// # Errors
     /// A place that is missing or not in its span.
@@ -261,8 +261,8 @@ impl FirstOrderBoard {
         }
     }
 
-    /// Returns a point of the board, by its parts along the board and to the left, as shares of half its length and
-    /// half its width.
+    /// Returns a point of the board, by its parts along the board and to the left. They are shares of half its length
+    /// and half its width.
     fn point(&self, [ahead, left]: [f64; 2], when: When) -> Linear {
         let along = self.along(when);
         let share = self.half_length / self.link * Interval::new(ahead);
@@ -353,7 +353,7 @@ impl FirstOrderBoard {
         (least - most) / size
     }
 
-    /// Returns true if the gap between the board and the convex hull of some segments is shown to be more than `metres`
+    /// Returns true if the gap between the board and the convex hull of some segments is shown to exceed `metres`
     /// throughout the step (Lemma 11).
     pub fn is_clear_of(&self, segments: &[[Vector; 2]], metres: &Interval) -> bool {
         let rough: Vec<_> = segments.iter().map(|ends| ends.map(|end| [end.x.rough(), end.y.rough()])).collect();
@@ -368,8 +368,8 @@ impl FirstOrderBoard {
         })
     }
 
-    /// Returns the point of the front handle's place at tau = 0, if it is shown to be in the board then, and to stay in
-    /// it if the board is moved by `metres`.
+    /// Returns the point p(m) of the front handle, or `None`. The point is returned only if it is shown to be in the
+    /// board at tau = 0, also with the board moved by `metres`.
     pub fn inner_point(&self, metres: &Interval) -> Option<&Vector> {
         let inset = self.half_length - self.link * Interval::new(0.5);
         let off = self.front.error(When::Middle) + metres;

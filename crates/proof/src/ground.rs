@@ -1,5 +1,5 @@
-//! The obstacles of a stage: their shapes in the path's own coordinates, boards that stay clear of them (Lemma 9 of
-//! docs/proofs.md), boards that have come within their keep-out, and clearances (Lemma 11).
+//! The obstacles of a stage, with their shapes in the path's own coordinates. Lemma 9 of docs/proofs.md: boards that
+//! stay clear of them, and boards that have come within their keep-out. Lemma 11: clearances.
 
 use serde::Deserialize;
 

@@ -165,8 +165,8 @@ fn smaller(a: Number, b: Number) -> Number {
     if b < a { b } else { a }
 }
 
-/// Returns numbers below and above the root of a number of at least 0: for every s > 0, the root lies between s and x
-/// / s. Near the root, one step of Newton's method brings the two together.
+/// Returns numbers below and above the root of a number of at least 0. For every s > 0, the root lies between s and x /
+/// s. Near the root, one step of Newton's method brings the two together.
 fn root(x: Number) -> (Number, Number) {
     if !x.is_positive() {
         return (x, x);

@@ -178,7 +178,7 @@ struct Checker {
     about: About,
     /// The dragon of a scene of one, or all.
     scenes: Vec<Scene>,
-    /// What the sections of dragons have shown; `None` in a scene of one.
+    /// Facts that the sections of dragons have shown; `None` in a scene of one.
     alone: Option<Vec<Alone>>,
     /// True in the section of a dragon.
     is_in_section: bool,

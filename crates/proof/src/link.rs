@@ -109,8 +109,8 @@ fn slack(capsule: &Capsule, slope: &Interval, distance: &Interval) -> Interval {
     (Interval::new(2.0) * slope + (Interval::new(1.0) + curvature * distance) * half) * half
 }
 
-/// Returns true if D(u, x) < l^2 for all u of the front and all x of a stretch, by Taylor's formula about the middles
-/// of both.
+/// Returns true if D(u, x) < l^2 for all u of the front and all x of a stretch. Taylor's formula about the middles of
+/// both shows it.
 fn is_stretch_nearer(pair: &Pair, squared: &Interval) -> bool {
     let Pair { front, rear, distance, .. } = pair;
     // An upper bound of |g(u, m_x)| for all u of the front.

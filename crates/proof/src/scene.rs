@@ -192,8 +192,8 @@ impl Scene {
         Ok(Self { name, delay, frame, team, path, head_speed, obstacles })
     }
 
-    /// Returns the seconds of the show at which the head has travelled some metres: before the path's start 0, and at
-    /// it from 0 until it begins to move.
+    /// Returns the seconds of the show at which the head has travelled some metres. Up to the path's start they are 0.
+    /// If the metres may or may not be positive, the seconds begin at 0.
     pub fn time(&self, travelled: &Interval) -> Interval {
         let zero = Interval::new(0.0);
         let seconds = (travelled / self.head_speed).max(&zero);

@@ -11,7 +11,7 @@ use super::path::{Place, Span};
 use super::scene::Scene;
 use super::steps::{Steps, straight_run};
 
-/// What the section of a dragon has shown.
+/// Facts that the section of a dragon has shown.
 pub(super) struct Alone {
     /// The end of its last step.
     end: Option<Place>,
@@ -41,9 +41,9 @@ impl Alone {
     }
 }
 
-/// What a stretch of time is said to show of two dragons, whose links do not lock.
+/// Claim about two dragons over an interval of time in which their links do not lock.
 pub(super) enum Claim<'c> {
-    /// Nothing of their boards.
+    /// No claim about their boards.
     Links,
     /// No boards of the two touch.
     Clear,
@@ -54,8 +54,8 @@ pub(super) enum Claim<'c> {
 /// The section of two dragons.
 pub(super) struct Pair {
     pub dragons: [usize; 2],
-    /// Seconds up to which stretches follow one another from the start, and true if all of them were clear, and if all
-    /// say how far boards are apart.
+    /// Seconds up to which stretches follow one another from the start. The two flags are true if all of them were
+    /// clear, and if all say how far boards are apart.
     end: Option<f64>,
     all_clear: bool,
     all_apart: bool,
@@ -81,8 +81,8 @@ struct Together {
     links: u64,
 }
 
-/// Returns true if a head is surely in a span from one time to another: it stands at the start before its delay has
-/// passed, and at the path's end.
+/// Returns true if a head is surely in a span from one time to another. The head stands at the start before its delay
+/// has passed, and at the path's end.
 fn is_in_span(scene: &Scene, Span(lo, hi): Span, from: &Interval, to: &Interval) -> bool {
     scene.path.travelled(lo).is_at_most(&scene.travelled_at(from))
         && (scene.path.is_at_end(hi) || scene.travelled_at(to).is_at_most(&scene.path.travelled(hi)))

@@ -47,15 +47,15 @@ impl Sides {
         least - most
     }
 
-    /// Returns the parts of a point along the board and to the left, as shares of half its length and half its width,
-    /// at most 1: the nearest point of the board.
+    /// Returns the point of the board nearest to another point, by its parts along the board and to the left. They are
+    /// shares of half its length and half its width, from -1 to 1.
     pub fn shares_of(&self, point: [f64; 2]) -> [f64; 2] {
         let [along, aside] = self.seen(minus(point, self.centre));
         [(along / self.half_length).clamp(-1.0, 1.0), (aside / self.half_width).clamp(-1.0, 1.0)]
     }
 
-    /// Returns the share of the way along a segment at which the point nearest to the board is, and the vector to it
-    /// from the board.
+    /// Returns the point of a segment nearest to the board, as a share of the way along the segment. Returns also the
+    /// vector from the board to that point.
     pub fn nearest_of([from, to]: [[f64; 2]; 2], board: &Self) -> (f64, [f64; 2]) {
         let along = minus(to, from);
         let at = |share: f64| [0, 1].map(|part| from[part] + share * along[part]);
@@ -76,8 +76,8 @@ impl Sides {
         all.min_by(|one, other| square(one).total_cmp(&square(other))).unwrap_or((0.0, [0.0; 2]))
     }
 
-    /// Returns unit vectors along which segments may be apart from the board: to the nearest point of each, its
-    /// normals, and the normals of the board's sides.
+    /// Returns unit vectors along which segments may be apart from the board. They lead to the nearest point of each
+    /// segment, or are normals of each segment or of the board's sides.
     pub fn directions_to(&self, segments: &[[[f64; 2]; 2]]) -> Vec<[f64; 2]> {
         let [x, y] = self.axis;
         let mut directions = vec![[x, y], [-y, x], [-x, -y], [y, -x]];
@@ -108,8 +108,8 @@ impl Sides {
         if dot(there, there) <= dot(back, back) { there } else { back.map(std::ops::Neg::neg) }
     }
 
-    /// Returns the corner of this board and the side of another that are nearest to each other, by number, and the
-    /// nearest point of the side: its share of the way from the side's first corner to the next, from 0 to 1.
+    /// Returns the corner of this board and the side of another that are nearest to each other, by number. The last
+    /// number is the nearest point's share of the way from the side's first corner to the next, from 0 to 1.
     pub fn nearest_point(&self, other: &Self) -> (usize, usize, f64) {
         let (own, its) = (self.corners(), other.corners());
         let pairs = (0..4).flat_map(|corner| (0..4).map(move |side| (corner, side)));

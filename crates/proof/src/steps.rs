@@ -366,8 +366,8 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
     Ok(pairs + about as u64)
 }
 
-/// Returns the first and the last handle of the boards from `first` on, where the last listed handle is on segment 0, a
-/// line; and the metres between the two.
+/// Returns the first and the last handle of the boards from `first` on, and the metres between the two. Precondition:
+/// the last listed handle is on segment 0, a line.
 pub(super) fn straight_run(scene: &Scene, chain: &Chain, first: usize) -> (Capsule, Capsule, Interval) {
     let (team, last) = (&scene.team, chain.last());
     let length = team.links(first, team.benches - 1);

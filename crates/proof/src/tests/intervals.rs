@@ -1,6 +1,6 @@
-//! Every operation on intervals encloses the exact result: against integers for `+`, `-`, `*`, `/` and roots, against
-//! 512 bits of `astro-float` for the elementary functions. Single operations on numbers are rounded to the nearest
-//! number in their direction.
+//! Every operation on intervals encloses the exact result. Integers show this for `+`, `-`, `*`, `/` and roots, 512
+//! bits of `astro-float` for the elementary functions. Single operations on numbers are rounded to the nearest number
+//! in their direction.
 
 use astro_float::{BigFloat, Consts, RoundingMode, Sign};
 use fastrand::Rng;
