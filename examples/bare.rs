@@ -1,5 +1,5 @@
-//! A bare iceoryx2 publisher and subscriber of a payload as large as the paper's frames, with none of this project's
-//! code: the cost of the transport itself. `python3 benches/latency.py` compares the live publisher with it.
+//! A bare iceoryx2 publisher and subscriber, without this project's code, of a payload as large as the paper's frames.
+//! This measures the cost of the transport itself. `python3 benches/latency.py` compares the live publisher with it.
 //!
 //! `bare publish NAME SECONDS` sends 1,000 samples a second; `bare subscribe NAME SECONDS` receives them for SECONDS
 //! and prints the latency from sending to receiving as a line of JSON.

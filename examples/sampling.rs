@@ -1,5 +1,5 @@
-//! Cost and error of sampling: the paper's way of finding the contact, every pair at every hundredth of a second,
-//! beside the exact search, in one run.
+//! Cost and error of sampling, beside the exact search, in one run. The paper finds the contact by sampling: every pair
+//! at every hundredth of a second.
 //!
 //! `cargo run --release --example sampling`
 

@@ -82,8 +82,8 @@ impl Common {
         self.names.first().map_or("", String::as_str)
     }
 
-    /// Tests the names: each once, one alone for a command of one publisher, all in one place, since clap replaces
-    /// those before the command by those after it.
+    /// Tests the names. Each name is given once, and a command of one publisher has one name. All stand in one place,
+    /// since clap replaces those before the command by those after it.
     ///
     /// # Errors
     /// Bad input: the sentence says what was expected.
@@ -326,8 +326,8 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Ends this program with a sentence if no page of shared memory is available, which Linux signals by SIGBUS: other
-/// processes have filled /dev/shm since the last test.
+/// Ends this program with a sentence if no page of shared memory is available, since other processes have filled
+/// /dev/shm. Linux signals this by SIGBUS.
 pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
     const SENTENCE: &[u8] = b"error: /dev/shm is full: remove what fills it, or make it larger\n";
     let end = || {

@@ -80,8 +80,8 @@ impl ProvedBounds {
         Self { lo, hi, status, proved_until: until.map(rounded_down), time }
     }
 
-    /// Creates the fields of an enclosure, if there is one: its bounds, the metres of travel up to which they hold, and
-    /// those where the upper bound is met.
+    /// Creates the fields of an enclosure, if there is one. They are its bounds, the metres of travel up to which they
+    /// hold, and those where the upper bound is met.
     fn of(found: Option<([f64; 2], Option<f64>, f64)>, time_at: impl Fn(f64) -> f64) -> Self {
         let Some(([lo, hi], until, travelled)) = found else { return Self::new(None, None, None, None) };
         Self::new(Some(lo), Some(hi), until.map(&time_at), Some(time_at(travelled)))

@@ -44,7 +44,7 @@ pub struct RecordArguments {
     /// recorded by default), markers, clock, tf
     #[arg(long, value_name = "TOPICS", value_delimiter = ',', value_parser = topic, conflicts_with = "recover")]
     topics: Vec<Topic>,
-    /// Begin another file after so much (1GB, 500MB) or so long (1h, 90s); one begins with every run anyway
+    /// Size or duration (1GB, 500MB, 1h, 90s) at which the next file begins; each run begins another file anyway
     #[arg(long, value_name = "SIZE|TIME", value_parser = split, conflicts_with = "recover")]
     split: Option<Split>,
     /// Wall time after which to end: 60, 90s, 5m, 8h

@@ -41,7 +41,7 @@ pub struct ReplayArguments {
         allow_negative_numbers = true
     )]
     rate: Option<f64>,
-    /// So many times as fast as recorded
+    /// Playback speed, as a factor of the recorded speed
     #[arg(long, value_name = "X", default_value_t = 1.0, help_heading = "The show", allow_negative_numbers = true)]
     time_scale: f64,
     /// Begin with the first frame of the recording at or after these simulated seconds

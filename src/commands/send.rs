@@ -49,8 +49,7 @@ struct PsnArguments {
     /// Which handles of each dragon, counted from 1: all, head, tail, 1,2,9 or head,20-40
     #[arg(long, value_name = "WHICH", default_value = "all")]
     trackers: Selection,
-    /// The stage's axes for the desk's x, y and z: x, y (into the depth) and up, in any order, with a minus to reverse
-    /// one
+    /// The stage's axes for the desk's x, y and z: x, y (into the depth) and up, in any order; a minus reverses one
     #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
     axes: Axes,
     /// Number of networks that multicast may pass, this one included
@@ -87,7 +86,7 @@ struct OscArguments {
 /// Arguments of `send ros2`.
 #[derive(Debug, Clone, clap::Args)]
 struct Ros2Arguments {
-    /// Offer services that conduct the show, to everybody whom ROS 2 reaches
+    /// Offer services that conduct the show, to every ROS 2 node on the network
     #[arg(long)]
     control: bool,
     #[command(flatten)]

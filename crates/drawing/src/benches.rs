@@ -146,7 +146,8 @@ mod tests {
 
     #[test]
     fn only_boards_that_overlap_and_share_no_handle_are_pairs() {
-        // Boards 3 m long and 1 m wide: 0 and 2 overlap by 0.25 m, 0 and 3 touch, 1 overlaps 0 but shares a handle.
+        // Boards 3 m long and 1 m wide. Boards 0 and 2 overlap by 0.25 m, and boards 0 and 3 touch. Board 1 overlaps
+        // board 0 but shares a handle with it.
         let boards = [(0, lying(0.0, 0.0)), (1, lying(0.5, 0.5)), (2, lying(1.0, 0.75)), (3, lying(0.0, -1.0))];
         let found = overlapping(&boards, 1e-9);
         assert_eq!(found.iter().map(|pair| (pair.0, pair.1)).collect::<Vec<_>>(), [(0, 2)]);

@@ -1,7 +1,7 @@
 //! The lantern look: the stage at night in the light of the dragon's lanterns, without script and without filter.
 //!
 //! The look is that of the page's show (`crates/outputs/src/view/lanterns.js`). Light on the ground is a mask over
-//! paving: pools of light are white circles in the mask, which cover one another as light adds up. The boards are the
+//! paving. Pools of light are white circles in the mask, which cover one another as light adds up. The boards are the
 //! true rectangles.
 
 use svg::node::element::{

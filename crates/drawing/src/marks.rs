@@ -75,8 +75,8 @@ impl Happened {
         sentence + " (counting from 1)"
     }
 
-    /// Returns the mark of the event: a ring and a cross for a contact or an obstacle, a diamond for a stall, a square
-    /// for a lock. It has the colour of danger if the event is now, a quiet colour if it was before.
+    /// Returns the mark of the event. A contact or an obstacle has a ring and a cross, a stall a diamond, a lock a
+    /// square. The mark has the colour of danger if the event is now, and a quiet colour if it was before.
     pub fn sign(&self, (x, y): (f64, f64), palette: &Palette) -> Group {
         let colour = match self.tense {
             Tense::Present => palette.danger,

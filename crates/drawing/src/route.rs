@@ -81,8 +81,8 @@ fn arc_point(segment: &SegmentOutline, curvature: f64, part: f64) -> Point {
 fn arc(data: &mut String, segment: &SegmentOutline, curvature: f64) {
     let radius = metres(1.0 / curvature.abs());
     let left = u8::from(curvature > 0.0);
-    // At most a third of a turn each: the large-arc flag is never needed, and a whole circle is not one arc, which SVG
-    // does not allow.
+    // Each arc is at most a third of a turn, so that the large-arc flag is never needed. SVG does not allow a whole
+    // circle as one arc.
     let steps = (curvature.abs() * segment.length / (TAU / 3.0)).ceil().max(1.0);
     let _ = write!(data, "M{}", pair(segment.start));
     for step in 1..=steps as u64 {

@@ -1,6 +1,6 @@
 //! The colour of a bench: its mean speed over one link passage, on a scale about the head's speed.
 //!
-//! The scale is that of the page (`SpeedScale` of `crates/outputs/src/view/palette.js`): a colour means the same speed
+//! The page has the same scale (`SpeedScale` of `crates/outputs/src/view/palette.js`). So a colour means the same speed
 //! on the page, in a picture of `draw` and in the documents. `draw` calls [`mean_speeds`].
 
 use bench_dragon_motion::Motion;

@@ -1,7 +1,7 @@
 //! The publisher: a fixed-rate loop whose frames go into shared memory and to any other transport.
 //!
-//! [`live`] is the loop, its statistics and its command queue; [`transports`] carry frames to other processes;
-//! [`log`](mod@log) writes commands and hashes, from which a run can be computed again; [`run`] starts and stops all of
+//! [`live`] is the loop, its statistics and its command queue. [`transports`] carry frames to other processes.
+//! [`log`](mod@log) writes commands and hashes, from which a run can be computed again. [`run`] starts and stops all of
 //! them. Called by the commands `run` and `replay`.
 
 pub mod live;

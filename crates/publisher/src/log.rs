@@ -1,9 +1,9 @@
 //! `run --log`: a transport that writes a file.
 //!
 //! [`LogPublisher`] is the loop's end. It copies the arrays of a frame into a queue without a lock, an allocation or a
-//! system call. A thread orders them as in the message, hashes them and writes. Unlike `transports::background`, it
-//! skips no frame while there is room. Without room, it records the frame's tick as lost. A frame and its commands are
-//! queued together, or not at all.
+//! system call. A thread orders them as in the message, hashes them and writes. The log skips no frame while its queue
+//! has room. Without room, it records the frame's tick as lost. A frame and its commands are queued together, or not at
+//! all.
 
 pub mod arithmetic;
 pub mod hash;

@@ -167,9 +167,9 @@ impl Marker {
     }
 }
 
-/// visualization_msgs/MarkerArray: a cube for each bench, a sphere at a contact, a dashed ring at the coming event, the
-/// sentence of `run`, `watch` and the stage picture, the names of the benches in it. Of each obstacle its outline, its
-/// keep-out as a wide faint line about the outline, and its name.
+/// visualization_msgs/MarkerArray: a cube for each bench, a sphere at a contact, and a dashed ring at the coming event.
+/// One text is the sentence of `run`, `watch` and the stage picture, and others are the names of the benches in it.
+/// Each obstacle has its outline, its keep-out as a wide faint line about the outline, and its name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarkerArray {
     /// The benches from the head on, then `contact`, `coming`, `sentence`, the `numbers` and the ground.

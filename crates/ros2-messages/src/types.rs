@@ -43,8 +43,8 @@ impl MessageType {
         format!("{}/msg/{}", self.package, self.name)
     }
 
-    /// Returns the definition and those of all its parts in the schema encoding `ros2msg`: before each part a line of
-    /// 80 equals signs and a line with its name.
+    /// Returns the definition and those of all its parts in the schema encoding `ros2msg`. Before each part are a line
+    /// of 80 equals signs and a line with its name.
     pub fn schema(self) -> String {
         let own_name = format!("{}/{}", self.package, self.name);
         let mut names = vec![own_name.clone()];
@@ -68,9 +68,9 @@ impl MessageType {
     }
 }
 
-/// Returns the part of a `ros2msg` schema on which the bytes of a message `name`, `package/Name`, depend: the fields of
-/// every type in it, each as type and name, in order. Comments and constants are left out, and every type has its
-/// package.
+/// Returns the part of a `ros2msg` schema on which the bytes of a message `name`, `package/Name`, depend. This part is
+/// the fields of every type in it, each as type and name, in order. Comments and constants are left out, and every type
+/// has its package.
 pub fn fields(name: &str, schema: &str) -> BTreeMap<String, Vec<[String; 2]>> {
     let (mut of, mut fields) = (name.to_owned(), BTreeMap::from([(name.to_owned(), Vec::new())]));
     for line in schema.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {

@@ -1,12 +1,12 @@
 //! Acknowledgement of old messages in the name of subscribers that do not acknowledge.
 //!
 //! A writer of RustDDS 0.15.1 keeps all messages that one of its subscribers has not acknowledged, up to its limit. A
-//! best-effort subscriber acknowledges nothing, a killed reliable one nothing until its lease ends, and both count
-//! (`Writer::remove_all_acked_changes_but_keep_depth`). RustDDS has no limit of time. So this file sends the writer, in
-//! our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2): of a best-effort subscriber for all messages, of
-//! a reliable one for those that are older than [`AGE`] and not among the last `depth`. A reliable subscriber gets a
-//! GAP for these messages. RustDDS ignores the ACKNACK if the subscriber has acknowledged more. Called by the volatile
-//! writers.
+//! best-effort subscriber acknowledges nothing. A killed reliable subscriber acknowledges nothing until its lease ends.
+//! Both count (`Writer::remove_all_acked_changes_but_keep_depth`). RustDDS has no limit of time. So this file sends the
+//! writer, in our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2). For a best-effort subscriber it
+//! acknowledges all messages. For a reliable subscriber it acknowledges the messages that are older than [`AGE`] and
+//! not among the last `depth`. A reliable subscriber gets a GAP for these messages. RustDDS ignores the ACKNACK if the
+//! subscriber has acknowledged more. Called by the volatile writers.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::{Ipv4Addr, SocketAddr};

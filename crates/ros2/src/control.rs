@@ -1,12 +1,12 @@
-//! Services over ROS 2, on their own thread: the node's parameter services and, on request, those below `/<name>` that
-//! conduct the show, as a client of the show's own service.
+//! Services over ROS 2, on their own thread: the node's parameter services and, on request, those below `/<name>`. The
+//! latter conduct the show, as a client of the show's own service.
 //!
 //! Clients of both RMW implementations are answered, each in its own mapping ([`mapping`]). The requests use
-//! ros2-client's subscriptions, so that the node shows its services; the responses use RustDDS's writers. ros2-client's
-//! `Server` does not fit: it speaks one mapping, hides the bytes of a request, and answers at once. A client whose
-//! reply reader is not matched yet would never get that answer, so an answer waits here ([`Matches`]). A dead client,
-//! or one that floods the services, costs the loop nothing: this process takes the requests, and passes a bounded
-//! number of commands to the show at once.
+//! ros2-client's subscriptions, so that the node shows its services. The responses use RustDDS's writers. The `Server`
+//! of ros2-client does not fit: it speaks one mapping, hides the bytes of a request, and answers at once. A client
+//! whose reply reader is not matched yet would never get that answer, so an answer waits here ([`Matches`]). A dead
+//! client, or one that floods the services, costs the loop nothing. This process takes the requests, and passes a
+//! bounded number of commands to the show at once.
 
 mod calls;
 mod endpoints;
@@ -38,8 +38,8 @@ const MOST_CALLS: usize = 16;
 const MOST_PENDING: usize = 512;
 /// The longest wait of an answer for its client's reply reader: while the client is there, and otherwise. RMW
 /// implementations stop after 0.1 s. On a loaded machine discovery takes longer, and a lost datagram of discovery is
-/// repeated after seconds; an answer that is sent before is lost. Other answers do not wait. It is also the longest
-/// wait of an answer that RustDDS refuses: a killed client ends such a refusal after its lease, 20 s with Fast DDS.
+/// repeated after seconds. An answer that is sent before is lost. Other answers do not wait. It is also the longest
+/// wait of an answer that RustDDS refuses. The refusal for a killed client ends after its lease, 20 s with Fast DDS.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(30);
 const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
@@ -53,7 +53,7 @@ const PARAMETERS_INTERVAL: Duration = Duration::from_millis(50);
 const LINGER: Duration = Duration::from_millis(20);
 
 /// Returns for each service its name, and whether the bytes are a request of `rmw_fastrtps_cpp` and of
-/// `rmw_cyclonedds_cpp`; never both for a service that conducts the show. For tests.
+/// `rmw_cyclonedds_cpp`. They are never both for a service that conducts the show. For tests.
 pub fn mappings_of(bytes: &[u8]) -> impl Iterator<Item = (&'static str, [bool; 2])> {
     services::SERVICES.iter().chain(&parameters::SERVICES).map(|service| {
         let headed = bytes.split_at_checked(mapping::CYCLONE_HEADER).and_then(|(_, body)| (service.read)(body));

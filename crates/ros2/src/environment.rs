@@ -86,8 +86,8 @@ impl Network {
     }
 }
 
-/// Checks that a name can be a ROS 2 namespace: words of letters, digits and single underscores, not beginning with a
-/// digit, joined by slashes (ROS 2 design, "Topic and Service name mapping").
+/// Checks that a name can be a ROS 2 namespace: words joined by slashes (ROS 2 design, "Topic and Service name
+/// mapping"). A word has letters, digits and single underscores, and does not begin with a digit.
 ///
 /// # Errors
 /// [`Ros2Error::Name`].

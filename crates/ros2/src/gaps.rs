@@ -2,9 +2,9 @@
 //!
 //! RustDDS offers a new subscriber all messages that it keeps, whatever durability and depth the subscriber has, and
 //! has no call to withhold them. So this file sends a GAP submessage (RTPS 2.5, section 9.4.5.6) to the subscriber:
-//! these messages are not for it. RustDDS retransmits 5 ms after the subscriber has asked, and the subscriber accepts a
-//! GAP only when it knows the writer, so that the datagram is repeated for some time. If all come too late, the
-//! subscriber gets old messages first. Called by the matches.
+//! these messages are not for it. RustDDS retransmits 5 ms after the subscriber has asked. The subscriber accepts a GAP
+//! only when it knows the writer, so the datagram is repeated for some time. If all come too late, the subscriber gets
+//! old messages first. Called by the matches.
 
 use std::net::SocketAddr;
 use std::ops::RangeInclusive;

@@ -2,10 +2,10 @@
 //!
 //! Cyclone takes the messages that the first heartbeat of a writer names for old ones, and acknowledges them without
 //! delivery to a volatile reader. RustDDS sends a heartbeat when it matches a reader, but the reader may not know the
-//! writer yet. The next heartbeat of RustDDS may name an answer that RustDDS has not sent: it counts a message from the
-//! call that writes it, and answers an ACKNACK before it sends. The client would then wait without end. So this file
-//! sends a HEARTBEAT submessage (RTPS 2.5, section 9.4.5.7) just before the answer is written: it names the answers of
-//! before. Called by the matches.
+//! writer yet. The next heartbeat of RustDDS may name an answer that RustDDS has not sent. RustDDS counts a message
+//! from the call that writes it, and answers an ACKNACK before it sends. The client would then wait without end. So
+//! this file sends a HEARTBEAT submessage (RTPS 2.5, section 9.4.5.7) just before the answer is written: it names the
+//! answers of before. Called by the matches.
 
 use rustdds::{DomainParticipant, GUID};
 

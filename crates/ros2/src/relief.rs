@@ -1,9 +1,10 @@
 //! The relief of a volatile writer by a second one of the same topic. Pure. Called by the topic's writer.
 //!
-//! For each new subscriber a volatile writer of RustDDS 0.15.1 lists the number of every message that it has written
-//! (`RtpsReaderProxy::set_pending_gap_up_to`), some 13 bytes each, until the subscriber acknowledges: a best-effort or
-//! killed one never does. A second writer begins at 1. It writes nothing until the subscribers have discovered it. Then
-//! it writes alone, and the first writer stays for the retransmission of its last messages.
+//! For each new subscriber a volatile writer of RustDDS 0.15.1 lists the number of every message that it has written,
+//! about 13 bytes each (`RtpsReaderProxy::set_pending_gap_up_to`). The list stays until the subscriber acknowledges,
+//! and a best-effort or killed subscriber never does. A second writer begins at 1. It writes nothing until the
+//! subscribers have discovered it. Then it writes alone, and the first writer stays for the retransmission of its last
+//! messages.
 
 use std::time::{Duration, Instant};
 

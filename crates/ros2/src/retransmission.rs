@@ -6,10 +6,10 @@
 //! sends datagrams after each match: a NACK_FRAG submessage (RTPS 2.5, section 9.4.5.14) for each of the first messages
 //! of the writer. Called by the matches.
 //!
-//! It stays while RustDDS has no such call: without it half of all first calls take 3 s, and a `hold` must not. It is
-//! harmless: a writer retransmits the messages that it has and that are not acknowledged, RustDDS drops one that comes
-//! twice, and the counter of NACK_FRAG is not that of the ACKNACKs of RustDDS. If it fails, the request comes after the
-//! heartbeat period of Fast DDS.
+//! This workaround is needed until RustDDS offers retransmission requests. Without it half of all first calls take 3 s,
+//! and a `hold` must not. It is harmless: a writer retransmits the messages that it has and that are not acknowledged.
+//! RustDDS drops a message that comes twice. The counter of NACK_FRAG is not that of the ACKNACKs of RustDDS. If the
+//! workaround fails, the request comes after the heartbeat period of Fast DDS.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -96,7 +96,7 @@ pub(super) fn send(datagram: &[u8], addresses: impl Iterator<Item = SocketAddr>)
 }
 
 /// Returns the start of a message from a local endpoint to a remote one: the header, and the remote participant as the
-/// destination of what follows. Also returns the numbers of both endpoints in their participants.
+/// destination. Also returns the numbers of both endpoints in their participants.
 pub(super) fn addressed(from: [u8; 16], to: [u8; 16]) -> (Vec<u8>, [[u8; 4]; 2]) {
     let [from, to] = [from, to].map(|guid| {
         let [a, b, c, d, e, f, g, h, i, j, k, l, entity @ ..] = guid;

@@ -1,9 +1,9 @@
 //! `/rosout`: the lines of the program's log, the alerts and the cues, as rcl_interfaces/Log.
 //!
-//! In: records of the program's logger, kept in a queue from the start of the process ([`enqueue`]), so that warnings
-//! of before the node are sent too; and those of a parent process, which has no node ([`take_queued`],
-//! [`enqueue_line`]). Out: messages. Stamps are wall time, as in every node of ROS 2. Called by the topics' thread,
-//! which alone sends, and by the program's logger.
+//! In: records of the program's logger ([`enqueue`]), and those of a parent process, which has no node
+//! ([`take_queued`], [`enqueue_line`]). A queue keeps records from the start of the process, so that warnings before
+//! the node exists are sent too. Out: messages. Stamps are wall time, as in every node of ROS 2. Called by the topics'
+//! thread, which alone sends, and by the program's logger.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};

@@ -1,11 +1,11 @@
 //! The writer of one topic: its quality of service, its messages for late and slow subscribers, its discarded messages.
 //!
 //! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
-//! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first; with
-//! Fast DDS also a volatile one, since RustDDS does not read the durability of a subscriber. So a message without
-//! subscribers is held here and not written, and a writer of events is replaced after its last subscriber has left.
-//! From a subscriber that joins others older messages are withheld by a GAP of our own ([`gaps`](super::gaps)): RustDDS
-//! sends one only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches
+//! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first. With
+//! Fast DDS so would a volatile subscriber, since RustDDS does not read the durability of a subscriber. So a message
+//! without subscribers is held here and not written, and a writer of events is replaced after its last subscriber has
+//! left. A GAP of our own ([`gaps`](super::gaps)) withholds older messages from a subscriber that joins others. RustDDS
+//! sends a GAP only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches
 //! both, and a transient-local one would report the second as incompatible. Messages to single readers are none either:
 //! RustDDS repairs them for every later subscriber.
 //!

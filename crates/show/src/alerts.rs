@@ -20,9 +20,9 @@ pub const MOST_PER_FRAME: usize = 7;
 /// hysteresis, a clearance that oscillates about the threshold would make the level flicker.
 const HYSTERESIS_RATIO: f64 = 1.5;
 
-/// Time for which the clearance must stay that wide, as a share of the approach time. The ratio alone is not enough. As
-/// the paper's head passes from one bench to the next, its clearance rises from 0.050 m to 0.082 m and falls back
-/// within 4 s. It is above 0.075 m for 0.6 s.
+/// Time for which the clearance must stay that wide, as a share of the approach time. The ratio alone is not enough.
+/// The paper's head passes from one bench to the next: its clearance rises from 0.050 m to 0.082 m and falls back
+/// within 4 s. The clearance is above 0.075 m for 0.6 s.
 const RELEASE_HOLD: f64 = 0.1;
 
 /// A change of the alert level or a step of the countdown.

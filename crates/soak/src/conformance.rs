@@ -122,8 +122,8 @@ impl ConformanceCheck {
         }
     }
 
-    /// Returns true if a time before the expected one has a reason: the end, a cue that pauses, or a step that ended
-    /// within skipped periods.
+    /// Returns true if a time before the expected time has a reason. Reasons are the end, a cue that pauses, and a step
+    /// that ended within skipped periods.
     fn stops_early(
         &mut self,
         before: &FrameHeader,

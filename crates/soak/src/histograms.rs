@@ -1,8 +1,8 @@
 //! `soak --report`: the distributions of wake-up lateness and step cost as an HdrHistogram interval log.
 //!
-//! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, two lines for each
-//! ten seconds, with the tags `lateness` and `step`, values in nanoseconds, each histogram encoded as V2 and
-//! compressed. HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read it. The sum
+//! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, with two lines for
+//! each ten seconds. Their tags are `lateness` and `step`, their values nanoseconds. Each histogram is encoded as V2
+//! and compressed. HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read it. The sum
 //! over all lines of a tag is the distribution of the percentiles in the run's summary. The command `run` calls it for
 //! `soak`.
 

@@ -84,8 +84,8 @@ impl Observation {
 pub struct Latencies {
     /// From `sent_ns` to receiving: the cost of the transport and of waking this process.
     pub since_sent: Percentiles,
-    /// From `deadline_ns` to receiving, skipped periods included with the latency they would have had: the latency at
-    /// the nominal rate, a late wake-up of the publisher included.
+    /// From `deadline_ns` to receiving. Skipped periods are included with the latency they would have had. This is the
+    /// latency at the nominal rate, a late wake-up of the publisher included.
     pub since_deadline: Percentiles,
 }
 

@@ -156,9 +156,9 @@ fn missed(fleet: &Fleet, steady: &[&Member]) -> f64 {
     steady.iter().map(of).sum::<u64>() as f64
 }
 
-/// Returns the number of steady subscribers that disagree with the publisher. Either frames and skipped periods do not
-/// add up to the last received tick, or there was more than one run, or more than a second's frames were not compared
-/// with the stage.
+/// Returns the number of steady subscribers that disagree with the publisher. One reason is that frames and skipped
+/// periods do not add up to the last received tick. Others are a number of runs other than one, and more than a
+/// second's frames that were not compared with the stage.
 fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
     let Some(summary) = fleet.summary() else { return f64::NAN };
     let disagrees = |member: &&&Member| {

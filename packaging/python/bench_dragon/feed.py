@@ -141,8 +141,8 @@ class Feed:
         return scene
 
     def handle_indices(self, *handles: int) -> Any:
-        """Returns the index of the handle of each pose of a `light` feed in a team of `handles`, or in several teams in
-        the order of the stage: shape (poses,)."""
+        """Returns the index of the handle of each pose of a `light` feed: shape (poses,). `handles` is the number of
+        handles of the team, or of each team in the order of the stage."""
         return indices_of(self._services[self._poses], *handles)
 
     def publishers(self) -> int:

@@ -5,7 +5,7 @@
     reader.push(frame.header, frame.handles)     # for every frame, as it comes
     time, handles = reader.at(monotonic_ns)      # at any time: simulated seconds and a structured array
 
-Display the stream a period behind the present, such as `time.monotonic_ns() - 1e9 / rate`: the error is then
+Display the stream a period behind the present, such as `time.monotonic_ns() - 1e9 / rate`. The error is then
 proportional to the fourth power of the interval of two frames. Frames that a tunnel brings from another machine have
 times of that machine's clock: push these with their arrival time.
 """

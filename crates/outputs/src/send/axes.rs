@@ -45,9 +45,9 @@ impl Axes {
         of_stage
     }
 
-    /// Returns a turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. There, as
-    /// everywhere, a positive turn about the first axis is from the second towards the third, so that axes of the other
-    /// handedness reverse it.
+    /// Returns a turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. In any axes, a
+    /// positive turn about the first axis is from the second towards the third. So axes of the other handedness reverse
+    /// the turn.
     pub fn rotation(&self, heading: f64) -> [f64; 3] {
         let sign = self.handedness();
         self.vector([0.0, 0.0, sign * heading])

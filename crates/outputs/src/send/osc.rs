@@ -41,8 +41,8 @@ impl Addresses {
         OscMessage { addr: format!("{}/{address}", self.prefix), args }
     }
 
-    /// `/alert ,sisffffiii`: the level and its number, the event, simulated seconds until the event, the clearance, the
-    /// place and the benches of the event, the latest cue. Benches count within their dragon.
+    /// `/alert ,sisffffiii`: the level and its number, the event, simulated seconds until the event, and the clearance.
+    /// Then follow the place and the benches of the event, and the latest cue. Benches count within their dragon.
     pub fn alert(&self, alert: &CollisionAlert, stage: Option<&Stage>, cue: u32) -> OscMessage {
         let bench = |number: u32| bench(stage.and_then(|stage| stage.owner(number)).map_or(number, |(_, own)| own));
         let level = alert.alert_level().map_or("unknown", Level::name);

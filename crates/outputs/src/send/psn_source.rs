@@ -132,8 +132,8 @@ impl Source {
         Some(sentences)
     }
 
-    /// Returns a sentence for each kind of a dragon's handles that is left out: those that it does not have, and those
-    /// without a number, by the count of trackers and of chosen handles.
+    /// Returns a sentence for each kind of a dragon's handles that is left out. One kind is handles that the dragon
+    /// does not have. The other is handles without a number, known from the counts of trackers and of chosen handles.
     fn left_out(
         &self,
         dragon: &Dragon,

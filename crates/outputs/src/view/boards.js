@@ -45,8 +45,9 @@ function boardOf(dragons, number) {
 }
 
 /**
- * Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap; with
- * these points as `ends`, and their distance `away`, m. The boards are of any dragons, numbered through all handles.
+ * Returns the middle between the nearest points of two boards, one of which is a corner, or of their overlap. The
+ * result also has these points as `ends`, and their distance as `away`, m. The boards are of any dragons, numbered
+ * through all handles.
  */
 export function nearest(dragons, ...pair) {
   const [a, b] = pair.map((number) => boardOf(dragons, number));
@@ -112,8 +113,8 @@ function eachWithin(dragons, most, found) {
 }
 
 /**
- * Returns the two boards that share no handle and overlap most, and their overlap in metres; null if no two boards are
- * nearer than `tolerance` metres, the rounding of their places.
+ * Returns the two boards that share no handle and overlap most, and their overlap in metres. Returns null if no two
+ * boards are nearer than `tolerance` metres, the rounding of their places.
  */
 export function overlapping(dragons, tolerance) {
   let deepest = null;
@@ -147,8 +148,8 @@ function anyPair(dragons) {
 }
 
 /**
- * The sides of an obstacle of a stage message, each as its two ends; the distance `keep` that boards have to stay away
- * from them; and a circle around them. A circle has one side, its centre.
+ * The sides of an obstacle of a stage message, each as its two ends, and a circle around them. Boards have to keep the
+ * distance `keep` from the sides. A circle has one side, its centre.
  */
 export function sidesOf({ kind, keep_out, outline }) {
   const { x, y, heading, curvature } = outline[0];

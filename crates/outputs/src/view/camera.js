@@ -63,8 +63,8 @@ export class Camera {
   }
 
   /**
-   * Updates the frame: all teams, each with `stage` and `places`, the team of the followed bench, and the simulated
-   * seconds per second of the fastest show, with which the camera keeps up.
+   * Updates the frame. `teams` are all teams, each with `stage` and `places`, and `followed` is the team of the
+   * followed bench. The camera keeps up with `rate`, the simulated seconds per second of the fastest show.
    */
   update(teams, passed, followed = teams[0], rate = 1) {
     this.longest = Math.max(...teams.map(({ stage }) => Math.max(stage.head_length, stage.body_length)));

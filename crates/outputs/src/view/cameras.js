@@ -8,7 +8,7 @@ const SHOWN = 2500;
 
 export class Cameras {
   /**
-   * `look` tells the cameras of one look from those of another; `note` is an element for a sentence; `isWanted` says of
+   * `look` tells the cameras of one look from those of another. `note` is an element for a sentence. `isWanted` says of
    * an event whether its key may act.
    */
   constructor(eye, look, note, isWanted) {

@@ -32,9 +32,9 @@ function onSpiral(a, angle) {
 }
 
 /**
- * How a segment's spiral stands on the stage: its centre `x`, `y`, and the direction `c`, `s` of its x axis; `side` is
- * -1 where it is mirrored. Its beginning and the side to which it bends say so; without a curvature it is about the
- * origin.
+ * How a segment's spiral stands on the stage. Its centre is `x`, `y`, and its x axis has the direction `c`, `s`. `side`
+ * is -1 where the spiral is mirrored. These follow from the segment's beginning and the side to which it bends. A
+ * spiral without a curvature is about the origin.
  */
 export function spiralFrame({ kind, x, y, heading, curvature, theta_first, pitch }) {
   if (curvature === null) return { x: 0, y: 0, c: 1, s: 0, side: 1 };
@@ -171,7 +171,7 @@ function inMetres(context, camera, right = 0, down = 0) {
 }
 
 /**
- * The ground with the path on it. A long path takes longer to draw than all its benches, so it is kept with a margin
+ * The ground with the path on it. A long path takes longer to draw than all its benches. So it is kept with a margin
  * until the camera moves beyond the margin, or the path changes.
  */
 export class Ground {
@@ -248,11 +248,11 @@ export class Ground {
 }
 
 /**
- * Draws everything. `scene` has: ground, labels (null: no words are written), and dragons, each with stage, places
- * (STRIDE numbers a handle, as all handles here), colours (a SpeedScale), path, marks (see marks.js), chosen (a bench,
- * or -1), its chosenName, its endNames, stale (true if it is stale beside live ones), and identity (see
- * palette.js; null for a single dragon); the measure, and whether the picture has the focus. Returns the words written,
- * as boxes in pixels.
+ * Draws everything: ground, dragons, labels and measure. No words are written if `labels` is null. `hasFocus` is true
+ * if the picture has the focus. A dragon has stage, places (STRIDE numbers a handle, as all handles here), colours (a
+ * SpeedScale), path, and marks (see marks.js). It has chosen (a bench, or -1), its chosenName, and its endNames. It
+ * also has stale (true if it is stale beside live ones), and identity (see palette.js; null for a single dragon).
+ * Returns the words written, as boxes in pixels.
  */
 export function draw(context, camera, palette, { ground, dragons, labels, measure, hasFocus }) {
   ground.cover(context, camera, palette,
@@ -393,7 +393,7 @@ function inSight(camera, stage, places) {
 
 /**
  * Boards in a colour, with an edge if a colour and a width are given. Each board is one line of the board's width in a
- * separate path: browsers draw a single line as a rectangle, which is faster than a path of several corners.
+ * separate path. Browsers draw a single line as a rectangle, which is faster than a path of several corners.
  */
 export function fillBoards(context, stage, places, benches, colour, edge) {
   context.strokeStyle = colour;

@@ -61,8 +61,8 @@ export class HermiteReader {
 
   /**
    * Returns the state at a moment on the clock of `due`: the simulated time, the handles, and the two frames around
-   * them, the same frame twice if the handles are exactly a frame's. There is no interpolation before the oldest kept
-   * frame, after the newest, and at a jump of simulated time. Null if no frame has come.
+   * them. Both are the same frame if the handles are exactly a frame's. There is no interpolation before the oldest
+   * kept frame, after the newest, and at a jump of simulated time. Returns null if no frame has come.
    *
    * Headings follow from the positions, as in the frames. Without velocities in the stream the path between
    * two frames is a straight line.
@@ -122,7 +122,7 @@ function setHeadings(handles, dragons) {
 }
 
 /**
- * The coordinate at the index `k` and its rate, of the polynomial of least degree through both positions and the
+ * The coordinate at the index `k` and its rate. The polynomial is that of least degree through both positions and the
  * velocities of those frames that play: cubic, quadratic, or a straight line.
  */
 function coordinate(from, to, k, length, u, handles) {

@@ -1,9 +1,9 @@
-// The places of words on the picture, so that none can be read as those of another board: each stands at its own board,
-// or a line leads from it to that board. Pixels of the screen; knows no canvas and no page.
+// The places of words on the picture. A label is never read as that of another board: it stands at its own board, or a
+// line leads from it to that board. Pixels of the screen; knows no canvas and no page.
 //
-// A board is { x, y, c, s, l, w, free }: middle, direction, half length, half width, and the share of the half length
-// on which no other board of the chain lies. A box is { x, y, half, tall }: middle, half
-// width, half height. A line is { from, to }.
+// A board is { x, y, c, s, l, w, free }: middle, direction, half length, half width, and a share of the half length. On
+// that share no other board of the chain lies. A box is { x, y, half, tall }: middle, half width, half height. A line
+// is { from, to }.
 
 /** The side of the squares of the map of boards (px). */
 const SQUARE = 4;
@@ -97,12 +97,12 @@ class BoardMap {
 }
 
 /**
- * Places labels in the order of their importance. `items`: each with a `key`, the size of its box `half` and `tall`,
- * and either `board` (an index among `boards`) or the place `x`, `y` of an event. `marked`: indices of outlined boards;
- * `rings`: { x, y, radius }; `keep`: boxes that are taken; `last`: the earlier offsets by key.
+ * Places labels in the order of their importance. Each of `items` has a `key` and the size of its box, `half` and
+ * `tall`. It also has either `board` (an index among `boards`) or the place `x`, `y` of an event. `marked`: indices of
+ * outlined boards; `rings`: { x, y, radius }; `keep`: boxes that are taken; `last`: the earlier offsets by key.
  *
- * Returns a label for each item: `box`, its `line` (null for a badge), the end `share` of the line on the board, and
- * `isBadge` for a label without room, whose number stands on the board itself.
+ * Returns a label for each item: `box`, its `line` (null for a badge), and the end `share` of the line on the board.
+ * `isBadge` marks a label without room, whose number stands on the board itself.
  */
 export function layout({ boards, items, rings, marked, keep, width, height, unit, last }) {
   const map = new BoardMap(boards, width, height), boxes = [...keep], lines = [], placed = [];

@@ -32,9 +32,9 @@ export class Labels {
   }
 
   /**
-   * Draws labels, in the order of their importance: each with `text`, `key`, `ink`, `large` (times the usual size), and
-   * either `dragon` and `bench`, or the place `x`, `y` of an event. `keep` are boxes that words may not cover. Returns
-   * the boxes written, each with its text, its bench, and the end of its line.
+   * Draws labels, in the order of their importance. Each has `text`, `key`, `ink`, and `large` (times the usual size).
+   * It also has either `dragon` and `bench`, or the place `x`, `y` of an event. `keep` are boxes that words may not
+   * cover. Returns the boxes written, each with its text, its bench, and the end of its line.
    */
   draw(context, camera, palette, { dragons, items, rings, marked, keep }) {
     const { width, height, ratio, unit } = camera, now = performance.now();

@@ -40,9 +40,10 @@ export function viewOf({ width, height }, camera) {
 }
 
 /**
- * A dragon's boards that light the picture, in pixels: middle, direction `c`, `s`, half the length along it `dx`, `dy`,
- * the front handle `ax`, `ay`, how much its lanterns are `lit` and `burn` white; its head, tail and pearl where they
- * are among them; and the exposure: a coil has many lanterns to a square metre, a procession few.
+ * A dragon's boards that light the picture, in pixels. A board has its middle, direction `c`, `s`, half the length
+ * along it `dx`, `dy`, and the front handle `ax`, `ay`. It also has how much its lanterns are `lit` and `burn` white.
+ * The head, the tail and the pearl are added where they are among the boards. The exposure is less for a coil, which
+ * has many lanterns to a square metre, than for a procession.
  */
 export function boardsOf(view, dragon) {
   const { stage, places, show } = dragon, count = places.length / STRIDE - 1, boards = [], margin = 5 * view.pixels;

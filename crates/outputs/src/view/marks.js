@@ -64,9 +64,10 @@ export class Nearest {
 }
 
 /**
- * The marks of a state: each with the benches it concerns (`pair`, numbers through all handles), a place, a colour of
- * the palette, whether the place is a ghost (in the future), whether the outlines are dashed, and a `line` between the
- * two. The caller, which knows the language, sets `text` and `names`. `near` are the lines of `Nearest`.
+ * The marks of a state. Each has the benches it concerns (`pair`, numbers through all handles), a place, and a colour
+ * of the palette. It also has whether the place is a ghost (in the future), whether the outlines are dashed, and a
+ * `line` between the two. The caller, which knows the language, sets `text` and `names`. `near` are the lines of
+ * `Nearest`.
  */
 export function marksOf({ state, alert, dragons, overlap, near }) {
   const still = overlap ? [] : near.map(({ place, benches, obstacle }) => ({ kind: "nearest", pair: [], benches,

@@ -17,9 +17,9 @@ const FINEST = 0.001;
 const AT_REST = 0.5;
 
 /**
- * The identities of several dragons, besides their names: dashes (pixels of ink and of gap in turn), a colour that is
- * visible on a light and on a dark ground, and the light of its lanterns. Without colour vision two dragons differ in
- * their dashes.
+ * The identities of several dragons, besides their names. Each has dashes (pixels of ink and of gap in turn) and the
+ * light of its lanterns. Its colour is visible on a light and on a dark ground. Without colour vision two dragons
+ * differ in their dashes.
  */
 const IDENTITIES = [
   { colour: "#1f6fb5", dashes: [], light: [84, 150, 255] },
@@ -115,10 +115,10 @@ class MeanSpeeds {
 }
 
 /**
- * The scale of the colours for a run: from rest to twice the head's speed, logarithmic in the difference from it, since
- * most shows have differences of a thousandth for minutes and of a half for seconds. It is only widened, so that a
- * colour keeps its meaning within a run. A bench has the colour of its mean speed over one link passage. The scale
- * keeps the speeds of the last moving frame. The crate `drawing` has the same scale.
+ * The scale of the colours for a run: from rest to twice the head's speed, logarithmic in the difference from that
+ * speed. Most shows have differences of a thousandth for minutes and of a half for seconds. The scale is only widened,
+ * so that a colour keeps its meaning within a run. A bench has the colour of its mean speed over one link passage. The
+ * scale keeps the speeds of the last moving frame. The crate `drawing` has the same scale.
  */
 /** Returns a power of two that no speed of the handles exceeds, and that rounding of the speeds hardly changes. */
 function boundOf(handles) {

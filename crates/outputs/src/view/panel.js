@@ -18,10 +18,10 @@ export function put(id, text) {
 const spokenOf = new Map();
 
 /**
- * The state, the sentence and the countdown of a situation: `state`, `alert`, `trouble` (the reason why nothing comes,
- * or null), `silent` (seconds without a frame, or null), `stale` (true if the whole picture is stale), `of` (the dragon
- * of the situation, or null for a single dragon), `seconds` until the event `ahead` (NaN without a countdown), `stands`
- * (true if the show stands still), `stage`, and `now` (the present state in words).
+ * The state, the sentence and the countdown of a situation. `trouble` is the reason why nothing comes, or null, and
+ * `silent` the seconds without a frame, or null. `stale` is true if the whole picture is stale. `of` is the dragon of
+ * the situation, or null for a single dragon. `seconds` are those until the event `ahead` (NaN without a countdown).
+ * `stands` is true if the show stands still, and `now` is the present state in words.
  */
 export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, stage, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;

@@ -1,8 +1,8 @@
 // Pointer input: mouse, fingers and keys on the picture. Maps gestures to actions, and does not know the actions.
 
 /**
- * `acts` has: pan(x, y) and zoomAt(by, x, y) in pixels, isFree() (true if two fingers may move the picture), tap(x, y),
- * `keys`, an action for each key, and isWanted(event), true if the key of a letter or a sign may act.
+ * `acts` has pan(x, y) and zoomAt(by, x, y) in pixels, isFree() (true if two fingers may move the picture), and tap(x,
+ * y). It also has `keys`, an action for each key, and isWanted(event), true if the key of a letter or a sign may act.
  */
 export function attach(canvas, acts) {
   const fingers = new Map();

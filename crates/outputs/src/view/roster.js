@@ -1,5 +1,5 @@
-// The list of several dragons beside the picture: the name and the state of each; of a publisher with one dragon also
-// the transport's sign, the countdown and the sentence. A single dragon has no list.
+// The list of several dragons beside the picture, with the name and the state of each. A publisher with one dragon also
+// has the transport's sign, the countdown and the sentence. A single dragon has no list.
 
 import { SIGNS, element } from "./panel.js";
 import { capital, remaining, say, sentenceOf } from "./words.js";

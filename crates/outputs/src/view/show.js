@@ -45,9 +45,9 @@ export class Show {
   }
 
   /**
-   * Begins the next picture, at the show time `time`. `stands`: the show stands still; `jumped`: another epoch;
-   * `coming`: the benches of the next event and the seconds until then; `happened`: it is past; `flash`: its place
-   * then, if this dragon's flash shows it, or null.
+   * Begins the next picture, at the show time `time`. `stands`: the show stands still. `jumped`: another epoch.
+   * `coming`: the benches of the next event and the seconds until then. `happened`: the event is past. `flash`: the
+   * event's place then, if this dragon's flash shows it, or null.
    */
   update({ time, places, stands, jumped, coming, happened, flash }) {
     const { now } = this, tail = places.length - STRIDE;

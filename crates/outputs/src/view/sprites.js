@@ -27,7 +27,7 @@ export const POOL_RADIUS = 3.2;
 
 /**
  * The light of a bench on the ground. A lamp at the height h lights a place at the distance q by (1 + (q / h)^2)^-1.5
- * (inverse square and cosine); a near and a high lamp are added, less their light at the radius. Far light is redder.
+ * (inverse square and cosine). A near and a high lamp are added, less their light at the radius. Far light is redder.
  */
 export function pool(red, green, blue) {
   const size = 128, [canvas, context] = blank(size, size), data = context.createImageData(size, size);

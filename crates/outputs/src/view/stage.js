@@ -66,8 +66,8 @@ const roster = new Roster(select);
 let dragons = [], several = false;
 meet();
 /**
- * `chosen` is a bench (from 0, or -1) of the dragon `whose`; `selected` is the dragon of the figures, null for that of
- * the publisher of the header.
+ * `chosen` is a bench (from 0, or -1) of the dragon `whose`. `selected` is the dragon of the figures, or null for the
+ * dragon of the publisher of the header.
  */
 let palette = paletteOf(canvas), chosen = -1, whose = dragons[0], selected = null, last = null;
 /** The moments of this pass of the page and of the one before, and of the pass that drew last. */
@@ -75,9 +75,9 @@ let passedAt = 0, beforeAt = 0, drawnAt = -Infinity;
 
 /**
  * For tests and measurements: the received and drawn data. `shown` is the simulated time and the handles at the latest
- * pass, `range` speeds on the colour scale, `marks` and `labels` the marks and words on the latest picture; `latency`
- * and `ways` in ms since the frame was sent. With several dragons it is of the first, and `dragons` has the same of
- * each.
+ * pass, and `range` speeds on the colour scale. `marks` and `labels` are the marks and words on the latest picture.
+ * `latency` and `ways` are in ms since the frame was sent. With several dragons the data are those of the first, and
+ * `dragons` has the same of each.
  */
 const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null,
     shown: null, range: null, marks: [], labels: [], latency: publishers[0].latency, ways: publishers[0].stream.ways,

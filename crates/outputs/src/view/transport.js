@@ -35,7 +35,7 @@ export class Transport {
   }
 
   /**
-   * Updates the state at a moment. `lost` is the reason why nothing comes, or null; `cueOf` finds a cue by its number;
+   * Updates the state at a moment. `lost` is the reason why nothing comes, or null. `cueOf` finds a cue by its number.
    * `stand` is the scene's time at the end of a loop, s, or null.
    */
   look(now, newest, lost, cueOf, stand) {

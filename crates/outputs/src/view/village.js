@@ -1,6 +1,6 @@
-// What stands still in the view from a seat, drawn once for each seat: the stone floor, the night over the village, and
-// the heads of those who sit in front. Called by seat.js. The village stands on a ring around the stage, so that
-// another seat sees other houses.
+// The still background of the view from a seat, drawn once for each seat. It is the stone floor, the night over the
+// village, and the heads of the spectators who sit in front. Called by seat.js. The village stands on a ring around the
+// stage, so that another seat sees other houses.
 
 import { blank, hash } from "./sprites.js";
 

@@ -283,8 +283,8 @@ function outward(seconds, step) {
 }
 
 /**
- * Returns the proof of an event, in a show that ends at `freeze`: `text`, empty for an unknown event, and `canCome`,
- * true if the show reaches it.
+ * Returns the proof of an event, in a show that ends at `freeze`. `text` is empty for an unknown event, and `canCome`
+ * is true if the show reaches the event.
  */
 export function proofOf({ event, status, time_lo, time_hi, obstacle }, freeze) {
   const number = obstacle === undefined ? "" : ` ${obstacle + 1}`;

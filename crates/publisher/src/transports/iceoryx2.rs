@@ -4,10 +4,10 @@
 //! there, since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`,
 //! `/status`, `/stage`, `/scene`, the event service `<name>/tick` and, if a scene requests it, `<name>/poses32`.
 //!
-//! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first.
-//! iceoryx2 detects by a lock of the operating system whether the server's process lives. So a killed process does not
-//! block the name, and a stopped process keeps it. The other services admit a second publisher: a tunnel to other
-//! machines.
+//! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first. The
+//! library iceoryx2 detects by a lock of the operating system whether the server's process lives. So a killed process
+//! does not block the name, and a stopped process keeps it. The other services admit a second publisher: a tunnel to
+//! other machines.
 
 pub mod chase_status;
 mod control;

@@ -1,8 +1,9 @@
 //! The services, with their requests and responses as their packages define them.
 //!
-//! `simulation_interfaces` (1.0.0 to 2.1.0 do not differ in what follows), `rosbag2_interfaces` (Humble to Kilted, and
-//! `Resume` of what came later) under the names that rosbag2's player gives them, `std_srvs/Trigger`. In: the bytes of
-//! a request. Out: a [`Call`]; back from a [`Response`]. Called by the control thread.
+//! Packages: `simulation_interfaces` (the parts used here are alike from 1.0.0 to 2.1.0), `rosbag2_interfaces` and
+//! `std_srvs/Trigger`. The services of `rosbag2_interfaces` (Humble to Kilted, and the later `Resume`) have the names
+//! that rosbag2's player gives them. In: the bytes of a request. Out: a [`Call`]; back from a [`Response`]. Called by
+//! the control thread.
 
 use serde::Serialize;
 

@@ -123,7 +123,8 @@ impl Record {
     }
 
     /// Returns the periods of the step that ended with the frame at `place`. Returns `None` if a frame of the step is
-    /// missing, or if it may have begun in the period of a cue that pauses, without a frame that stands still.
+    /// missing. Also returns `None` if the step may have begun in the period of a cue that pauses, without a frame that
+    /// stands still.
     fn length_of_step(&self, place: usize) -> Option<u64> {
         let mut place = place;
         let mut periods = 0;

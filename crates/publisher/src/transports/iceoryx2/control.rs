@@ -1,6 +1,6 @@
 //! Commands over shared memory: the request-response service `<name>/control`, on its own thread.
 //!
-//! A dead client, or one that floods the service, costs the loop nothing: this thread takes the requests, and the loop
+//! A dead client, or one that floods the service, costs the loop nothing. This thread takes the requests, and the loop
 //! executes one command in each period from a queue of bounded length.
 
 use std::sync::Arc;

@@ -106,8 +106,8 @@ proptest! {
         }
     }
 
-    /// Whatever is commanded, of whatever size: time stays within the show, jumps are counted and nothing else is, and
-    /// the same list gives the same bits.
+    /// With any commands, of any size, time stays within the show, and only jumps are counted. The same list gives the
+    /// same bits.
     #[test]
     fn time_stays_within_the_show_and_two_plays_are_alike(
         (time_scale, rate, start, freeze) in super::shows(),
