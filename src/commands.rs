@@ -326,8 +326,8 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Ends this program with a sentence if no page of shared memory is available, since other processes have filled
-/// /dev/shm. Linux signals this by SIGBUS.
+/// Ends this program with a sentence if no page of shared memory is available, which Linux signals by SIGBUS. Other
+/// processes have then filled /dev/shm since the last test.
 pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
     const SENTENCE: &[u8] = b"error: /dev/shm is full: remove what fills it, or make it larger\n";
     let end = || {

@@ -18,7 +18,8 @@ use i_overlay::i_float::int::point::IntPoint;
 pub const TOLERANCE: f64 = 1e-3;
 
 /// Greatest distance of a corner from the straight line of its step, metres. An edge that turns by an angle a within
-/// the step bulges beyond the step's polygons by up to its length times a^2 / 8. Its corners leave their lines as far.
+/// the step bulges beyond the step's polygons by up to its length times a^2 / 8. Its corners leave their lines by as
+/// much.
 const STRAIGHT: f64 = 0.1 * TOLERANCE;
 
 /// Metres of the grid to which corners are rounded: on a grid, the union has no corner but those of its rings.
