@@ -18,6 +18,7 @@ mod lines;
 mod log_lines;
 pub mod metrics;
 mod new_file;
+mod parent;
 pub mod plan;
 mod publishing;
 mod realtime_scheduling;

@@ -19,11 +19,11 @@ use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::soak::histograms::HistogramLog;
 
 use super::events::sentence;
+use super::parent::Parent;
 use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
-use super::soak::Parent;
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
 
 /// Nanoseconds that waiting subscribers have before the first frame: each tries to connect every 20 ms.

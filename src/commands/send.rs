@@ -15,8 +15,8 @@ use bench_dragon::outputs::send::osc_sender::{MOST_RATE, OscSender, OscSenders};
 use bench_dragon::outputs::send::psn_sender::{Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE};
 use bench_dragon::outputs::send::trackers::{Numbers, Selection};
 
+use super::parent::Parent;
 use super::ros_args::UseSimTime;
-use super::soak::Parent;
 use super::{CommandError, Common, Output, number, stop_on_signals};
 
 /// Arguments of `send`.

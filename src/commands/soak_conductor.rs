@@ -10,7 +10,7 @@ use bench_dragon::show::scene::{OnContact, Scene};
 use bench_dragon::soak::conduct::ShowFacts;
 use bench_dragon::soak::conduct::load_generator;
 
-use super::soak::Parent;
+use super::parent::Parent;
 use super::{CommandError, Common, stop_on_signals};
 
 /// Longest wait for an answer of the publisher.

@@ -21,9 +21,6 @@ pub struct VerifyArguments {
     file: PathBuf,
 }
 
-/// Bytes of the longest first line that is read to determine the kind of file.
-const LONGEST_FIRST_LINE: u64 = 1 << 26;
-
 /// The first bytes of a recording.
 const MCAP_MAGIC: &[u8] = b"\x89MCAP";
 
@@ -38,7 +35,7 @@ pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), Comman
     let bar = progress_bar(file.metadata().map_or(0, |data| data.len()), common);
     let mut file = BufReader::new(file);
     let mut first = Vec::new();
-    file.by_ref().take(LONGEST_FIRST_LINE).read_until(b'\n', &mut first).map_err(unread)?;
+    file.by_ref().take(proof::LONGEST_LINE).read_until(b'\n', &mut first).map_err(unread)?;
     if first.starts_with(MCAP_MAGIC) {
         bar.finish_and_clear();
         return recording::verify(common, &arguments.file);

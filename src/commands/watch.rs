@@ -1,5 +1,6 @@
 //! `watch`: the terminal monitor. `keys` has the commands of its keys, `terminal` reads them.
 
+mod key_bytes;
 mod keys;
 pub mod terminal;
 

@@ -138,7 +138,7 @@ fn the_python_example_reads_the_socket() {
         let arguments = ["examples/python/stage_socket.py", "--url", &url, "--seconds", "4"];
         Process::start(python().args(arguments)).output()
     };
-    let refused = read("nobody");
+    let refused = read("no_publisher");
     let sentence = text(&refused.stderr);
     assert!(!refused.status.success() && sentence.lines().count() == 1, "{sentence}");
     assert!(sentence.contains("name: expected one of the publishers"), "{sentence}");

@@ -20,7 +20,7 @@ use nix::unistd::Pid;
 use serde_json::Value;
 
 /// The user id of a user without rights.
-const NOBODY: u32 = 65534;
+const OTHER_USER: u32 = 65534;
 
 /// Returns the file of the program. Test programs that start no program are built without the program.
 fn executable() -> &'static str {
@@ -239,14 +239,14 @@ impl Place {
     }
 
     /// Runs the program in this place as the user without rights, from a copy that this user may read.
-    pub fn as_nobody(&self, arguments: &[&str]) -> Output {
+    pub fn as_other_user(&self, arguments: &[&str]) -> Output {
         let copy = self.folder().join("bench-dragon");
         if !copy.exists() {
             copy_program(&copy);
             std::fs::set_permissions(self.folder(), std::fs::Permissions::from_mode(0o755)).unwrap();
         }
         let mut command = Command::new("setpriv");
-        command.args([&format!("--reuid={NOBODY}"), &format!("--regid={NOBODY}"), "--clear-groups"]);
+        command.args([&format!("--reuid={OTHER_USER}"), &format!("--regid={OTHER_USER}"), "--clear-groups"]);
         command.arg(copy).args(arguments).current_dir(self.folder());
         Process::start(&mut command).output()
     }

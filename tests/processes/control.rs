@@ -84,8 +84,8 @@ fn the_command_line_conducts_a_show() {
     assert_eq!(done(name, &["release"])["playback"], "paused");
     let (code, _, sentence) = control(name, &["seek", "1e6"]);
     assert!(code == 1 && sentence.contains("out of range"), "{code} {sentence}");
-    let (code, _, sentence) = control("nobody", &["pause"]);
-    assert!(code == 1 && sentence.contains("nobody publishes"), "{code} {sentence}");
+    let (code, _, sentence) = control("no_publisher", &["pause"]);
+    assert!(code == 1 && sentence.contains("no publisher has the name"), "{code} {sentence}");
     assert_eq!(control(name, &["step", "0"]).0, 2);
     publisher.signal(nix::sys::signal::Signal::SIGINT);
     let summary = summary(&publisher.output());
@@ -364,7 +364,7 @@ fn another_user_cannot_conduct() {
         assert!(Instant::now() < deadline, "no publisher");
         wait(0.1);
     }
-    let output = place.as_nobody(&["control", "pause"]);
+    let output = place.as_other_user(&["control", "pause"]);
     let printed = text(&output.stderr);
     if cfg!(feature = "any_user") {
         assert_eq!(output.status.code(), Some(0), "{printed}");

@@ -425,7 +425,7 @@ fn another_user_is_kept_out_or_let_in_as_the_build_allows() {
         })
         .map(|file| file.metadata().unwrap().mode() & 0o777)
         .collect();
-    let output = place.as_nobody(&["watch", "--json", "--duration", "2"]);
+    let output = place.as_other_user(&["watch", "--json", "--duration", "2"]);
     if cfg!(feature = "any_user") {
         assert_eq!(modes, BTreeSet::from([0o666]));
         let lines = json_lines(&output);

@@ -354,7 +354,7 @@ fn what_cannot_be_recorded_is_refused_in_one_sentence() {
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "a refusal leaves no file");
     // No publisher is running.
-    let output = program("record_nobody").args(["record", "-o", new, "--duration", "0.2"]).output().unwrap();
+    let output = program("record_no_publisher").args(["record", "-o", new, "--duration", "0.2"]).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("nothing came from"), "{}", text(&output.stderr));
     assert!(!Path::new(new).exists());

@@ -1,4 +1,4 @@
-"""The page for everybody: small windows, large letters, keys, paper, languages, screen readers; and the tools of the crew. Same
+"""The page for all users: small windows, large letters, keys, paper, languages, screen readers; and the tools of the crew. Same
 browser and arguments as stage_picture.py.
 
     stage_reach.py SCENARIO PROGRAM NAME

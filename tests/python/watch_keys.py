@@ -157,7 +157,7 @@ def terminal_is_restored():
     with Watch() as watch:
         until(watch.reads_keys, "keys are read")
         watch.press("h")
-        watch.shows("nobody publishes under the name")
+        watch.shows("no publisher has the name")
         watch.press("\x03")
         assert watch.exit_code() == 0, "Ctrl-C ends it"
         assert not watch.reads_keys()

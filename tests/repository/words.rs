@@ -1,5 +1,5 @@
-//! No private word is in sources, tests, examples or documents if the field has a standard word, and no phrase that
-//! must be read twice.
+//! No private word is in sources, tests, examples or documents if the field has a standard word, no phrase that must be
+//! read twice, and no sentence of more than 25 words.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -53,13 +53,14 @@ const PRIVATE: [(&str, &str); 40] = [
     ("UNDER_WAY", "MAX_IN_FLIGHT"),
 ];
 
-/// Phrases that a newcomer must read twice, and the remedy.
-const PHRASES: [(&str, &str); 14] = [
+/// Phrases that a newcomer must read twice, in lower case, and the remedy.
+const PHRASES: [(&str, &str); 15] = [
     ("so many", "name the parameter"),
-    ("Takes in", "handles, buffers, processes: the standard verb"),
     ("takes in", "handles, buffers, processes: the standard verb"),
     ("whoever", "name the actor"),
-    ("Whoever", "name the actor"),
+    ("nobody", "name the actor"),
+    ("somebody", "name the actor"),
+    ("everybody", "name the actor"),
     ("what is not", "name the thing"),
     (" anew", "again"),
     (" amid", "among, during"),
@@ -70,6 +71,9 @@ const PHRASES: [(&str, &str); 14] = [
     ("akes leave", "shuts down"),
     ("has it that", "states"),
 ];
+
+/// The most words of a sentence. A code span is one word.
+const MOST_WORDS: usize = 25;
 
 /// Returns all files below a folder.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -85,7 +89,8 @@ fn is_written(path: &Path) -> bool {
 
 /// Returns every written file of the repository except this one, which lists the words.
 fn written() -> Vec<PathBuf> {
-    let folders = ["src", "crates", "tests", "benches", "examples", "docs", "config", "fuzz/fuzz_targets"];
+    let folders =
+        ["src", "crates", "tests", "benches", "examples", "docs", "config", "packaging", "msgs", "fuzz/fuzz_targets"];
     let all = folders.into_iter().flat_map(|folder| files(Path::new(folder)));
     let pages = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md"].map(PathBuf::from);
     let all = all.chain(pages).filter(|file| is_written(file) && !file.ends_with("repository/words.rs"));
@@ -121,10 +126,126 @@ fn no_phrase_that_must_be_read_twice_is_left() {
     let mut found = Vec::new();
     for file in written() {
         for (number, line) in std::fs::read_to_string(&file).unwrap().lines().enumerate() {
-            for (phrase, remedy) in PHRASES.iter().filter(|(phrase, _)| has(line, phrase)) {
+            let line = line.to_lowercase();
+            for (phrase, remedy) in PHRASES.iter().filter(|(phrase, _)| has(&line, phrase)) {
                 found.push(format!("{}:{}: \"{phrase}\": {remedy}", file.display(), number + 1));
             }
         }
     }
     assert!(found.is_empty(), "{} places:\n{}", found.len(), found.join("\n"));
+}
+
+/// Returns the text of the comment that a line is, and its mark; `None` for a line without a comment of its own.
+fn comment<'l>(line: &'l str, marks: &[&'static str]) -> Option<(&'l str, &'static str)> {
+    let line = line.trim_start();
+    let mark = marks.iter().find(|mark| line == mark.trim_end() || line.starts_with(**mark))?;
+    Some((line.get(mark.len()..).unwrap_or_default().trim_end_matches("*/"), mark))
+}
+
+/// Returns the lines of prose in a file. A line of anything else is empty.
+fn prose(file: &Path, text: &str) -> Vec<String> {
+    let extension = file.extension().unwrap_or_default().to_str().unwrap();
+    let marks: &[&str] = match extension {
+        "md" => return text.lines().map(str::to_owned).collect(),
+        "rs" | "js" | "css" => &["/// ", "//! ", "// ", "/** ", "/* ", "* "],
+        _ => &["# "],
+    };
+    let (mut lines, mut last, mut is_docstring) = (Vec::new(), "", false);
+    for line in text.lines() {
+        if extension == "py" && (is_docstring || line.trim_start().starts_with("\"\"\"")) {
+            is_docstring ^= line.matches("\"\"\"").count() == 1;
+            lines.push(line.replace("\"\"\"", ""));
+            continue;
+        }
+        let (found, mark) = comment(line, marks).unwrap_or(("", ""));
+        // Neighbours of different marks are different texts; a block comment has two marks.
+        let is_other =
+            !last.is_empty() && !mark.is_empty() && mark != last && !(mark == "* " && last.starts_with("/*"));
+        lines.push(if is_other { format!("- {found}") } else { found.to_owned() });
+        last = mark;
+    }
+    lines
+}
+
+/// Returns true for a line that begins an item of a list.
+fn is_item(line: &str) -> bool {
+    let number = line.trim_start_matches(|c: char| c.is_ascii_digit());
+    ["- ", "* ", "+ ", "@"].iter().any(|mark| line.starts_with(mark)) || number != line && number.starts_with(". ")
+}
+
+/// Returns the paragraphs of lines of prose, each with the number of its first line. Code, tables, headings and HTML are
+/// left out.
+fn paragraphs(lines: &[String]) -> Vec<(usize, String)> {
+    let (mut found, mut is_code) = (vec![(0, String::new())], false);
+    for (number, line) in (1..).zip(lines) {
+        let text = line.trim();
+        let is_fence = text.starts_with("```");
+        is_code ^= is_fence;
+        let is_html =
+            text.strip_prefix('<').is_some_and(|rest| rest.starts_with(|c: char| !c.is_whitespace() && c != '='));
+        let begins = found.last().is_none_or(|(_, text)| text.is_empty());
+        let is_formula = begins && line.starts_with("    ");
+        if text.is_empty() || is_code || is_fence || is_html || is_formula || text.starts_with(['|', '#']) {
+            found.push((0, String::new()));
+            continue;
+        }
+        if begins || is_item(text) {
+            found.push((number, String::new()));
+        }
+        let (_, paragraph) = found.last_mut().unwrap();
+        paragraph.push_str(text);
+        paragraph.push(' ');
+    }
+    found
+}
+
+/// Returns the sentences of a paragraph, as words. A code span is one word, and so is a link with its address.
+fn sentences(paragraph: &str) -> Vec<Vec<&str>> {
+    let is_end = |word: &str| {
+        let word = word.trim_end_matches(['"', '\'', ')', ']', '*', '_', '`']);
+        word.len() > 1 && word.ends_with(['.', '!', '?'])
+    };
+    let (mut found, mut is_span) = (vec![Vec::new()], false);
+    let words: Vec<&str> = paragraph.split_whitespace().collect();
+    for (at, word) in words.iter().enumerate() {
+        let begins_in_span = is_span;
+        is_span ^= word.matches('`').count() % 2 == 1;
+        if !begins_in_span && word.contains(char::is_alphanumeric) {
+            found.last_mut().unwrap().push(*word);
+        }
+        let next = words.get(at + 1).and_then(|next| next.chars().next());
+        if !is_span && is_end(word) && next.is_none_or(|next| !next.is_lowercase()) {
+            found.push(Vec::new());
+        }
+    }
+    found
+}
+
+#[test]
+fn no_sentence_has_more_than_25_words() {
+    let others = ["CHANGELOG.md", "Cargo.toml", "deny.toml", "tests/run"].map(PathBuf::from);
+    let (mut found, mut count) = (Vec::new(), 0);
+    for file in written().into_iter().chain(others).chain([PathBuf::from("tests/repository/words.rs")]) {
+        let lines = prose(&file, &std::fs::read_to_string(&file).unwrap());
+        for (number, paragraph) in paragraphs(&lines) {
+            for sentence in sentences(&paragraph) {
+                count += usize::from(!sentence.is_empty());
+                if sentence.len() > MOST_WORDS {
+                    let text = sentence.join(" ");
+                    found.push(format!("{}:{number}: {} words: {text}", file.display(), sentence.len()));
+                }
+            }
+        }
+    }
+    assert!(count > 10_000, "{count} sentences");
+    assert!(found.is_empty(), "{} of {count} sentences:\n{}", found.len(), found.join("\n"));
+}
+
+#[test]
+fn a_sentence_ends_at_a_full_stop_and_a_code_span_is_a_word() {
+    let lines = ["/// One two", "/// `three three three` [four](address). Five: a . b", "", "// - six", "// - seven."];
+    let lines = prose(Path::new("file.rs"), &lines.join("\n"));
+    let paragraphs = paragraphs(&lines);
+    let counts = paragraphs.iter().flat_map(|(_, text)| sentences(text)).map(|words| words.len());
+    assert_eq!(counts.filter(|count| *count > 0).collect::<Vec<_>>(), [4, 3, 1, 1]);
 }

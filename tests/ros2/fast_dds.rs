@@ -335,7 +335,7 @@ fn visit(name: &str, index: usize) -> Visit {
     Visit::Served
 }
 
-/// Removes the shared memory that killed participants of Fast DDS have left, half a megabyte each: nobody holds its
+/// Removes the shared memory that killed participants of Fast DDS have left, half a megabyte each: no process holds its
 /// lock. A participant that starts may not hold it yet, so what is younger than a minute stays.
 fn remove_left_memory() {
     let age = |lock: &Path| lock.metadata().ok()?.modified().ok()?.elapsed().ok();

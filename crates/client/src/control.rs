@@ -37,7 +37,7 @@ pub enum ControlError {
     #[error(transparent)]
     Open(#[from] OpenError),
     /// There is no publisher.
-    #[error("nobody publishes under the name \"{0}\"")]
+    #[error("no publisher has the name \"{0}\"")]
     NoPublisher(String),
     /// Frames come, and no show on this machine takes commands.
     #[error(

@@ -3,7 +3,6 @@
 //! Each is a separate process that handles the events of feeds, so that none can delay the loop.
 
 mod http;
-pub mod keys;
 pub mod metrics;
 pub mod monitor;
 pub mod send;

@@ -49,8 +49,8 @@ use self::steps::{Step, Steps};
 
 /// The version of the file format.
 const FORMAT: u32 = 2;
-/// Limit of the length of a line, bytes.
-const LONGEST_LINE: u64 = 1 << 26;
+/// The most bytes of a line. The first line holds the text of the scene.
+pub const LONGEST_LINE: u64 = 1 << 26;
 
 /// The content of a valid certificate.
 #[derive(Debug, Clone, Serialize)]

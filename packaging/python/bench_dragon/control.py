@@ -34,7 +34,7 @@ class Controller:
         except iox2.RequestResponseOpenError as error:
             if "IncompatibleRequestOrResponseType" in str(error):
                 raise layout_error(service, [ControlRequest, ControlResponse]) from error
-            raise ConnectionError(f'nobody publishes under the name "{name}"') from error
+            raise ConnectionError(f'no publisher has the name "{name}"') from error
         self._client = opened.client_builder().create()
         self._sent = 0
 

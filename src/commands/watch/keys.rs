@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
+use super::key_bytes::Key;
 use bench_dragon::client::control::command_client::{Action, ActionResult, CommandClient};
 use bench_dragon::client::control::{refusal, standing};
 use bench_dragon::client::feed::FeedEvent;
 use bench_dragon::messages::control::Command;
-use bench_dragon::outputs::keys::Key;
 use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGCONT, SIGQUIT, SIGTSTP};
 

@@ -11,10 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use bench_dragon_messages::SCENE_HASH_BYTES;
-use bench_dragon_proof::{Proved, ProvedEvent, Refused, scene_hash};
-
-/// The most bytes of the first line, which holds the scene's text.
-const LONGEST_FIRST_LINE: u64 = 1 << 26;
+use bench_dragon_proof::{LONGEST_LINE, Proved, ProvedEvent, Refused, scene_hash};
 
 /// BLAKE3 of a scene's text.
 pub type SceneHash = [u8; SCENE_HASH_BYTES];
@@ -35,7 +32,7 @@ impl Certificate {
     pub fn open(file: &Path) -> Result<Self, Refused> {
         let mut lines = BufReader::new(File::open(file).map_err(Refused::Unreadable)?);
         let mut first = Vec::new();
-        lines.by_ref().take(LONGEST_FIRST_LINE).read_until(b'\n', &mut first).map_err(Refused::Unreadable)?;
+        lines.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut first).map_err(Refused::Unreadable)?;
         let scene_hash = scene_hash(&bench_dragon_proof::scene_of(&first)?);
         Ok(Self { file: file.to_owned(), scene_hash, lines: Cursor::new(first).chain(lines) })
     }

@@ -148,7 +148,7 @@ export function conduct(publishers, keysConduct, keySwitch) {
     return id;
   }
   /**
-   * Says that a command on a connection that has broken gets no answer. A seek is not sent again: nobody expects the
+   * Says that a command on a connection that has broken gets no answer. A seek is not sent again: no user expects the
    * jump later.
    */
   function showLost() {
@@ -243,7 +243,7 @@ export function conduct(publishers, keysConduct, keySwitch) {
     if (at - sentenceAt > SENTENCE_TIME) put(part("answer"), "");
     if (bar.hidden) return;
     main.style.setProperty("--conduct-height", `${bar.offsetHeight}px`);
-    // A browser ends the drag of a control that is disabled, and tells nobody.
+    // A browser ends the drag of a control that is disabled, and sends no event.
     for (const control of bar.querySelectorAll("button, input, select:not(#conduct-whom)")) control.disabled =
         !all.length && !(control === line && dragged);
     // All shows can be held while the selected one is gone.
