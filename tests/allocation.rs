@@ -73,11 +73,11 @@ impl FrameSource for Watched<'_> {
     fn frame(&mut self, tick: u64, stamps: Stamps) -> Period<'_> {
         self.frames += 1;
         self.stop.store(self.frames == FRAMES, Ordering::Relaxed);
-        if tick > 0 {
+        if self.frames > 1 {
             self.before = self.before.or(Some(allocations()));
         }
         let outgoing = self.show.outgoing(tick, stamps);
-        if tick > 0 {
+        if self.frames > 1 {
             self.loans += 2 + outgoing.alerts.len() as u64;
         }
         self.states[outgoing.header.state as usize] += 1;
