@@ -6,16 +6,16 @@
 //! Where all dragons have tables of their frames, a table lists the pairs that can be the nearest at each time of the
 //! show ([`super::between_table`]). Otherwise the pairs are found from frame to frame.
 //!
-//! The broad phase is that of [`super::search`]: every bench carries from frame to frame a lower bound of its distance
-//! to the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A bench is
-//! tested again only when its bound comes within the limit. The box about each dragon gives a wide bound to benches
-//! that are far from all others; among the others a grid finds the near ones.
+//! The broad phase is the same as in [`super::search`]. Every bench carries from frame to frame a lower bound of its
+//! distance to the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A
+//! bench is tested again only when its bound comes within the limit. The box about each dragon gives a wide bound to
+//! benches that are far from all later dragons. For the other benches a grid finds the boards nearby.
 //!
-//! Dragons that go side by side hardly approach each other, however fast they go. So a bench keeps a list of the
-//! boards near it, each with a distance and the places of the board's handles at that time as seen from the bench: with
-//! the front handle as the origin and the link as an axis. A point of a board is a linear function of the board's two
-//! handles. So two boards have approached by no more than [`corner_reach`] times the movement of the handles as seen
-//! from the bench. A board of the list is measured again only when this bound comes within the limit.
+//! Dragons that go side by side hardly approach each other, however fast they go. So a bench keeps a list of the boards
+//! near it. Each entry has a distance and the places of the board's handles at that time, as seen from the bench. In
+//! this frame the bench's front handle is the origin and its link is an axis. A point of a board is a linear function
+//! of the board's two handles. So two boards have approached by no more than [`corner_reach`] times the movement of the
+//! handles as seen from the bench. A board of the list is measured again only when this bound comes within the limit.
 
 use super::between_table::{BetweenTable, TabledDragon};
 use super::grid::Grid;

@@ -2,13 +2,13 @@
 //! that a frame tests only these.
 //!
 //! The time is divided into equal cells. Throughout a cell every handle is near a quadratic polynomial of the cell's
-//! time, which gives every two boards a lower and an upper bound of their distance (see [`super::moving`]). The list of
-//! a cell has the pairs whose lower bound is within the least upper bound, in ascending order; its last entry stands
-//! for all other pairs.
+//! time. The polynomials give a lower and an upper bound of the distance of every two boards (see [`super::moving`]).
+//! The list of a cell has the pairs whose lower bound is within the least upper bound, in ascending order. Its last
+//! entry stands for all other pairs.
 //!
-//! The polynomials follow from the rows of each dragon's table ([`crate::solve::table::rows`]): throughout a cell,
-//! alpha of the second handle is nearly a linear function of the time. They hold while alpha and the head are within
-//! assumed errors, which every frame checks.
+//! The polynomials follow from the rows of each dragon's table ([`crate::solve::table::rows`]). Throughout a cell,
+//! alpha of the second handle is nearly a linear function of the time. The polynomials hold while alpha and the head
+//! are within assumed errors, which every frame checks.
 //!
 //! In: the dragons of a show and its end. Out: a list for every frame. Only [`super::between`] calls it.
 
@@ -262,8 +262,8 @@ impl<'a> Builder<'a> {
         Some(one.distance_bounds(one_at, other, other_at))
     }
 
-    /// Returns the pairs that can be within `limit`, each with a lower bound, and lowers the limit to `allowance`
-    /// metres above an upper bound of the least distance.
+    /// Returns the pairs that can be within `limit`, each with a lower bound. Lowers the limit to `allowance` metres
+    /// above an upper bound of the least distance.
     fn candidates(&mut self, limit: &mut f64, allowance: f64) -> Vec<((u32, u32), f64)> {
         let mut candidates = Vec::new();
         let travel = self.boxes.iter().map(|(_, travel)| *travel).fold(0.0, f64::max);

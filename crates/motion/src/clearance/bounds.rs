@@ -9,12 +9,12 @@
 //! others. Far behind, where boards hardly move against each other while all advance by a link, one list is valid for
 //! all cells of a row.
 //!
-//! The rows are grouped into blocks. The least bound of each block is also kept cell by cell, so that those of a whole
-//! chain are adjacent in memory: a frame reads only the blocks whose least bound is within its limit.
+//! The rows are grouped into blocks. The least bound of each block is also kept cell by cell. So the least bounds of a
+//! whole chain are adjacent in memory. A frame reads only the blocks whose least bound is within its limit.
 //!
-//! The head's link differs, but while the second handle is in a cell, the head too is near a known quadratic polynomial
-//! of the cell's time. Its list is valid while the head is within the assumed error, which every frame checks. Past a
-//! stall the head is elsewhere and has no list.
+//! The head's link differs. But while the second handle is in a cell, the head too is near a known quadratic polynomial
+//! of the cell's time. The head's list is valid while the head is within the assumed error, which every frame checks.
+//! Past a stall the head is elsewhere and has no list.
 //!
 //! In: a path and a team. Out: lists for every frame. Only the clearance calls it.
 

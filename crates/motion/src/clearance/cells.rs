@@ -1,5 +1,5 @@
-//! Places of the handles and the head while the second handle is in a cell of the table: quadratic polynomials of the
-//! cell's time with error bounds. Used only to make the table.
+//! Places of the handles and the head while the second handle is in a cell of the table. They are quadratic polynomials
+//! of the cell's time with error bounds. Used only to make the table.
 
 use super::bounds::CELLS;
 use super::moving::Quadratic;
@@ -22,8 +22,8 @@ pub(super) struct HeadGridPoint {
 /// Error bound of the head's place at the end of the first cell, in links: the path's start is within the cell.
 const ERROR_BEHIND_START: f64 = 1e-3;
 
-/// Returns the first row for which T is known while the phase goes from `begin` to `end`, and the handles from this row
-/// up to `end_row`.
+/// Returns the first row for which T is known while the phase goes from `begin` to `end`. Returns also the handles from
+/// this row up to `end_row`.
 pub(super) fn handles(rows: &Rows, (begin, end): (f64, f64), end_row: usize) -> (usize, Vec<Quadratic>) {
     let front = rows.bands.first().map_or(0, |band| band.first_row);
     let first = ((rows.valid_from - begin).ceil() as usize).max(front);
@@ -147,8 +147,8 @@ fn largest_difference(a: [f64; 6], (middle, half): (f64, f64), b: [f64; 3], (tim
     shifted.iter().map(|coefficient| coefficient.abs()).sum()
 }
 
-/// Returns the head when alpha of the second handle is at the beginning of a cell, by the number of the cell over all
-/// rows; of several places the first. The places need not be exact.
+/// Returns the head when alpha of the second handle is at the beginning of a cell. The index is the number of the cell
+/// over all rows. Of several places the first is returned. The places need not be exact.
 pub(super) fn head_grid_points(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Option<HeadGridPoint>>> {
     let cells = |travelled: f64| {
         let (alpha, rate) = follower.second_handle(travelled)?;

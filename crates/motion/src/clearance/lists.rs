@@ -16,8 +16,8 @@ const MOST_ENTRIES: usize = 24;
 /// Boards farther than the nearest by more than this, in links, have no entry.
 const ALLOWANCE: f64 = 0.02;
 
-/// Nanoseconds on a processor of 2025 for the handle of a row, for its list, for visiting another board, and for
-/// bounding the distance to it.
+/// Nanoseconds on a processor of 2025 for a row's handle, for its list, for a visited board, and for a bound of its
+/// distance.
 const WORK_OF_HANDLE: usize = 400;
 const WORK_OF_LIST: usize = 300;
 const WORK_OF_VISIT: usize = 15;

@@ -2,19 +2,19 @@
 //! table.
 //!
 //! **The bound.** Time t runs from -1 to 1 over the cell. Every handle is a quadratic polynomial of t with an error of
-//! at most `error` metres; so are the middle of a board and, since its link is rigid, its unit axis u. Take any
-//! direction w that is fixed to board a: w = p u + q n with p^2 + q^2 = 1 and n the unit normal of a. Between a and b
-//! there is the gap
+//! at most `error` metres. The middle of a board is such a polynomial, too. So is its unit axis u, since its link is
+//! rigid. Take any direction w that is fixed to board a. Then w = p u + q n with p^2 + q^2 = 1 and n the unit normal of
+//! a. Between a and b there is the gap
 //!
 //! (c_b - c_a) . w - h_a(w) - L_b |u_b . w| - W_b |n_b . w|,
 //!
 //! with the middles c, half the length L_b and width W_b of b, and h_a(w) = L_a |p| + W_a |q|, which is constant. The
-//! signed distance is the greatest such gap over all w (by the separating axis theorem where the boards overlap), so
-//! each is a lower bound. The gap is the least of four functions, one for each corner of b; each is a sum of products
-//! of two known quadratics. Of every product the powers up to t^2 are kept, the others are bounded by their
-//! coefficients; if A and B have errors e and f, and B is a unit vector, A . B has an error of at most e + |A| f. The
-//! rest is the least value of a quadratic between -1 and 1. Motion of b along a does not weaken the bound, at any
-//! speed.
+//! signed distance is the greatest such gap over all w, by the separating axis theorem where the boards overlap. So
+//! each gap is a lower bound. The gap is the least of four functions, one for each corner of b. Each function is a sum
+//! of products of two known quadratics. Of every product the powers up to t^2 are kept. The others are bounded by their
+//! coefficients. Let A and B have errors e and f, and let B be a unit vector. Then A . B has an error of at most e +
+//! |A| f. The rest is the least value of a quadratic between -1 and 1. Motion of b along a does not weaken the bound,
+//! at any speed.
 //!
 //! From above the distance is bounded by that of any two points, one fixed to each board.
 
@@ -116,7 +116,7 @@ impl MovingBoard {
     }
 
     /// Returns the board in the middle of the cell, for handles without error. Its axis is a unit vector even if the
-    /// handles' distance is not exactly the link: a direction w of the bound is a unit vector in its frame.
+    /// handles' distance is not exactly the link. So a direction w of the bound is a unit vector in the board's frame.
     pub(super) fn middle(&self) -> Board {
         let Self { half_length, half_width, .. } = *self;
         let axis = self.axis.terms[0].normalize();
@@ -147,9 +147,9 @@ impl MovingBoard {
         self.centre.to(&other.centre).travel() + turn(self) + turn(other)
     }
 
-    /// Returns a lower and an upper bound of the signed distance to `other` throughout the cell, given both boards in
-    /// the middle of the cell: the least gap along the direction in which they are nearest there, and the greatest
-    /// distance of the points that are closest there.
+    /// Returns a lower and an upper bound of the signed distance to `other` throughout the cell. `at` and `other_at`
+    /// are the two boards in the middle of the cell. The lower bound is the least gap along the direction in which the
+    /// boards are nearest there. The upper bound is the greatest distance of the points that are closest there.
     pub(super) fn distance_bounds(&self, at: &Board, other: &Self, other_at: &Board) -> (f64, f64) {
         let (on_own, on_other) = closest_points_board_board(at, other_at);
         let direction = direction(at, other_at, on_other - on_own);

@@ -3,11 +3,11 @@
 //! In: the chain of a frame and the clearance of its nearest two boards. Out: a board nearer to an obstacle, if there
 //! is one. The show calls it if a scene has obstacles and alerts.
 //!
-//! Obstacles stand still. So the clearance of a body bench depends on the place of its front handle alone, which a
-//! follower table gives as a row and a phase: see [`super::bounds`]. Each row is divided into [`CELLS`] equal cells.
-//! For each row and cell a table has a lower bound of the clearance of all obstacles: that in the middle of the cell,
-//! less the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the benches that the
-//! bounds do not exclude.
+//! Obstacles stand still. So the clearance of a body bench depends on the place of its front handle alone. A follower
+//! table gives this place as a row and a phase (see [`super::bounds`]). Each row is divided into [`CELLS`] equal cells.
+//! For each row and cell a table has a lower bound of the clearance of all obstacles. The bound is the clearance in the
+//! middle of the cell, less the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the
+//! benches that the bounds do not exclude.
 
 use super::cells::handles;
 use super::moving::MovingBoard;

@@ -26,9 +26,9 @@ const MOST_MOVED: f64 = 100.0;
 
 /// For every bench a lower bound of its distance to those behind it, carried from frame to frame.
 ///
-/// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D
-/// (a little more if links have errors). No two boards are nearer by more than twice that. So an earlier bound, less
-/// this amount for all movement since, still holds.
+/// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D.
+/// If links have errors, this length is a little more. No two boards are nearer by more than twice this length. So an
+/// earlier bound, less this amount for all movement since, still holds.
 #[derive(Debug, Clone)]
 pub(super) struct CarriedBounds {
     /// The handles of the previous frame.
@@ -270,8 +270,9 @@ impl<'a> ClearanceSearch<'a> {
         value
     }
 
-    /// Returns a lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides
-    /// and without a square root: half the link of `b` is scaled to half its board, and its width is taken across.
+    /// Returns a lower bound of the signed distance of `board_a` and bench `b`, from the gaps along `board_a`'s sides.
+    /// The bound needs no square root. Half the link of `b` is scaled to half its board, and half the board's width is
+    /// subtracted in any direction.
     fn gap_bound(&self, board_a: &Board, b: usize) -> f64 {
         let Positions { x, y } = self.chain;
         let half_link = (0.5 * (x[b] - x[b + 1]), 0.5 * (y[b] - y[b + 1]));
