@@ -1,49 +1,51 @@
-//! First contact and least clearance of a motion along any path, by conservative advancement: steps of the head that
-//! are proved to contain no nearer pair, and are halved if the proof fails.
+//! First contact and least clearance of a motion along any path, by conservative advancement. The head advances in
+//! steps that are proved to contain no nearer pair. A step is halved if the proof fails.
 //!
 //! In: a path, a team, the places where handles turn round ([`Singularities`](super::singularities::Singularities)),
 //! two places of the head. Out: an [`Event`] or a [`LeastClearance`], and how far the search came. The timeline,
 //! `check` and `plan pitch` call it. The search of `stepped_search` serves boards of one team, boards of two dragons
 //! ([`between`]), and boards and obstacles (`ground`).
 //!
-//! **How far handles move.** Handle 1 turns round only if the head is at a head turn, handle k + 1 only if handle k
-//! turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the turns
-//! between determine how each handle moves. The path that handle k passes over, forth and back, has the length m_k
-//! (`displacement`).
+//! **How far handles move.** Handle 1 turns round only if the head is at a head turn. Handle k + 1 turns round only if
+//! handle k turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the
+//! turns between determine how each handle moves. The path that handle k passes over, forth and back, has the length
+//! m_k (`displacement`).
 //!
-//! **How far boards move.** A point of a board is rear + s (front - rear) + w n, n the link's unit normal, s in
-//! [-e, 1 + e], e = inset / link, |w| <= width / 2. With handle velocities u and v, n turns at most at the rate
-//! (|u| + |v|) / link. So in a step from handle i to i + 1 the point goes along a path no longer than
-//! |s| m_i + |1 - s| m_{i+1} + (width / (2 link)) (m_i + m_{i+1}), which for any s is at most
+//! **How far boards move.** A point of the board from handle i to i + 1 is rear + s (front - rear) + w n with the
+//! link's unit normal n. Here s is in [-e, 1 + e], e = inset / link, and |w| <= width / 2. With handle velocities u and
+//! v, n turns at most at the rate (|u| + |v|) / link. So in a step the point goes along a path no longer than
+//! |s| m_i + |1 - s| m_{i+1} + (width / (2 link)) (m_i + m_{i+1}). For any s this length is at most
 //! C = max(m_i, m_{i+1}) + (e + width / (2 link)) (m_i + m_{i+1}).
 //!
 //! **Why nothing is skipped.** Assume that at some time of a step the clearance of a pair is x <= `limit`, limit >= 0.
-//! Take the nearest points P and Q of the two boards at that time, or a common point if they overlap: they are at most
-//! `limit` apart. At the ends of the step the *same* two points of the boards are at least as far apart as the
-//! clearances there. Their paths before and after that time together are those of the step. So c_start + c_end <= 2
-//! limit + B, B = C_a + C_b, and a pair that violates this stays above the limit during the whole step. (C need not be
-//! additive over sub-steps: the lengths of the paths of P and Q are.) For a limit below 0 there may be no such common
-//! pair of points: clearance is the largest gap over all directions, so along the best direction at either end two
-//! points bound it, and these differ between the ends. Then C takes m_i + m_{i+1} in place of their maximum, which is
-//! additive. Uncertain steps are halved, the earlier half first, down to the last digits of the distance.
+//! Take the nearest points P and Q of the two boards at that time, or a common point if the boards overlap. P and Q are
+//! at most `limit` apart. At the ends of the step the *same* two points of the boards are at least as far apart as the
+//! clearances there. Their paths before and after that time together are their paths in the step. So c_start + c_end <=
+//! 2 limit + B, B = C_a + C_b, and a pair that violates this stays above the limit during the whole step. (C need not
+//! be additive over sub-steps: the lengths of the paths of P and Q are.) For a limit below 0 there may be no such
+//! common pair of points. Clearance is the largest gap over all directions. So along the best direction at either end
+//! two points bound the clearance, and these points differ between the ends. Then C has the sum m_i + m_{i+1}, which is
+//! additive, in place of the maximum. Uncertain steps are halved, the earlier half first, down to the last digits of
+//! the distance.
 //!
 //! **Seen from the chain.** All this holds in any frame that moves rigidly. If all handles from the first to the last
-//! of a pair stay on one line or circle, so do their distances along it, and B = 0. On one spiral, take the frame that
-//! turns about the centre with handle i and moves outward by a d theta_i, in a fixed direction e of the frame. With
-//! psi_k = theta_k - theta_i, handle k moves in it by a d psi_k outward, by r_k d psi_k around, and by a d theta_i
-//! times the difference between its outward direction and e. This difference is at most the angle between them. While
-//! the handles from i to k go the same way, psi_k is monotone, so that the ends of the step determine these lengths.
-//! The angle of each link is monotone, too: (t . b) sqrt(a^2 + r^2) is larger at its outer handle than at its inner
-//! one, by 2 a (r + r') sin^2(d / 2) / link, so the outer handle turns less.
+//! of a pair stay on one line or circle, their distances along it stay the same. Then B = 0. On one spiral, take the
+//! frame that turns about the centre with handle i. The frame also moves outward by a d theta_i, in a fixed direction e
+//! of the frame. Let psi_k = theta_k - theta_i. In this frame handle k moves by a d psi_k outward and by r_k d psi_k
+//! around. It also moves by a d theta_i times the difference between its outward direction and e. This difference is at
+//! most the angle between the two directions. While the handles from i to k go the same way, psi_k is monotone, so that
+//! the ends of the step determine these lengths. The angle of each link is monotone, too. The product
+//! (t . b) sqrt(a^2 + r^2) is larger at the outer handle than at the inner handle, by 2 a (r + r') sin^2(d / 2) / link.
+//! So the outer handle turns less.
 //!
-//! **Which pairs.** Every link behind the first has one length, so the place of handle i >= 1 determines all places
-//! behind it: a pair (i, i + k) is where (1, 1 + k) is when handle 1 is at that place. Let S be the first place of
-//! handle 1. A handle i that is at or ahead of S is behind handle 1, which has come from S without a jump: handle 1 was
-//! at the place of handle i before, and so was the pair (1, 1 + k). So pairs without boards 0 and 1 matter only in
-//! steps in which handle 2 is somewhere behind S, in either direction of motion. A pair does not matter if its front
-//! handles are both behind the quiet place, where no two boards ever come within the limit. No pair matters while the
-//! whole team keeps its shape. Followers are solved only as far back as they can reach the boards that matter
-//! (`reach`).
+//! **Which pairs.** Every link behind the first has one length. So the place of handle i >= 1 determines all places
+//! behind it. A pair (i, i + k) is where (1, 1 + k) is when handle 1 is at that place. Let S be the first place of
+//! handle 1. A handle i that is at or ahead of S is behind handle 1, which has come from S without a jump. So handle 1
+//! was at the place of handle i before. Then the pair (1, 1 + k) was where (i, i + k) is now. So pairs without boards 0
+//! and 1 matter only in steps in which handle 2 is somewhere behind S, in either direction of motion. A pair does not
+//! matter if its front handles are both behind the quiet place, where no two boards ever come within the limit. No pair
+//! matters while the whole team keeps its shape. Followers are solved only as far back as they can reach the boards
+//! that matter (`reach`).
 
 pub mod between;
 mod broad_phase;
@@ -114,10 +116,10 @@ impl<'a> ConservativeAdvancement<'a> {
         Self { path, team, head_turns: places(head_turns), body_turns: places(body_turns), curves }
     }
 
-    /// Finds the first contact while the head goes from one place to another, metres of travel: the first place, to the
-    /// last digits, at which a signed distance is 0 or less. The event has the deepest of the pairs that touch there,
-    /// and the touching point. Boards that overlap at `from` are a contact there: the deepest pair, at the centre of
-    /// its overlap.
+    /// Finds the first contact while the head goes from one place to another, metres of travel. The first contact is
+    /// the first place, to the last digits, at which a signed distance is 0 or less. The event has the deepest of the
+    /// pairs that touch there, and the touching point. Boards that overlap at `from` are a contact there: the deepest
+    /// pair, at the centre of its overlap.
     ///
     /// # Errors
     /// [`NoFollower`] if a configuration strictly inside the motion cannot be solved.
@@ -139,8 +141,9 @@ impl<'a> ConservativeAdvancement<'a> {
     }
 
     /// Finds the first touch of each obstacle of a ground, in the path's own coordinates, while the head goes from one
-    /// place to another: the first place, to the last digits, at which its clearance is 0 or less. Returns them in the
-    /// order of the obstacles, and the metres of travel up to which that is proved.
+    /// place to another. The first touch is the first place, to the last digits, at which the obstacle's clearance is 0
+    /// or less. Returns the touches in the order of the obstacles, and the metres of travel up to which they are
+    /// proved.
     ///
     /// # Errors
     /// [`NoFollower`] if a configuration strictly inside the motion cannot be solved.
@@ -182,8 +185,8 @@ impl<'a> ConservativeAdvancement<'a> {
         golden_section_min(clearance, from, to)
     }
 
-    /// Returns the metres of travel of the head up to which the whole team stays on its line or circle, and so keeps
-    /// its shape; `None` if it is not on one.
+    /// Returns the metres of travel of the head up to which the whole team stays on its line or circle. Until then the
+    /// team keeps its shape. Returns `None` if the team is not on a line or circle.
     fn rigid_until(&self, travelled: f64) -> Option<f64> {
         let head = self.path.param_at(travelled);
         let segment = self.path.segment(head);

@@ -220,8 +220,8 @@ impl Ensemble {
         Ok((first.map(|(meeting, pair)| self.contact_event(&meeting, pair)), until))
     }
 
-    /// Returns the first contact of boards of two dragons up to a time of the show: its time, and a bench of each,
-    /// counted within it; `None` if there is none, or the search gave up.
+    /// Returns the first contact of boards of two dragons up to a time of the show. The contact has its time, and a
+    /// bench of each dragon, counted within the dragon. Returns `None` if there is no contact, or the search gave up.
     pub fn first_contact_of(
         &self,
         pair: [usize; 2],
@@ -255,8 +255,8 @@ impl Ensemble {
         self.dragons.iter().zip(found).map(|(dragon, found)| moving(dragon, found)).collect()
     }
 
-    /// Returns the least clearances of any two boards that share no handle, of one dragon and of two, from the start
-    /// until the show ends at `freeze`.
+    /// Returns the least clearances of any two boards that share no handle, from the start until the show ends at
+    /// `freeze`. `own` is for boards of one dragon, `between` for boards of two dragons.
     pub fn least_clearances(&self, freeze: &TimedEvent, progress: &mut dyn FnMut(f64)) -> LeastClearances {
         let share = 0.5 / self.dragons.len() as f64;
         let own = |k: usize| self.own_least_clearance(k, freeze, &mut |part| progress(share * (k as f64 + part)));
@@ -265,8 +265,8 @@ impl Ensemble {
         LeastClearances { own, between }
     }
 
-    /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show; `None`
-    /// if there are no two, or the search failed.
+    /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show. Returns
+    /// `None` if there are no two boards, or the search failed.
     fn own_least_clearance(
         &self,
         dragon: usize,
@@ -309,8 +309,8 @@ impl Ensemble {
         Some(TimedClearance { least, time: meeting.time, searched_until })
     }
 
-    /// Returns the time at which boards of two dragons are nearest, up to a time of the show, and a bench of each,
-    /// counted within it; `None` if the search failed.
+    /// Returns the time at which boards of two dragons are nearest, up to a time of the show. Returns also a bench of
+    /// each dragon, counted within the dragon. Returns `None` if the search failed.
     pub fn nearest_of(&self, pair: [usize; 2], to: f64) -> Option<(f64, [usize; 2])> {
         let two = pair.map(|dragon| &self.dragons[dragon]);
         let found = two.map(|dragon| dragon.motion.singularities(&mut |_| ()));

@@ -1,7 +1,7 @@
 //! The ground: the obstacles and the boundary of a stage, each with its keep-out.
 //!
 //! In: the shapes of a scene, in stage coordinates. Out: the clearance of a board. The scene creates a ground and gives
-//! it to [`Motion`](crate::Motion), which maps it once to the path's own coordinates: there the searches and the live
+//! it to [`Motion`](crate::Motion), which maps it once to the path's own coordinates. There the searches and the live
 //! clearance run.
 
 use crate::model::board::Board;

@@ -1,6 +1,6 @@
 //! The motion: a team on a path at a speed, with a method to solve it. This crate alone decides what a show computes:
-//! the solver and the reason for it, the events, the live clearance, the time of a travelled distance, the outline to
-//! draw.
+//! the solver and the reason for it, the events, and the live clearance. It also decides the time of a travelled
+//! distance and the outline to draw.
 //!
 //! In: the numbers of a scene. The show, the plans and the commands call it. Only `model` distinguishes the kinds of
 //! curves.
@@ -64,8 +64,8 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Returns the greatest difference, metres, between the clearance of a frame and that of exact motion: twice the
-    /// displacement of a board's points for handles with the error that the solver promises.
+    /// Returns the greatest difference, metres, between the clearance of a frame and the clearance of exact motion. It
+    /// is twice the displacement of a board's points for handles with the error that the solver promises.
     pub fn clearance_error(&self, team: &Team) -> f64 {
         let factor = |link| Board::displacement_factor(link, team.hole_inset, team.width);
         let factor = factor(team.link(0)).max(factor(team.link(1)));
@@ -348,8 +348,8 @@ impl Motion {
         }
     }
 
-    /// Makes a table for the clearance of frames from another solver: the most exact one, or a coarse one if the exact
-    /// one would be too large.
+    /// Makes a table for the clearance of frames from another solver. It is the most exact table, or a coarse table if
+    /// the exact table would be too large.
     fn table_for_clearance(&self) -> Option<FollowerTable> {
         let exact = || FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted);
         let coarse = || {

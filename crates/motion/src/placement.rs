@@ -69,8 +69,8 @@ impl Placement {
     /// The placement of a path that stands at its own coordinates.
     pub const IDENTITY: Self = Self { turn: None, origin: Vector::new(0.0, 0.0) };
 
-    /// Creates the placement that puts the origin of the path's coordinates at `origin`, metres, and turns the path by
-    /// `rotation_turns` turns counter-clockwise about it, after a reflection of y if `mirror` is true.
+    /// Creates the placement that puts the origin of the path's coordinates at `origin`, metres. It turns the path by
+    /// `rotation_turns` turns counter-clockwise about that point, after a reflection of y if `mirror` is true.
     pub fn new(origin: Vector, rotation_turns: f64, mirror: bool) -> Self {
         // Whole turns are nothing, and quarters are exact.
         let part = rotation_turns - rotation_turns.round();
@@ -86,8 +86,8 @@ impl Placement {
         Self { turn: turned, origin }
     }
 
-    /// Returns the placement of the spiral about the origin that a spiral of an outline is: its beginning, its heading
-    /// and the side of its curvature say where it lies. `None` for other curves.
+    /// Returns the placement that maps the spiral about the origin to a spiral of an outline. The beginning, the
+    /// heading and the side of the curvature say where the outline's spiral lies. Returns `None` for other curves.
     pub fn of_spiral(outline: &SegmentOutline) -> Option<Self> {
         let (spiral, first, curvature) = outline.kind.spiral()?;
         if curvature.is_nan() {

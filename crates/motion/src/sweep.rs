@@ -1,5 +1,5 @@
-//! [`sweep`]: the positions that boards take one after the other while the head goes from one place to another, near
-//! enough to each other for an outline of the ground they cover.
+//! [`sweep`]: the positions that boards take one after the other while the head goes from one place to another. The
+//! positions are near enough to each other for an outline of the ground that the boards cover.
 //!
 //! In: a motion, a stretch of its path, some benches. Out: pairs of positions of one board. `drawing::swept` calls it.
 
@@ -10,8 +10,8 @@ use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::Point;
 use crate::model::board::Board;
 
-/// The corners of a board at the beginning and at the end of a step of the head, in the order of [`Board::corners`], on
-/// the stage.
+/// The corners of a board on the stage, at the beginning and at the end of a step of the head. They are in the order of
+/// [`Board::corners`].
 pub type Moved = [[Point; 4]; 2];
 
 /// Shares of a step at which the corners are compared with the straight lines between its ends.
@@ -26,8 +26,9 @@ const GROWTH: f64 = 1.5;
 const LEAST_SHARE: f64 = 1e-9;
 
 /// Gives `moved` every position of the boards of `benches`, counted from 0, while the head travels `from` to `to`
-/// metres: step by step, so that each corner stays within `tolerance` metres of the straight line between its two
-/// ends, at a quarter, a half and three quarters of the step. `progress` receives the share that is done, from 0 to 1.
+/// metres. The head travels step by step. In a step each corner stays within `tolerance` metres of the straight line
+/// between its two ends. This is tested at a quarter, a half and three quarters of the step. `progress` receives the
+/// share that is done, from 0 to 1.
 ///
 /// A board whose front handle is at one place of the path lies in one position, whichever bench of its length that is.
 /// So a board is left out from where the board before it, of the same length, began.
@@ -114,8 +115,8 @@ impl Boards<'_> {
             .map_or(0, |last| last + 1)
     }
 
-    /// Returns the positions of the first `least` boards, if there are as many, and of those behind them up to the last
-    /// one that is alone.
+    /// Returns the positions of the first `least` boards, if there are as many. Returns also the positions of the
+    /// boards behind them up to the last board that is alone.
     fn positions(&self, travelled: f64, least: usize) -> Result<Vec<Position>, NoFollower> {
         let (path, team) = (self.motion.path(), self.motion.team());
         let mut front = path.param_at(travelled);

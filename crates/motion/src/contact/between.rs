@@ -1,11 +1,12 @@
 //! First contact and least clearance of boards of two dragons of a show, by the steps of [`super`].
 //!
-//! **Why nothing is skipped.** The proof in [`super`] does not use that two boards belong to one chain: it needs the
-//! clearances at both ends of a step and bounds C of the paths of the boards' points on the stage. Here a step is
-//! one of time. Each head goes forward along its path, or stands, so that C of each board is that of its own dragon,
-//! and B = C_a + C_b. Boards that stand have no path. Two boards on straight lines, neither of which begins or ends to
-//! move within the step, move relative to each other by the difference of their two vectors, along a straight line: B
-//! is its length. So two dragons that go side by side, or one behind the other, cost few steps.
+//! **Why nothing is skipped.** The proof in [`super`] does not use that two boards belong to one chain. It needs the
+//! clearances at both ends of a step. It also needs bounds C of the paths of the boards' points on the stage. Here a
+//! step is an interval of time. Each head goes forward along its path, or stands. So C of each board follows from its
+//! own dragon, and B = C_a + C_b. Boards that stand have no path. Let two boards be on straight lines, and let neither
+//! begin or end to move within the step. Then they move relative to each other by the difference of their two vectors,
+//! along a straight line. B is the length of this difference. So two dragons that go side by side, or one behind the
+//! other, cost few steps.
 
 use crate::event::Budget;
 use crate::linkage::NoFollower;
@@ -70,8 +71,8 @@ pub struct Meeting {
     pub place: Point,
 }
 
-/// Finds the first contact of two dragons between two times: the first time, to the last digits, at which a signed
-/// distance is 0 or less. `searched_until` is a time.
+/// Finds the first contact of two dragons between two times. The first contact is at the first time, to the last
+/// digits, at which a signed distance is 0 or less. `searched_until` is a time.
 ///
 /// # Errors
 /// [`NoFollower`] if a configuration inside the motion cannot be solved.

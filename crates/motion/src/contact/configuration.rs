@@ -95,8 +95,8 @@ pub(super) fn near_pairs(
     pairs
 }
 
-/// Returns the last place up to `to` at which the whole team can be solved, and the metres of travel from which on
-/// rounding may prevent a solution.
+/// Returns the last place up to `to` at which the whole team can be solved. Returns also the metres of travel from
+/// which on rounding may prevent a solution.
 pub(super) fn last_solvable(
     chain: &ConservativeAdvancement,
     budget: &mut Budget,

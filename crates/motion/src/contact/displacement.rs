@@ -86,8 +86,8 @@ impl Displacements {
         Ok(())
     }
 
-    /// Returns the places at which the follower of `handle` turned round: behind each turning place of the handle, and
-    /// behind each place it passed over at which a follower turns.
+    /// Returns the places at which the follower of `handle` turned round. They are behind each turning place of the
+    /// handle, and behind each place it passed over at which a follower turns.
     fn followers_of_turns(
         &mut self,
         chain: &ConservativeAdvancement,
@@ -191,8 +191,8 @@ impl Displacements {
         self.handles[bench].run == self.handles[bench + 1].run && places.iter().all(|place| place.segment == segment)
     }
 
-    /// Returns the signed curvature of the line or circle on which a board stays while it goes one way; `None` if it is
-    /// not on one.
+    /// Returns the signed curvature of the line or circle on which a board stays while it goes one way. Returns `None`
+    /// for any other motion.
     pub fn one_curve(
         &self,
         chain: &ConservativeAdvancement,

@@ -1,18 +1,18 @@
 //! First touches of the obstacles of a ground and the least clearance of each, by the steps of [`super`].
 //!
-//! **Why nothing is skipped.** An obstacle stands still, so the proof in [`super`] holds with B = C of the board: if
-//! its distance d from the shape is at most x >= 0 at some time of a step, take the nearest points P of the board and Q
-//! of the shape then, or a common point. At both ends of the step P is at least as far from Q as the distances d_start
-//! and d_end, and P goes along a path no longer than C. So d_start + d_end <= 2 x + C. Where the clearance sought is an
-//! overlap, d < 0, the displacements that are additive take C's place. This holds for a convex shape. Out of a pocket
-//! of another shape the least translation may jump. There a board that is C longer and wider to each side takes the
-//! board's place: in the whole step the board is within it, so its least translation frees the board at any time of the
-//! step.
+//! **Why nothing is skipped.** An obstacle stands still, so the proof in [`super`] holds with B = C of the board.
+//! Assume that the board's distance d from the shape is at most x >= 0 at some time of a step. Take the nearest points
+//! P of the board and Q of the shape at that time, or a common point. At both ends of the step P is at least as far
+//! from Q as the distances d_start and d_end. P goes along a path no longer than C. So d_start + d_end <= 2 x + C.
+//! Where the clearance sought is an overlap, d < 0, the displacements that are additive take C's place. This holds for
+//! a convex shape. Out of a pocket of another shape the least translation may jump. There a board that is C longer and
+//! wider to each side takes the board's place. In the whole step the board is within this larger board. So the least
+//! translation of the larger board frees the board at any time of the step.
 //!
-//! **Along a straight line** a board only moves by a vector D, and its distance from a side of a shape is a convex
-//! function of the way. Its slopes at both ends of the step bound it from below: along a wall nothing is lost. **Along
-//! a circle** the board and the circle's centre keep their distance: a round obstacle moves past the board by the turn
-//! times the distance of the two centres.
+//! **Along a straight line** a board only moves by a vector D. Its distance from a side of a shape is a convex function
+//! of the way. The slopes at both ends of the step bound this function from below. So along a wall nothing is lost.
+//! **Along a circle** the board and the circle's centre keep their distance. So a round obstacle moves past the board
+//! by the turn times the distance of the two centres.
 //!
 //! **Which boards.** A body board is where board 1 is when handle 1 is at the front handle's place. So boards behind
 //! board 1 matter only in steps in which handle 2 is somewhere behind the first place of handle 1, as in [`super`].
@@ -215,8 +215,8 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
         step.extend_to(benches + 1, self.chain, (before, after), self.state.budget)
     }
 
-    /// Returns the limit of a meeting, and the greatest sum of the clearances at both ends of a step with which it may
-    /// be reached; `None` if the circles about the board exclude that.
+    /// Returns the limit of a meeting. Returns also the greatest sum of the clearances at both ends of a step with
+    /// which the limit may be reached. Returns `None` if the circles about the board exclude that.
     fn coarse_limit(
         &self,
         step: &Displacements,
@@ -258,8 +258,8 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
         Ok(self.state.budget.spend(tested)?)
     }
 
-    /// Returns true if a board that stays on one line or circle is proved to stay above the limit, which its clearance
-    /// exceeds at both ends.
+    /// Returns true if a board that stays on one line or circle is proved to stay above the limit. Its clearance must
+    /// exceed the limit at both ends.
     fn is_far_on_one_curve(
         &self,
         step: &Displacements,
@@ -395,8 +395,8 @@ fn benches_of(meetings: &[Meeting]) -> usize {
     meetings.iter().map(|&(bench, _)| bench + 1).max().unwrap_or(0)
 }
 
-/// Returns a lower bound of a convex function of the share of a way, given at both ends the distance and the points
-/// that are nearest: from its slopes there.
+/// Returns a lower bound of a convex function of the share of a way. The distance and the nearest points at both ends
+/// are given. The bound follows from the slopes there.
 fn convex_bound(first: (f64, Point, Point), last: (f64, Point, Point), way: Vector) -> f64 {
     let slope = |(_, on_board, on_side): (f64, Point, Point)| {
         let outward = on_board - on_side;

@@ -139,8 +139,8 @@ impl<'s, 'a, 'b> ChainSearch<'s, 'a, 'b> {
         Ok(())
     }
 
-    /// Returns the metres of travel of the head before which no new pair matters: the whole team keeps its shape, or is
-    /// behind the quiet place.
+    /// Returns the metres of travel of the head before which no new pair matters. Until then the whole team keeps its
+    /// shape, or is behind the quiet place.
     fn nothing_new_until(&self, configuration: &Configuration) -> f64 {
         let path = self.chain.path;
         let quiet = self.quiet.filter(|quiet| progress(path, configuration.places[0], *quiet) > 0.0);

@@ -8,8 +8,8 @@
 use crate::event::{Budget, Spent};
 use crate::linkage::NoFollower;
 
-/// Within this share of the shortest link, the clearance of one pair is assumed to have one minimum: the only part of
-/// the least clearance without proof.
+/// Within this share of the shortest link, the clearance of one pair is assumed to have one minimum. This assumption is
+/// the only part of the least clearance without proof.
 const UNIMODAL_SHARE: f64 = 1e-2;
 
 /// Greatest number of configurations for a first guess of the least clearance.
