@@ -5,15 +5,16 @@
 //!
 //! **Two links are enough.** Let F be the follower map of a body link, from its front handle's travel to its rear
 //! handle's. Handle k + 1 is behind handle k, so no handle after the first is ever further along the path than handle 1
-//! has been; on the first segment, outside the fold, F is continuous arbitrarily far back. So while F is continuous up
+//! has been. On the first segment, outside the fold, F is continuous arbitrarily far back. So while F is continuous up
 //! to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
 //! is first reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on
-//! the first segment: a straight line, without singularities, or an inward spiral, with singularities near its centre
-//! only (`inward`). Only a start near the centre makes `SingularitySearch::body_stall` consider more links. So there
-//! are two problems in one variable, a `LinkTrace` each: the head's link for all places of the head, and a body link
-//! for all places that handle 1 has come to. They are solved in lockstep, and every step is proven to hold nothing
-//! unseen (`certificate`) or halved, down to the resolution of doubles (`trace`). Between two turning points of handle
-//! 1 its place is monotone in the head's, so one is found from the other by bisection.
+//! the first segment. This segment is a straight line without singularities, or an inward spiral with singularities
+//! near its centre only (`inward`). Only a start near the centre makes `SingularitySearch::body_stall` consider more
+//! links. So there are two problems in one variable, a `LinkTrace` each. The first is the head's link for all places of
+//! the head. The second is a body link for all places that handle 1 has come to. The two problems are solved in
+//! lockstep. Every step is proven to hold nothing unseen (`certificate`) or halved, down to the resolution of doubles
+//! (`trace`). Between two turning points of handle 1 its place is monotone in the head's place. So either place is
+//! found from the other by bisection.
 
 mod certificate;
 mod inward;
@@ -30,8 +31,8 @@ use super::event::{Budget, Event};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
 
-/// Units in the last place before a lock: rounding can make a handle jump within the last `JUMP_DIGITS`; `SAFE_DIGITS`
-/// more are a margin; before `UNTOUCHED_DIGITS` no handle jumps.
+/// Units in the last place before a lock. Rounding can make a handle jump within the last `JUMP_DIGITS`. `SAFE_DIGITS`
+/// more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
 const JUMP_DIGITS: u32 = 256;
 const SAFE_DIGITS: u32 = 32;
 const UNTOUCHED_DIGITS: u32 = 1024;

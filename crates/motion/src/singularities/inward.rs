@@ -14,11 +14,12 @@
 //!   g_d = (1 - t^2)/2 theta + cot d - d / sin^2 d < 0, so theta(d) grows. Inward d grows as theta falls, so the link
 //!   comes to the curve once: the stall.
 //! - pi <= d <= 3 pi/2: g > 0 and sin d < 0, the link is stalled.
-//! - 3 pi/2 < d < 2 pi: again one positive zero, at most sqrt(d |cot d|), so that (1 - t^2)/2 theta < d / sin^2 d and
-//!   it too grows with d: the link comes to that curve at most once, where the stall ends.
+//! - 3 pi/2 < d < 2 pi: again g has one positive zero, at most sqrt(d |cot d|). So (1 - t^2)/2 theta < d / sin^2 d, and
+//!   the zero too grows with d. The link comes to that curve at most once, where the stall ends.
 //!
-//! Before a fold d < 2 pi; without one the link is shorter than the pitch, and so d, which is link / a at the centre.
-//! From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2, and there are neither stalls nor locks.
+//! Before a fold d < 2 pi. Without a fold the link is shorter than the pitch. So d, which is link / a at the centre, is
+//! less than 2 pi, too. From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2, and there are neither
+//! stalls nor locks.
 
 use std::f64::consts::PI;
 
