@@ -69,10 +69,11 @@ impl Board {
 
     /// Returns the greatest displacement of a board's points per metre of displacement of its two handles.
     ///
-    /// With p = rear + s (front - rear) + w n, s in [-inset / link, 1 + inset / link], |w| <= width / 2 and n the unit
-    /// normal of the link: the handles' displacements u and v, at most D, move the first two terms by |(1 - s) u + s
-    /// v|, at most (|1 - s| + |s|) D <= (1 + 2 inset / link) D. The link keeps its length and its vector changes by at
-    /// most 2 D. So its unit normal changes by at most 2 D / link, and the last term by at most (width / link) D.
+    /// A point of the board is p = rear + s (front - rear) + w n with the unit normal n of the link. Here s is in
+    /// [-inset / link, 1 + inset / link] and |w| <= width / 2. Let the handles' displacements u and v be at most D.
+    /// They move the first two terms by |(1 - s) u + s v|. This is at most (|1 - s| + |s|) D <= (1 + 2 inset / link) D.
+    /// The link keeps its length and its vector changes by at most 2 D. So its unit normal changes by at most 2 D /
+    /// link, and the last term by at most (width / link) D.
     pub fn displacement_factor(link: f64, hole_inset: f64, width: f64) -> f64 {
         1.0 + 2.0 * hole_inset / link + width / link
     }

@@ -199,8 +199,8 @@ pub trait Curve {
         false
     }
 
-    /// Returns the place up to which no link of `link` metres stalls or locks, on the first curve of a path; `None` if
-    /// no link does anywhere on it.
+    /// Returns the place up to which no link of `link` metres stalls or locks, on the first curve of a path. Returns
+    /// `None` if no link stalls or locks anywhere on the curve.
     fn stall_free_until(&self, _link: f64) -> Option<Coordinate> {
         None
     }
@@ -211,8 +211,8 @@ pub trait Curve {
         None
     }
 
-    /// Returns the first place of the curve from which a board can reach into the disc, or an earlier one; `None` if no
-    /// place up to `last` can. `begin` is where the curve begins, `None` for the first curve of a path.
+    /// Returns the first place of the curve from which a board can reach into the disc, or an earlier place. Returns
+    /// `None` if no board up to `last` can. `begin` is where the curve begins, `None` for the first curve of a path.
     fn first_within(&self, disc: &ReachedDisc, begin: Option<Coordinate>, last: Coordinate) -> Option<Coordinate>;
 
     /// Returns the place of a path's first curve, ending at `last`, behind which no two boards without a common handle
@@ -221,8 +221,8 @@ pub trait Curve {
         None
     }
 
-    /// Returns an upper bound of the metres that a handle moves from `first` to `last`, seen from a frame that moves
-    /// rigidly with a reference handle.
+    /// Returns an upper bound of the metres that a handle moves from `first` to `last`. The motion is seen from a frame
+    /// that moves rigidly with a reference handle.
     ///
     /// The coordinate of the reference handle changes by `turned`; `behind` is where its follower was. `None` if no
     /// bound below the handle's own path length is known.

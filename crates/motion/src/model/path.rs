@@ -114,13 +114,13 @@ impl Path {
         }
     }
 
-    /// Creates the path inward along the spiral r = a theta (a = `pitch` / 2 pi) up to `turn_radius` and through an S
-    /// of two arcs to the opposite point. From there it leads outward along the same spiral turned by half a turn.
-    /// Travel starts `lead_in` metres before the turn and ends `lead_out` metres after it.
+    /// Creates the path inward along the spiral r = a theta (a = `pitch` / 2 pi) up to `turn_radius`. The path goes on
+    /// through an S of two arcs to the opposite point. From there it leads outward along the same spiral turned by half
+    /// a turn. Travel starts `lead_in` metres before the turn and ends `lead_out` metres after it.
     ///
-    /// With R = `turn_radius` the chords of both arcs lie on the diameter through the two ends and make the same angle
-    /// atan(R/a) with the tangents there. So both arcs turn by twice that angle. Their radii sum to sqrt(R^2 + a^2),
-    /// and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), for any `arc_ratio`, the first radius over the second.
+    /// With R = `turn_radius` the chords of both arcs lie on the diameter through the two ends. They make the same
+    /// angle atan(R/a) with the tangents there. So both arcs turn by twice that angle. Their radii sum to sqrt(R^2 +
+    /// a^2), and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), for any `arc_ratio`, the first radius over the second.
     ///
     /// # Errors
     /// [`Disjoint`] if the numbers are so extreme that rounding leaves a gap.

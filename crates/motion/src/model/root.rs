@@ -1,6 +1,6 @@
 //! Root finding in one unknown: a bracketed Newton iteration, and bisection for functions without a derivative.
 
-/// Returns the root of an increasing function within `low..=high`, by Newton's method kept inside a shrinking bracket
+/// Returns the root of an increasing function within `low..=high`. Newton's method is kept inside a shrinking bracket
 /// (rtsafe; Press et al., Numerical Recipes, 3rd ed., section 9.4).
 ///
 /// `function` returns the value and the derivative. The result is as exact as the function's rounding allows.
@@ -52,8 +52,8 @@ pub fn bisect_predicate(mut holds: impl FnMut(f64) -> bool, low: f64, high: f64)
     high
 }
 
-/// Returns the least value of a function that has one minimum within `low..=high`, and its place (golden section
-/// search; Kiefer, Sequential minimax search for a maximum, 1953).
+/// Returns the least value of a function that has one minimum within `low..=high`, and its place. The method is golden
+/// section search (Kiefer, Sequential minimax search for a maximum, 1953).
 ///
 /// The value is as exact as the function; the place of a smooth minimum only to half the digits.
 pub fn golden_section_min(mut function: impl FnMut(f64) -> f64, low: f64, high: f64) -> (f64, f64) {

@@ -110,8 +110,8 @@ pub enum OutlineKind {
         first: f64,
         /// Polar angle of its end on the unturned spiral, radians.
         last: f64,
-        /// Curvature at its beginning, 1/m, positive to the left, of a piece of a route, and of a spiral that a
-        /// placement moves, turns or mirrors; NaN of a spiral about the origin.
+        /// Curvature at its beginning, 1/m, positive to the left. It is given for a piece of a route, and for a spiral
+        /// that a placement moves, turns or mirrors. It is NaN for a spiral about the origin.
         curvature: f64,
     },
 }

@@ -167,7 +167,7 @@ pub fn middle_between(a: &Board, b: &Board) -> Point {
 
 /// Returns the centre of area of the overlap of two boards; without overlap, the middle of their closest points.
 ///
-/// One board is clipped by the other's four edges (Sutherland and Hodgman, 1974); the result is the centroid of the
+/// One board is clipped by the other's four edges (Sutherland and Hodgman, 1974). The result is the centroid of the
 /// polygon, or the middle of the touching points if the boards only touch.
 pub fn overlap_centre(a: &Board, b: &Board) -> Point {
     if separation_board_board(a, b) > 0.0 {

@@ -195,8 +195,8 @@ impl Shape {
         if self.holds(board.centre) { -self.least_escape(board, -limit) } else { least }
     }
 
-    /// Returns the signed distances of a board to each side, metres, with the point of the board and the point of the
-    /// side that are nearest; of a circle, to the circle. A side ignores the interior of its polygon.
+    /// Returns the signed distances of a board to each side, metres, with the nearest points of the board and of the
+    /// side. For a circle, the distance is to the circle. A side ignores the interior of its polygon.
     pub fn side_distances<'a>(&'a self, board: &'a Board) -> impl Iterator<Item = (f64, Point, Point)> + 'a {
         let rectangle = Rectangle::of(board);
         self.sides().map(move |(from, to)| {
@@ -209,8 +209,8 @@ impl Shape {
         })
     }
 
-    /// Returns a point of a board, and the point of the shape for a point of a side, both of which are in the board's
-    /// frame.
+    /// Returns on the stage a point of a board, and the point of the shape for a point of a side. Both are given in the
+    /// board's frame.
     fn on_stage(&self, board: &Board, on_board: Vector, on_side: Vector) -> (Point, Point) {
         let on_stage = |local: Vector| board.centre + local.x * board.axis + local.y * board.across();
         let outward = on_board - on_side;
@@ -219,8 +219,8 @@ impl Shape {
         (on_stage(on_board), on_stage(on_circle))
     }
 
-    /// Returns the point of a board and the point of the shape's outline that are nearest to each other; where they
-    /// overlap, two points near the place at which the outline meets the board.
+    /// Returns the point of a board and the point of the shape's outline that are nearest to each other. Where the
+    /// board and the shape overlap, the two points are near the place at which the outline meets the board.
     pub fn nearest_points(&self, board: &Board) -> (Point, Point) {
         let rectangle = Rectangle::of(board);
         let (mut least, mut nearest) = (f64::INFINITY, (Vector::zeros(), Vector::zeros()));
@@ -242,7 +242,7 @@ fn doubled_area(corners: &[Point]) -> f64 {
     corners[1..].windows(2).map(|pair| (pair[0] - corners[0]).perp(&(pair[1] - corners[0]))).sum()
 }
 
-/// Returns the sense in which the corners of a simple polygon stand, 1 if it is counter-clockwise, -1 if clockwise;
+/// Returns the sense in which the corners of a simple polygon stand: 1 if counter-clockwise, -1 if clockwise. Returns
 /// `None` unless the polygon is convex.
 fn sense(corners: &[Point]) -> Option<f64> {
     let count = corners.len();
@@ -300,8 +300,8 @@ impl Rectangle {
         gap(from.x, to.x, self.half.x).max(gap(from.y, to.y, self.half.y))
     }
 
-    /// Returns the signed separation of a segment by the separating axis theorem, metres: never more than the distance,
-    /// and minus the least translation where they overlap.
+    /// Returns the signed separation of a segment by the separating axis theorem, metres. The separation is never more
+    /// than the distance. Where the segment and the rectangle overlap, it is minus the least translation.
     fn separation(&self, from: Vector, to: Vector) -> f64 {
         let sides = self.separation_of_box(from, to);
         let along = to - from;

@@ -70,10 +70,10 @@ impl Spiral {
 
     /// Returns the arc length between `theta` and `theta - span`, metres.
     ///
-    /// From s = a/2 (theta w + asinh theta), w = sqrt(1 + theta^2), with both differences written as products of the
-    /// span, so that short spans far out keep all digits:
-    /// theta w - theta' w' = span (w + theta' (theta + theta') / (w + w')) and
-    /// asinh theta - asinh theta' = asinh(span (theta + theta') / (theta w' + theta' w)).
+    /// The length follows from s = a/2 (theta w + asinh theta), w = sqrt(1 + theta^2). Both differences are written as
+    /// products of the span, so that short spans far out keep all digits:
+    /// - theta w - theta' w' = span (w + theta' (theta + theta') / (w + w')),
+    /// - asinh theta - asinh theta' = asinh(span (theta + theta') / (theta w' + theta' w)).
     fn inward_length(&self, theta: f64, span: f64) -> f64 {
         if span == 0.0 {
             return 0.0;
@@ -107,7 +107,7 @@ impl Spiral {
     }
 
     /// Returns the residual of the chord from a handle at radius `r` to the point `d` radians outward, and its
-    /// derivative by d: G = (a d)^2 + 4 r (r + a d) sin^2(d/2) - link^2 (law of cosines).
+    /// derivative by d. The residual is G = (a d)^2 + 4 r (r + a d) sin^2(d/2) - link^2 (law of cosines).
     pub(crate) fn chord_residual(&self, r: f64, link: f64) -> impl Fn(f64) -> (f64, f64) + use<> {
         let a = self.radius_per_radian.high;
         move |d| {
@@ -148,15 +148,15 @@ impl Spiral {
         Ok(increasing_root(residual, 0.0, high, second))
     }
 
-    /// Returns the outermost fold for links of `link` metres: the polar angle at which a front handle's link locks;
-    /// `None` if the link is so short against the pitch that it never does.
+    /// Returns the outermost fold for links of `link` metres: the polar angle at which a front handle's link locks.
+    /// Returns `None` if the link is so short against the pitch that it never locks.
     ///
-    /// The first maximum of the chord grows with theta (d(chord^2)/d theta = 4 a^2 (2 theta + d) sin^2(d/2) > 0), so
-    /// at most one theta has it equal to the link.
+    /// The first maximum of the chord grows with theta: d(chord^2)/d theta = 4 a^2 (2 theta + d) sin^2(d/2) > 0. So at
+    /// most one theta has a first maximum equal to the link.
     pub fn fold(&self, link: f64) -> Option<f64> {
         let ratio = link / self.radius_per_radian.high;
-        // Returns the excess of the square of the first maximum over that of the link, over a^2, and its slope: at the
-        // maximum, the derivative by theta alone.
+        // Returns the excess of the square of the first maximum over the square of the link, divided by a^2, and its
+        // slope. At the maximum, the slope is the derivative by theta alone.
         let excess = |theta: f64| match first_chord_maximum(theta) {
             Some(d) => {
                 let square = sin(0.5 * d).powi(2);
@@ -178,13 +178,13 @@ impl Spiral {
 static LEAST_WITH_MAXIMUM: LazyLock<f64> =
     LazyLock::new(|| bisect_predicate(|theta| first_chord_maximum(theta).is_some(), 0.25, 1.0));
 
-/// Returns the angle d at which the chord from theta to theta + d first stops growing, in (pi, 2 pi); `None` if it
-/// grows without limit. It depends on theta alone.
+/// Returns the angle d at which the chord from theta to theta + d first stops growing, in (pi, 2 pi). Returns `None` if
+/// the chord grows without limit. The angle depends on theta alone.
 ///
 /// Half the slope of the squared chord over a^2 is H(d) = d + 2 theta sin^2(d/2) + theta (theta + d) sin d, positive up
 /// to pi. If H' >= 0 at pi, it stays so. If not, H has one minimum before 2 pi, and a zero exactly if that minimum is
-/// not above zero. If the first turn has no zero, no later turn has one: at sin d = -1, H = (1 - theta)(d + theta), and
-/// the part of the dip below that shrinks with d.
+/// not above zero. If the first turn has no zero, no later turn has a zero. At sin d = -1, H = (1 - theta)(d + theta),
+/// and the part of the dip below that value shrinks with d.
 fn first_chord_maximum(theta: f64) -> Option<f64> {
     let half_slope = |d: f64| {
         let sine = sin(0.5 * d);
@@ -349,8 +349,8 @@ impl Curve for Spiral {
 mod tests {
     use super::*;
 
-    /// Returns the greatest chord, before the chords first shrink, from `theta` on a spiral of radius theta to places
-    /// up to a turn outward, in small steps; `None` if they grow all the time.
+    /// Returns the greatest chord before the chords first shrink, in small steps. The chords lead from `theta` on a
+    /// spiral of radius theta to places up to a turn outward. Returns `None` if the chords grow all the time.
     fn greatest_before_shrinking(theta: f64) -> Option<f64> {
         let place = |phi: f64| Point::new(phi * phi.cos(), phi * phi.sin());
         let chords: Vec<f64> =

@@ -1,12 +1,12 @@
 //! The least translation that frees a board from a shape with which it overlaps.
 //!
-//! In the board's frame the board is the rectangle of half sides (h, w) about the origin. Moved by t it meets a side of
-//! the shape if and only if t is in the side's Minkowski sum with the rectangle: a hexagon, the set
-//! |x - m_x| <= h + |e_x| / 2, |y - m_y| <= w + |e_y| / 2, |n . (t - m)| <= h |n_x| + w |n_y|, with the side's middle m,
-//! its vector e and its unit normal n. Moved by t it meets no side but lies within the shape if and only if its centre
-//! does. So the places to avoid are the hexagons and the shape's interior, whose outline the hexagons cover. The least
-//! translation leads to the nearest point of a hexagon's outline that is inside no other hexagon and not inside the
-//! shape.
+//! In the board's frame the board is the rectangle of half sides (h, w) about the origin. Moved by t the board meets a
+//! side of the shape if and only if t is in the side's Minkowski sum with the rectangle. This sum is a hexagon: the set
+//! |x - m_x| <= h + |e_x| / 2, |y - m_y| <= w + |e_y| / 2, |n . (t - m)| <= h |n_x| + w |n_y|. Here the side has the
+//! middle m, the vector e and the unit normal n. Moved by t the board meets no side but lies within the shape if and
+//! only if its centre does. So the places to avoid are the hexagons and the shape's interior, whose outline the
+//! hexagons cover. The least translation leads to the nearest point of a hexagon's outline that is inside no other
+//! hexagon and not inside the shape.
 
 use arrayvec::ArrayVec;
 
@@ -99,7 +99,7 @@ impl Segment {
 struct Outline {
     segments: ArrayVec<Segment, MOST_SEGMENTS>,
     /// For each segment the squared distance from the origin to its nearest place that is not known to be covered, and
-    /// its number: a heap whose root is nearest (Cormen et al., Introduction to Algorithms, chapter 6).
+    /// its number. The entries are a heap whose root is nearest (Cormen et al., Introduction to Algorithms, chapter 6).
     heap: ArrayVec<(f64, u16), MOST_SEGMENTS>,
     /// The square of the distance of the free place.
     limit: f64,

@@ -150,8 +150,9 @@ proptest! {
     }
 }
 
-/// Returns the length of the least translation that frees a board, by trial of all candidates: of every outline of the
-/// places at which the board meets a side, the nearest point, and its meetings with every other one.
+/// Returns the length of the least translation that frees a board, by trial of all candidates. The outlines of the
+/// places at which the board meets a side give the candidates. They are the nearest point of each outline, and its
+/// meetings with every other outline.
 fn freed_by_trial(shape: &Shape, board: &Board) -> f64 {
     let half = Rectangle::of(board).half;
     let mut outlines = Vec::new();

@@ -50,24 +50,24 @@ impl Spiral {
         Some(Coordinate { high, low: 0.0 })
     }
 
-    /// Returns a lower bound of the clearance of two boards without a common handle, all handles at least `r` from the
-    /// centre of an inward spiral. It needs r >= 5 max(link + inset + width, pitch) and grows with r.
+    /// Returns a lower bound of the clearance of two boards without a common handle on an inward spiral. All handles
+    /// are at least `r` from the centre. The bound needs r >= 5 max(link + inset + width, pitch) and grows with r.
     ///
-    /// There theta > 31, so that the curvature is at most 1.002 / r, and chord and arc differ by less than 1 %: the
+    /// There theta > 31, so that the curvature is at most 1.002 / r, and chord and arc differ by less than 1 %. So the
     /// tangent turns by at most tau = 1.03 link / r <= 0.21 along one link. A chord leans by at most half of that
     /// against the tangent at its end. Let the path between the outermost handles of benches i and i + k turn by phi.
     ///
-    /// - k = 2: both links lean by psi <= tau against the one between them. Along that one the gap is
-    ///   body_link - 2 (inset cos psi + width / 2 sin psi) or more; the bracket is greatest at psi = tau or
-    ///   atan(width / 2 inset).
-    /// - k > 2, phi <= 2 pi / 3: along the tangent half way, each link leans by at most phi / 2, so the gap is at least
-    ///   (k - 1) body_link cos(phi / 2) - 2 inset - width sin(phi / 2). With width <= body_link and phi <= (k + 1) tau
-    ///   that is more than body_link - 2 inset at k = 3 and grows with k up to phi = 1.6. Where phi is more, k >= 7,
-    ///   and it is more than 2 body_link - 2 inset.
-    /// - phi more than that: every point of a board is within width / 2 + 1.05 max(link^2 / 8, inset (link + inset) /
-    ///   2) / r of the path between or just beyond its handles. Two places of the path p apart in polar angle, less
-    ///   whole turns, are apart by more than 0.49 r where |p| > 1/2, and otherwise by pitch r / hypot(r, 1.02 a) >=
-    ///   0.999 pitch. This case is impossible where the whole team turns by less.
+    /// - k = 2: both links lean by psi <= tau against the link between them. Along this link the gap is body_link - 2
+    ///   (inset cos psi + width / 2 sin psi) or more. The bracket is greatest at psi = tau or atan(width / 2 inset).
+    /// - k > 2, phi <= 2 pi / 3: against the tangent half way, each link leans by at most phi / 2. So the gap along
+    ///   this tangent is at least (k - 1) body_link cos(phi / 2) - 2 inset - width sin(phi / 2). Here width <=
+    ///   body_link and phi <= (k + 1) tau. So this bound is more than body_link - 2 inset at k = 3, and grows with k up
+    ///   to phi = 1.6. Where phi is more, k >= 7, and the bound is more than 2 body_link - 2 inset.
+    /// - phi more than that: every point of a board is near the path between or just beyond its handles. Its distance
+    ///   from the path is at most width / 2 + 1.05 max(link^2 / 8, inset (link + inset) / 2) / r. Let two places of the
+    ///   path be p apart in polar angle, less whole turns. Where |p| > 1/2, their distance is more than 0.49 r.
+    ///   Otherwise it is at least pitch r / hypot(r, 1.02 a) >= 0.999 pitch. This case is impossible where the whole
+    ///   team turns by less.
     fn board_clearance_bound(&self, team: &Team, r: f64) -> f64 {
         let Team { hole_inset, width, .. } = *team;
         let (longest, body) = (team.longest_link(), team.link(1));

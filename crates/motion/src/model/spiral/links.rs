@@ -43,8 +43,8 @@ impl Spiral {
 
     /// Returns the follower of a handle at `front` on an outward spiral.
     ///
-    /// With r' = r - a d at the follower, the square of the chord is (a d)^2 + 4 r r' sin^2(d/2), which grows with d
-    /// while tan(d/2) <= r'/a: beyond theta = 1 + pi/2 for a quarter of a turn.
+    /// With r' = r - a d at the follower, the square of the chord is (a d)^2 + 4 r r' sin^2(d/2). This square grows
+    /// with d while tan(d/2) <= r'/a. Beyond theta = 1 + pi/2 the condition holds for a quarter of a turn.
     pub(in crate::model) fn inner_follower(&self, front: Coordinate, behind: f64, link: f64) -> Follower {
         if front.high < 1.0 + FRAC_PI_2 {
             return Follower::Unknown;
