@@ -97,8 +97,8 @@ impl EulerHead {
     }
 }
 
-/// Returns the seconds after which the paper's head comes from the polar angle `start` to `theta`, as dt goes to 0:
-/// from d theta/dt = -v / (a theta), t = a (theta_0^2 - theta^2) / 2 v.
+/// Returns the seconds after which the paper's head comes from the polar angle `start` to `theta`, as dt goes to 0.
+/// From d theta/dt = -v / (a theta) follows t = a (theta_0^2 - theta^2) / 2 v.
 pub fn time_of_theta(spiral: &Spiral, start: f64, head_speed: f64, theta: f64) -> f64 {
     0.5 * spiral.radius_per_radian() * (start - theta) * (start + theta) / head_speed
 }

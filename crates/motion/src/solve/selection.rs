@@ -1,5 +1,5 @@
-//! Selects the table for a requested accuracy: the one that reads the fewest bytes per handle of those measured to meet
-//! the accuracy on this path with this team.
+//! Selects the table for a requested accuracy. Among the tables measured to meet the accuracy on this path with this
+//! team, the selected table reads the fewest bytes per handle.
 //!
 //! In: the motion and the requested accuracy. Out: a table with its measured error. The same request gives the same
 //! table in every run: cost is counted in bytes, never timed. [`crate`] and `trade` call this module.
@@ -93,11 +93,11 @@ impl Selection {
     }
 }
 
-/// Returns the cheapest table for `accuracy` metres, or the most exact one if none meets it; `None` if there is no
-/// table for this team and path.
+/// Returns the cheapest table for `accuracy` metres, or the most exact table if none meets the accuracy. Returns `None`
+/// if there is no table for this team and path.
 ///
-/// Positions are within max(accuracy, 8 eps (r + distance travelled)); headings within 2 accuracy / link; velocities
-/// within 10 accuracy / link of a handle's speed, so that extrapolation over a tenth of a link adds one accuracy.
+/// Positions are within max(accuracy, 8 eps (r + distance travelled)), headings within 2 accuracy / link, and
+/// velocities within 10 accuracy / link of a handle's speed. So extrapolation over a tenth of a link adds one accuracy.
 pub fn cheapest(path: &Path, team: Team, head_speed: f64, velocities: Velocities, accuracy: f64) -> Option<Selection> {
     cheapest_with(path, team, head_speed, velocities, accuracy, Instructions::fastest(team.handles()))
 }
@@ -196,8 +196,8 @@ impl ErrorMeasurement {
         Self { link: team.shortest_link(), head_speed, velocities, test_points }
     }
 
-    /// Returns the error of the handle with the largest ratio of error to allowed error, and its allowed error, metres;
-    /// and the largest ratio for a velocity.
+    /// Returns the error and the allowed error, metres, of the handle with the largest ratio of the first to the
+    /// second. Returns also the largest ratio for a velocity.
     fn measure(&self, table: &FollowerTable, accuracy: f64) -> Measured {
         let mut table = table.clone();
         let mut worst = Measured { error: 0.0, allowed: SHARE_MEASURED * accuracy, speed_error: 0.0 };

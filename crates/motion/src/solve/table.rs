@@ -127,8 +127,8 @@ impl FollowerTable {
     /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve. It is as
     /// exact as doubles allow and uses the fastest instructions of this processor.
     ///
-    /// Returns `None` if there is no such table: for a single bench, for a team so long that the table would exceed its
-    /// limit, and if the table is not exact even at the start.
+    /// Returns `None` for a single bench, and for a team so long that the table would exceed its limit. Returns `None`
+    /// also if the table is not exact even at the start.
     pub fn new(path: &Path, team: Team, head_speed: f64, velocities: Velocities) -> Option<Self> {
         Self::with_tolerance(path, team, head_speed, velocities, Tolerance::EXACT)
     }

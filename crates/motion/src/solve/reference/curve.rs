@@ -283,8 +283,8 @@ pub(super) fn spiral_length(radius_per_radian: &Real, theta: &Real, functions: &
     radius_per_radian / Real::from(2.0) * (theta * w + logarithm)
 }
 
-/// Returns the turns around its centre of the first `metres` of a spiral that begins `radius` metres from it, by two
-/// steps of Newton's method from `rough` turns.
+/// Returns the turns around the centre of the first `metres` of a spiral that begins `radius` metres from the centre.
+/// Two steps of Newton's method lead from `rough` turns to the result.
 pub(super) fn turns_of_metres(
     Piece { direction, pitch, radius }: Piece,
     metres: f64,

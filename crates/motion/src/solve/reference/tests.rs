@@ -46,8 +46,8 @@ fn length(vector: &RealVector) -> Real {
     vector.dot(vector).sqrt()
 }
 
-/// Returns the largest errors at each time of a table whose clock begins `before` seconds after the motion: of position
-/// over the handle's speed, if that is above 1, and of speed, relative.
+/// Returns the largest errors at each time of a table whose clock begins `before` seconds after the motion. The error
+/// of a position is divided by the handle's speed if the speed is above 1. The error of a speed is relative.
 fn errors(reference: &mut Reference, rows: &[Row], before: f64) -> Vec<(f64, f64, f64)> {
     let frames = rows.chunk_by(|a, b| a.time == b.time);
     let errors = frames.map(|rows| {
@@ -269,8 +269,8 @@ fn a_vector_turned_slightly_is_that_of_sine_and_cosine() {
     }
 }
 
-/// Checks the properties of every chain on any path: each handle is on its segment, each link has its length, no place
-/// between a handle and its follower is further away, speeds agree with small motions.
+/// Checks the properties of every chain on any path. Each handle is on its segment, each link has its length, and no
+/// place between a handle and its follower is further away.
 fn assert_sound(team: Team, description: &PathDescription, time: f64) -> Vec<Seat> {
     let mut reference = Reference::new(team, description, 1.0).unwrap();
     let path = description.path().unwrap();
@@ -340,8 +340,8 @@ fn integrated(path: &mut RealPath, segment: usize, to: &Real) -> Real {
     rows[rows.len() - 1].clone() * span * Real::from(on.curve.forward())
 }
 
-/// Returns the chain at `time` by the safe solver, and checks it against the reference: each position within 1e-12 m,
-/// times the growth of small errors along the chain.
+/// Computes the chain at `time` by the safe solver, and checks it against the reference. Each position agrees within
+/// 1e-12 m, times the growth of small errors along the chain.
 fn assert_newton_agrees(team: Team, description: &PathDescription, time: f64) {
     let path: Path = description.path().unwrap();
     let newton = Newton::new(path, team, 1.0, Velocities::Computed);

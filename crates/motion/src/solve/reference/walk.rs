@@ -1,9 +1,9 @@
 //! The first place behind a handle at the link's distance, in doubles: the first guess of the reference.
 //!
 //! The straight-line distance from the handle grows by at most a metre per metre of path. So from a place whose
-//! distance is m metres short of the link, a step of m metres back cannot pass the place sought (sphere tracing: Hart,
-//! The Visual Computer 12, 1996, for rays). The points are displacements from places that the reference knows exactly,
-//! so that they keep their digits far from the origin. Only the reference calls it.
+//! distance is m metres short of the link, a step of m metres back cannot pass the place sought. This method is sphere
+//! tracing (Hart, The Visual Computer 12, 1996, for rays). The points are displacements from places that the reference
+//! knows exactly, so that they keep their digits far from the origin. Only the reference calls it.
 
 use super::curve::{RealParam, RoughPlace};
 use super::path::Segment;
@@ -42,8 +42,8 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Returns how far back, in units of the coordinate, the first place is that is `link` metres from the front
-    /// handle; `None` if the segment has none.
+    /// Returns how far back the first place is that is `link` metres from the front handle, in units of the coordinate.
+    /// Returns `None` if the segment has no such place.
     ///
     /// # Errors
     /// [`NoFollower`] if a handle on the inward spiral comes nearer again first.

@@ -224,8 +224,8 @@ impl BandBuilder<'_> {
         errors
     }
 
-    /// Returns the error of one row of a piece `2 half` long, as a part of what is allowed: the largest of the errors
-    /// of place, heading and speed.
+    /// Returns the error of one row of a piece `2 half` long, as a part of the allowed error. It is the largest of the
+    /// errors of place, heading and speed.
     fn error(&self, half: f64, nodes: [&Node; 5], index: usize, chain: &NodeChain) -> f64 {
         let mut polynomials = polynomials(half, nodes);
         // The size of the slope's next power, if it falls as the last one did.
@@ -301,8 +301,8 @@ pub(super) fn within_half_turn(angle: f64) -> f64 {
     }
 }
 
-/// The first row of bands so far behind that shorter polynomials and more pieces make a frame faster: it then waits for
-/// memory, and each piece of a row needs less.
+/// The first row of bands so far behind that shorter polynomials and more pieces make a frame faster. There a frame
+/// waits for memory, and each piece of a row needs less.
 const FAR_ROW: usize = 512;
 
 /// Makes the table for `team` on `path`; `None` if there is none, or it would be too large.

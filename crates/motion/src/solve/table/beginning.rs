@@ -1,6 +1,6 @@
 //! The beginning of the table: one link's length of path so far behind the team that it is nearly or exactly straight.
 //!
-//! Used only to make the table. Here alpha is known for every place: on a straight line T is linear; on a spiral a
+//! Used only to make the table. Here alpha is known for every place. On a straight line T is linear. On a spiral a
 //! polynomial A with A(follower of p) = A(p) + 1 is fitted over a few links.
 
 use nalgebra::{DMatrix, DVector};

@@ -334,8 +334,8 @@ impl<'a> HeadBuilder<'a> {
         furthest.row + self.team.benches <= self.rows.rows()
     }
 
-    /// Returns the change of places and speeds by the rounding of the travel alone, as a part of what is promised: near
-    /// a lock, where the handles behind move much faster than the head, no table and no solver keeps the promise.
+    /// Returns the change of places and speeds by the rounding of the travel alone, as a part of the promised accuracy.
+    /// Near a lock, where the handles behind move much faster than the head, no table and no solver keeps the promise.
     fn harm_of_rounding(&self, piece: &Piece) -> f64 {
         let (link, travelled) = (self.team.link(1), piece.middle);
         let rounding = f64::EPSILON * travelled;

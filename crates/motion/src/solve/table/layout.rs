@@ -1,5 +1,5 @@
-//! Layout of the table before it is made: how far forward it reaches, its bands of rows, and the phases at which the
-//! path's junctions cut it.
+//! Layout of the table before it is made: its reach forward, its bands of rows, and the phases at which the path's
+//! junctions cut it.
 //!
 //! Called by [`super::band`] only.
 
@@ -95,8 +95,9 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize)
     kinks
 }
 
-/// Returns the metres that the head has travelled when a handle behind it crosses a junction, for each junction and as
-/// far as handles have one place each: at these places frames have kinks. It does not depend on a table.
+/// Returns the metres that the head has travelled when a handle behind it crosses a junction. The list has each
+/// junction, as far as handles have one place each. At these places frames have kinks. The list does not depend on a
+/// table.
 pub(super) fn crossings(track: &Track, team: &Team) -> Vec<f64> {
     let path = track.path;
     let of_segment = |segment: usize| {

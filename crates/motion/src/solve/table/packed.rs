@@ -4,7 +4,7 @@
 //! all phases and all rows that a frame can read. Only frames read it; the clearance reads the rows.
 //!
 //! Every polynomial of a piece is rewritten exactly for a part of it and shortened by Chebyshev polynomials, which
-//! bounds the change; the rounding of single precision is added. If the sum is too large, the part is halved.
+//! bounds the change. The rounding of single precision is added. If the sum is too large, the part is halved.
 
 use super::polynomial::{economise, on_part};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, piece_at, piece_of_share};

@@ -5,8 +5,8 @@ use nalgebra::SMatrix;
 /// Returns the polynomial of degree `N` with given slopes at `N` nodes; its constant is zero.
 ///
 /// Values are not used: half of their rounding would return in the slopes between them, more in shorter pieces. The
-/// proof uses them: where the slope's error is that of the first neglected power, zero at the nodes, the value's error
-/// is greatest at nodes.
+/// proof uses values. Let the slope's error come from the first neglected power, so that it is zero at the nodes. Then
+/// the value's error is greatest at nodes.
 #[derive(Debug, Clone)]
 pub(super) struct SlopeFit<const N: usize> {
     from_slopes: SMatrix<f64, N, N>,

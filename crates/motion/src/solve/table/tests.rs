@@ -112,8 +112,8 @@ fn what_cannot_be_packed_is_refused() {
     assert!(FollowerTable::formats().into_iter().all(|format| table.packed(format, allowed).is_none()));
 }
 
-/// A case so small that miri runs it too (`tests/run`), on each instruction set: the calls of code that needs one are
-/// the library's only unsafe code.
+/// A case so small that miri runs it too (`tests/run`), on each instruction set. The calls of code that needs an
+/// instruction set are the library's only unsafe code.
 #[test]
 fn a_small_table_is_read_as_exactly() {
     let path = Path::route(0.0).line(2.0).arc(Side::Left, 3.0, 0.1).line(2.0).build().unwrap();
