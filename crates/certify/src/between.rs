@@ -1,5 +1,6 @@
-//! Certified contacts of several dragons: the events of each alone, and then, of each two, stretches of time in which
-//! their boards are apart, up to their first contact. Lemma 12 of `docs/proofs.md`.
+//! Certified contacts of several dragons. The certificate has the events of each dragon alone. Then it has, for each
+//! two dragons, stretches of time in which their boards are apart, up to their first contact. Lemma 12 of
+//! `docs/proofs.md`.
 
 mod clearance;
 mod side;
@@ -192,7 +193,7 @@ impl PairSearch<'_, '_> {
             if self.step == 0.0 {
                 self.step = 0.25 * longest;
             }
-            // No step goes on where a dragon begins to move: until then it may be as long as one likes.
+            // While no dragon moves, a step must not cross the next start, but any length up to there is valid.
             let starts = self.sides.iter().map(|side| side.delay).filter(|start| *start > self.time);
             let until = if longest.is_finite() { to } else { starts.fold(to, f64::min) };
             // To the first order, a dragon that begins or ends to move would cost a factor of accuracy.
@@ -222,7 +223,7 @@ impl PairSearch<'_, '_> {
         Ok(None)
     }
 
-    /// Returns the line of what the two do from here until a time.
+    /// Returns the certificate line of both dragons from `self.time` to `to`.
     fn show_until(&self, to: f64) -> Result<CertificateLine<'static>, Refused> {
         let stretch = |side: &Side| match self.aim {
             Aim::Apart(_) => side.first_order(self.time, to, Extent::Whole),

@@ -96,8 +96,8 @@ impl Capsule {
         self.component(other, at.tangent, at.turned())
     }
 
-    /// Returns t . (u - x) for all u of this capsule and x of the other, t being the tangent at x, by Taylor's formula
-    /// of the second order along the other's span. With a junction in the span nothing is known of it.
+    /// Returns t . (u - x) for all u of this capsule and x of the other, where t is the tangent at x. The bound is from
+    /// Taylor's formula of the second order along the other's span. It is infinite if a junction is in the span.
     pub fn second_order_product(&self, path: &ExactPath, other: &Self, Span(first, last): Span) -> Interval {
         let Some(rate) = path.bend_rate(first, last) else { return Interval::within(f64::INFINITY) };
         let Self { middle, point, tangent: [x, y], half, curvature, .. } = *other;
@@ -109,8 +109,8 @@ impl Capsule {
         dot(other.tangent, between) + Interval::within(within.hi)
     }
 
-    /// Returns n . (u - x) for all u of this capsule and x of the other. n is the unit normal to the left at u, or at
-    /// x.
+    /// Returns n . (u - x) for all u of this capsule and x of the other. The vector n is the unit normal to the left at
+    /// u, or at x.
     pub fn across(&self, other: &Self, at_other: bool) -> Interval {
         let at = if at_other { other } else { self };
         let [x, y] = at.tangent;

@@ -1,5 +1,6 @@
-//! Enclosure of the least clearance of a show, and of that of each obstacle: steps of the head that prove the lower
-//! bounds, and one place for each that proves the upper bound. Lemmas 6 and 11 of `docs/proofs.md`.
+//! Enclosures of the least clearance of two boards in a show, and of the least clearance of each obstacle. Steps of the
+//! head prove the lower bounds. For each enclosure, one place proves the upper bound. Lemmas 6 and 11 of
+//! `docs/proofs.md`.
 
 mod apart;
 mod beside;
@@ -44,8 +45,8 @@ const LEAST_STEP: f64 = 1e-14;
 /// Rounding error of the show's end, as a share of the path length in metres.
 const END_SLACK: f64 = 1e-13;
 
-/// Share of the travel by which an upper bound must be before the end of a stretch that is not the path's, and the
-/// distances of grid points besides.
+/// Margin of an upper bound before the end of a show, unless the show ends with the path. The margin is the sum of a
+/// share of the travel and a number of distances of grid points.
 const BEFORE_TIME: f64 = 4e-14;
 const GRID: f64 = 8.0;
 
@@ -98,9 +99,9 @@ pub struct ObstacleEnclosure {
 /// The least clearances that the ordinary search has found. They only suggest where to search.
 #[derive(Debug, Clone, Copy)]
 pub struct ClearanceHints<'h> {
-    /// That of two boards; `None` to enclose only those of the obstacles.
+    /// Least clearance of two boards; `None` to enclose only the clearances of the obstacles.
     pub boards: Option<&'h LeastClearance>,
-    /// Those of the obstacles.
+    /// Least clearance of each obstacle.
     pub obstacles: &'h [TimedObstacleClearance],
 }
 
@@ -113,9 +114,9 @@ pub struct ClearanceEnclosures {
     pub obstacles: Vec<Option<ObstacleEnclosure>>,
 }
 
-/// Encloses the least clearance of all pairs of boards that share no handle, and that of each obstacle, from the start
-/// until the show ends at `show_end`. The enclosures are a nanometre wide, unless the search gives up after
-/// `most_steps`. `progress` receives the share that is done, from 0 to 1.
+/// Encloses the least clearance of all pairs of boards that share no handle, and the least clearance of each obstacle.
+/// The time is from the start until the show ends at `show_end`. The enclosures are a nanometre wide, unless the search
+/// gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
 pub fn enclose_least_clearance(
     motion: &Motion,
     show_end: &TimedEvent,
@@ -403,9 +404,9 @@ impl<'a, 'w> Descent<'a, 'w> {
         self.chain.exact.travelled(self.at.head).lo.max(0.0)
     }
 
-    /// Restricts the steps to the first two links, for an inward spiral. Precondition: no two boards touch and no link
-    /// locks while the head, or the front handle of any link, is at the first place or further out. See "The least
-    /// pitch" in `docs/proofs.md`.
+    /// Restricts the steps to the first two links, for an inward spiral. Precondition: while the head or any link's
+    /// front handle is at the first place or further out, no two boards touch and no link locks. See "The least pitch"
+    /// in `docs/proofs.md`.
     pub fn after_all_further_out(mut self) -> Self {
         self.links = Links::Front;
         self.chain.start = Some(Place(0, f64::INFINITY, 0.0));

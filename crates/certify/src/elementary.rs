@@ -26,7 +26,7 @@ pub(super) fn pi() -> Interval {
 /// sin y = s + (c sin z - s (1 - cos z)),   cos y = c - (s sin z + c (1 - cos z)).
 ///
 /// The brackets are below 0.0041, so that they are computed in doubles. Every operation is off by at most u = 2^-52 of
-/// its result, in any rounding mode; errors by underflow are below the last places that are added at the end.
+/// its result, in any rounding mode. Errors by underflow are below the last places that are added at the end.
 pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     if x.is_nan() || x.abs() > GREATEST_ARGUMENT {
         let any = Interval::within(1.0);
@@ -34,8 +34,8 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     }
     let quarters = rounded(x * std::f64::consts::FRAC_2_PI);
     let [high, middle, low] = HALF_PI.map(|part| part * quarters);
-    // No error: `high` is 0, or both are within a factor of 2 of each other (Sterbenz), since q = 1 begins at
-    // x = pi / 4, just above `high` / 2.
+    // The difference is exact: `high` is 0, or both are within a factor of 2 of each other (Sterbenz). The factor holds
+    // since q = 1 begins at x = pi / 4, just above `high` / 2.
     let first = x - high;
     let rest = middle + low;
     // y = about + lost, by Knuth's two-sum.
@@ -50,9 +50,9 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     // The remainders are below z 2^-60 and 2^-79.
     let sine_of_rest = z - z * square * (1.0 / 6.0 - square * (1.0 / 120.0));
     let versine_of_rest = square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)));
-    // In units of u z: 2 from z, 1 from its sine, 1 from the product with it, 1 from the bracket's sum, and less than 1
-    // from the remainders and all that has the factor z or u. In units of u: `rest` from its sum. `lost`, below u, is
-    // off by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
+    // In units of u z, 2 of the error is from z, and 1 each from its sine, the product with the sine, and the bracket's
+    // sum. Less than 1 is from the remainders and all that has the factor z or u. In units of u, the sum `rest` adds
+    // `rest`. `lost`, below u, is off by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
     let error = error + f64::EPSILON * (6.0 * z.abs() + rest.abs()) + 7e-25 * quarters.abs();
     let around = |kept: f64, bracket: f64| {
         let sum = kept + bracket;
@@ -104,7 +104,7 @@ static NEAR: LazyLock<[Kept; 102]> = LazyLock::new(|| {
     })
 });
 
-/// Enclosures of the reciprocals of the divisors of the terms of the sine, n (n - 1): each term is the term before it
+/// Enclosures of the reciprocals of the divisors n (n - 1) of the terms of the sine. Each term is the term before it
 /// times -y^2 over its divisor.
 const ODD: [Interval; 9] = reciprocals([6.0, 20.0, 42.0, 72.0, 110.0, 156.0, 210.0, 272.0, 342.0]);
 
@@ -123,8 +123,8 @@ const fn reciprocals<const N: usize>(divisors: [f64; N]) -> [Interval; N] {
     reciprocals
 }
 
-/// Returns 1 - s q1 (1 - s q2 (1 - ...)), the sum of a series whose terms have the factors -s q1, -s q2, ..., for s
-/// from 0 to 1. All partial sums are from 0 to 1, so that the ends of products are the products of ends.
+/// Returns 1 - s q1 (1 - s q2 (1 - ...)) for s from 0 to 1. This is the sum of a series whose terms have the factors -s
+/// q1, -s q2 and so on. All partial sums are from 0 to 1, so that the ends of products are the products of ends.
 fn alternating(s: Interval, factors: &[Interval]) -> Interval {
     factors.iter().rev().fold(Interval::ONE, |sum, factor| {
         let least = ((s.lo.max(0.0) * factor.lo).next_down() * sum.lo).next_down();

@@ -228,8 +228,8 @@ impl FirstOrderBoard {
         self.gap_along(direction, corners.map(|corner| other.corner(self, corner, when)), when)
     }
 
-    /// Returns an enclosure of the gap between this board and the convex hull of some points, at least one, along a
-    /// direction fixed to this board.
+    /// Returns an enclosure of the gap between this board and the convex hull of some points along a direction fixed to
+    /// this board. There is at least one point.
     pub fn gap_to(&self, points: &[Vector], direction: Direction, when: When) -> Interval {
         let Self { front, rear, .. } = self;
         let middle = |one: Vector, other: Vector| plus(one, other).map(|sum| sum * 0.5);
@@ -320,8 +320,8 @@ impl FirstOrderBoard {
             + Interval::within(error.hi)
     }
 
-    /// Returns a point of the board, `along` and `aside` of its middle: its position in the middle of the step, and a
-    /// bound of its distance from there.
+    /// Returns the position of a point of the board in the middle of the step, and a bound of the point's distance from
+    /// there. The point is `along` and `aside` of the board's middle.
     fn point(&self, (along, aside): (f64, f64), when: When) -> (Vector, Interval) {
         let Linear { at, .. } = self.along(when);
         let Self { front, rear, link, half_length, half_width, .. } = self;
@@ -334,8 +334,8 @@ impl FirstOrderBoard {
         (point, (off(front) + off(rear)) * (Interval::point(0.5) + along.abs() + aside.abs()))
     }
 
-    /// Returns an upper bound of the distance of a fixed point from the nearest point of the board; of a point inside
-    /// the board at every moment, minus the least translation that frees it.
+    /// Returns an upper bound of the distance of a fixed point from the nearest point of the board. For a point inside
+    /// the board at every moment, the distance is minus the least translation that frees the point.
     pub fn at_most_to(&self, target: [f64; 2], when: When) -> f64 {
         let fixed = target.map(Interval::point);
         let gap = |direction| self.gap_to(&[fixed], direction, when).hi;
@@ -349,8 +349,8 @@ impl FirstOrderBoard {
         (norm(minus(own, fixed)) + error).hi
     }
 
-    /// Returns true if the point of the front handle's place is in the board in the middle of the step, and stays in it
-    /// if the board is moved by `metres`.
+    /// Returns true if the point of the front handle's place is in the board in the middle of the step. The point must
+    /// also stay in the board if the board is moved by `metres`.
     pub fn holds_front_point(&self, metres: f64) -> bool {
         let inset = self.half_length - self.link * 0.5;
         (Interval::point(self.front.still) + Interval::point(metres)).is_below(inset.min(self.half_width))

@@ -127,8 +127,8 @@ pub enum CertificateLine<'a> {
         /// For a follower that vanishes: places behind and ahead of it that it cannot pass.
         #[serde(skip_serializing_if = "Option::is_none")]
         window: Option<Span>,
-        /// For a follower that jumps: a place ahead of it that it cannot pass, and a place that the next follower is at
-        /// or ahead of.
+        /// For a follower that jumps: two places ahead of it. It cannot pass the first place, and the next follower is
+        /// at the second place or ahead of it.
         #[serde(skip_serializing_if = "Option::is_none")]
         jump: Option<Span>,
     },

@@ -34,8 +34,9 @@ pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned,
     near.then_some(sign)
 }
 
-/// Returns the sign of the front product if, for every place of `front`, exactly one inner place of `rear` is proved to
-/// be at the link's distance. That place is the follower unless a nearer place is at the distance.
+/// Returns the sign of the front product if, for every place of `front`, exactly one inner place of `rear` is at the
+/// link's distance. That place is the follower unless a nearer place is at the distance. Returns `None` without a
+/// proof.
 pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let (u, x) = (&front.capsule, &rear.capsule);
     let behind = path.in_order(rear.span.1, front.span.0);
@@ -61,8 +62,8 @@ pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned
     holds.then_some(sign)
 }
 
-/// Returns true if the product of the tangent at a place of a span and the way from there to a place of `other` is
-/// proved to have a sign, that of `sign`, for all such places. The span is cut into stretches.
+/// Returns true if a product is proved to have the sign of `sign` for all places of a span and of `other`. Its factors
+/// are the tangent at the span's place and the way from there to the place of `other`. The span is cut into stretches.
 fn has_sign(path: &ExactPath, other: &Capsule, span: Span, sign: f64) -> bool {
     let mut waiting = vec![span];
     for _ in 0..MOST_STRETCHES {

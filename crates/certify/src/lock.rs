@@ -9,8 +9,8 @@ use super::path::Place;
 use super::step::Chain;
 use bench_dragon_motion::model::root::{bisect_predicate, golden_section_min};
 
-/// Number of places between the handles of a link at which a nearer follower is searched for, and the ratio of their
-/// distances from the follower.
+/// Number of places between the handles of a link at which a nearer follower is searched for. The distances of these
+/// places from the follower grow by the ratio.
 const JUMP_SAMPLES: i32 = 400;
 const JUMP_RATIO: f64 = 1.05;
 

@@ -12,7 +12,7 @@ use bench_dragon_motion::model::double_double::DoubleDouble;
 use bench_dragon_motion::model::spiral::Direction;
 
 /// A place on the path: a segment, counted from 0, and a coordinate on it. The coordinate is the exact sum of two
-/// doubles, of which the second is at most half a unit in the last place of the first.
+/// doubles. The second is at most half a unit in the last place of the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place(pub usize, pub f64, pub f64);
 
@@ -69,8 +69,8 @@ impl Serialize for Place {
     }
 }
 
-/// A curve of the path. The coordinate of a spiral is the polar angle, and `shift` is the distance from the centre in
-/// units of a less that: 0 but for turnarounds that are turned, see [`ExactPath::turnaround`].
+/// A curve of the path. The coordinate of a spiral is the polar angle. `shift` is the distance from the centre in units
+/// of a, minus the polar angle. It is 0 except for turnarounds that are turned, see [`ExactPath::turnaround`].
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Curve {
     Inward { a: Interval, shift: Interval, frame: Option<Frame> },
@@ -301,7 +301,8 @@ impl ExactPath {
     }
 
     /// Creates all turnarounds whose turn radius is in an interval. With `turned`, each is turned about the centre so
-    /// that A has this polar angle: then the spirals too depend on the radius, but all places move little with it.
+    /// that A has this polar angle. Then the spirals too depend on the radius, but all places move little with the
+    /// radius.
     pub fn turnaround(pitch: f64, turn_radius: Interval, arc_ratio: f64, turned: Option<f64>, lead_in: f64) -> Self {
         let a = Interval::point(pitch).over(pi() * 2.0);
         let theta = turn_radius.over(a);
@@ -321,8 +322,8 @@ impl ExactPath {
         let tangent = [around * sine - radial * cosine, -(around * cosine + radial * sine)];
         let right: Vector = [tangent[1], -tangent[0]];
         let first = Curve::Arc { origin: start, direction: tangent, inward: right, radius: first_radius };
-        // Both arcs turn by the same angle, so that their chords have one direction: the junction is on the line from A
-        // to -A, which it divides as the radii.
+        // Both arcs turn by the same angle, so that their chords have one direction. The junction is on the line from A
+        // to -A, and divides it as the radii.
         let middle = scaled(start, (Interval::ONE - ratio).over(Interval::ONE + ratio));
         let direction = first.tangent_of(angle, sin_cos_of(angle));
         let left: Vector = [-direction[1], direction[0]];

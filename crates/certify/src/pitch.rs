@@ -1,4 +1,4 @@
-//! Proofs for teams that come in on inward spirals from any distance: boards overlap with every pitch of an interval,
+//! Proofs for teams that come in on inward spirals from any distance. Boards overlap with every pitch of an interval,
 //! or no boards touch with one pitch. [`crate::plan`] calls it. "The least pitch" and Lemma 8 in `docs/proofs.md`.
 //!
 //! With the spiral's a = pitch / 2 pi as the unit of length, all spirals are equal and the team's lengths are
@@ -45,8 +45,8 @@ impl Pitches<'_> {
         Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
     }
 
-    /// Returns the spans of the handles from 1 on and a point, if with every pitch the two boards are proved to have
-    /// the point in common. Lengths are in units of a.
+    /// Returns the spans of the handles from 1 on, and a point that the two boards are proved to have in common with
+    /// every pitch. Returns `None` without a proof. Lengths are in units of a.
     pub fn overlap(&self) -> Option<(Vec<Span>, [f64; 2])> {
         let Self { team, from, to, theta, benches } = *self;
         if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
@@ -77,8 +77,8 @@ impl Pitches<'_> {
 /// Limit of pieces, three quarters of a turn at first, that are searched for a lock.
 const MOST_PIECES: u32 = 10_000;
 
-/// Returns true if the head's link is proved to lock with every pitch of an interval: while the head comes in from far
-/// outside, before it is at `radius`, metres from the centre.
+/// Returns true if the head's link is proved to lock with every pitch of an interval. The head comes in from far
+/// outside, and the lock is before the head is at `radius`, metres from the centre.
 pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bool {
     let radians = |metres: Interval, pitch: f64| metres.over(Interval::point(pitch).over(pi() * 2.0));
     let theta = Interval::point(radians(Interval::point(radius), from).hi);

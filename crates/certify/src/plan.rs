@@ -1,5 +1,8 @@
-//! Answers for the choreographer: the least pitch with which a team still reaches a radius, the greatest speed at which
-//! no handle is too fast, and the least radius with which a team turns round.
+//! Answers for the choreographer:
+//!
+//! - the least pitch with which a team still reaches a radius,
+//! - the greatest speed at which no handle is too fast,
+//! - the least radius with which a team turns round.
 //!
 //! In: a team or a scene. Out: two numbers that enclose the answer, proved, and the place that decides it. The `plan`
 //! command prints them.

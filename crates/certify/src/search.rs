@@ -467,8 +467,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    /// Returns the spans of handles 1 and on and a point, if two boards are proved to have the point in common while
-    /// the head is between two grid points.
+    /// Returns the spans of the handles from 1 on, and a point that two boards are proved to have in common. Meanwhile
+    /// the head is between two grid points. Returns `None` without a proof.
     fn touch(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
         let benches = benches(event);
         let handles = self.chain.spans(from, to, benches[1] + 1)?;
@@ -500,8 +500,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    /// Returns the status of an event for which the search halts on its way from `earliest` to it: the steps of that
-    /// way claim nothing of the event.
+    /// Returns the status of an event for which the search halts on its way from `earliest` to the event. The steps of
+    /// that way claim nothing of the event.
     fn undecided(&self, earliest: Place, halt: &Halt) -> Option<Status> {
         let Halt::Stuck(because) = halt else { return None };
         Some(Status::Undecided { time_lo: self.time(earliest).lo, because: because.clone() })
@@ -512,8 +512,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         (event.bench_b? as usize).checked_sub(self.given.team.benches + 1)
     }
 
-    /// Returns the spans of handles 1 and on and a point of the board, if it is proved to be within the keep-out while
-    /// the head is between two grid points.
+    /// Returns the spans of the handles from 1 on, and a point of the board that is proved to be within the keep-out.
+    /// Meanwhile the head is between two grid points. Returns `None` without a proof.
     fn reach(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
         let (bench, number) = (event.bench_a? as usize, self.number(event)?);
         let handles = self.chain.spans(from, to, bench + 1)?;

@@ -76,8 +76,8 @@ pub(super) struct Chain<'a> {
 /// Length added to both ends of a span, as a multiple of the rounding of doubles.
 const PAD: f64 = 64.0 * f64::EPSILON;
 
-/// Multiples of the pad that are tried for each handle, in this order: for most steps, and for steps next to an event,
-/// where the width of the spans is the width of the event's enclosure.
+/// Multiples of the pad that are tried for each handle, in this order. The first list is for most steps. The second
+/// list is for steps next to an event, where the width of the spans is the width of the event's enclosure.
 const COARSE: [f64; 3] = [1.0, 16.0, 256.0];
 const FINE: [f64; 11] = [0.015625, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0, 256.0];
 
@@ -239,8 +239,8 @@ impl<'c, 'a> Listed<'c, 'a> {
         self.chain.exact.segments[0].curve.distance_from_centre(theta)
     }
 
-    /// Returns a lower bound of the distance from the centre of all boards from a handle on, which is not the head's;
-    /// minus infinity if unknown.
+    /// Returns a lower bound of the distance from the centre of all boards from a handle on. The handle is not the
+    /// head's. Returns minus infinity if the bound is unknown.
     pub fn innermost(&self, from_handle: usize) -> f64 {
         self.chain.shape.innermost(self.ring(from_handle), self.chain.links[1])
     }

@@ -57,8 +57,8 @@ impl<'a> Turns<'a> {
         Self { team, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
     }
 
-    /// Returns true if, with every radius, a link surely stalls or locks that passes over `pivot` with one handle, the
-    /// other being between `pivot` and `end`: a lock with `end` ahead of `pivot`, a stall with `end` behind it.
+    /// Returns true if, with every radius, a link that passes over `pivot` with one handle surely stalls or locks. The
+    /// other handle is between `pivot` and `end`. A lock has `end` ahead of `pivot`, a stall has `end` behind it.
     pub fn fold(&self, link: usize, pivot: Place, end: Place) -> bool {
         let exact = &self.exact;
         if !exact.is_inside(pivot) || !exact.is_inside(end) || pivot == end {
@@ -78,8 +78,8 @@ impl<'a> Turns<'a> {
     }
 
     /// Returns true if, with every radius, two boards are proved to have a point in common while the head is at a
-    /// place, if it comes there without a lock. That is `head` with the middle radius, and its coordinate grows by
-    /// `rate` per metre of the radius.
+    /// place. The proof holds if the head comes there without a lock. The place is `head` with the middle radius, and
+    /// its coordinate grows by `rate` per metre of the radius.
     pub fn overlap(&self, (head, rate): (Place, f64), [a, b]: [usize; 2]) -> bool {
         if a + 2 > b || b >= self.team.benches {
             return false;

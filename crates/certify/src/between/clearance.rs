@@ -1,6 +1,6 @@
-//! The least clearances of a show of several dragons: those of each alone, and then, of each two, stretches of time in
-//! which their boards are further apart than a number of metres, and a time at which two are no further apart. Lemma 12
-//! of `docs/proofs.md`.
+//! The least clearances of a show of several dragons: first those of each dragon alone, then those of each two. For
+//! each two, stretches of time show that the boards are further apart than a number of metres. One more time shows two
+//! boards that are no further apart. Lemma 12 of `docs/proofs.md`.
 
 use super::side::{Extent, Side};
 use super::{Aim, PairSearch, Write};
@@ -66,9 +66,9 @@ pub struct BetweenEnclosure {
     pub until: Option<f64>,
 }
 
-/// Encloses the least clearance of each dragon of a show, that of each obstacle and each dragon, and that of each two
-/// dragons, from the start until the show ends at `freeze`, and writes a certificate. `scene` is the text of the scene.
-/// Each search gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
+/// Encloses least clearances from the start of a show until the show ends at `freeze`, and writes a certificate. The
+/// clearances are those of each dragon, of each obstacle and each dragon, and of each two dragons. `scene` is the text
+/// of the scene. Each search gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
@@ -125,8 +125,9 @@ fn contact_of(ensemble: &Ensemble, pair: [usize; 2], freeze: &TimedEvent) -> Opt
     (kind == EventKind::Contact && [one, other] == pair).then_some([a, b])
 }
 
-/// Returns the end of a show as an event of one dragon's own motion: with its own benches, at its path's end, or at a
-/// place that the show's end, taken as found, lets it come to.
+/// Returns the end of a show as an event of one dragon's own motion. The event is the contact or lock of the dragon's
+/// own benches, the path's end, or a place. The place is where the dragon is at the show's end, which is taken as
+/// found.
 fn own_end(ensemble: &Ensemble, dragon: usize, freeze: &TimedEvent) -> TimedEvent {
     let Dragon { motion, .. } = &ensemble.dragons()[dragon];
     let Event { kind, bench_a, bench_b, place, .. } = freeze.event;

@@ -36,8 +36,8 @@ pub(super) struct Stretch {
     pub head: Span,
     pub spans: Vec<Span>,
     pub boards: Vec<MovingBoard>,
-    /// A place of each span, the head's first, and the boards to the first order, where tau is the time from the middle
-    /// of the stretch. Empty unless they are requested.
+    /// A place of each span, the head's first, and the boards to the first order. There tau is the time from the middle
+    /// of the stretch. Both are empty unless they are requested.
     pub at: Vec<Place>,
     pub first_order: Vec<FirstOrderBoard>,
 }

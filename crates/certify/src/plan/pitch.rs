@@ -16,8 +16,8 @@ use crate::pitch::{Pitches, Reached, head_locks, reaches};
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
-/// The least pitch of an inward spiral with which a team reaches a radius. The head comes in from any distance, and
-/// until its front handle is at the radius no two boards touch that share no handle, and no link locks. Pitches above
+/// The least pitch of an inward spiral with which a team reaches a radius. The head comes in from any distance. Until
+/// the head's front handle is at the radius, no two boards touch that share no handle, and no link locks. Pitches above
 /// `value_hi` are not covered: with some of them boards may overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastPitch {
@@ -47,8 +47,8 @@ pub struct Overlap {
     pub head_radius: f64,
 }
 
-/// Distance of the two numbers in metres, with room for rounding; and the distance kept on both sides of a pitch that
-/// the search has found.
+/// Distance of the two numbers in metres, with room for rounding. The second distance is kept on both sides of a pitch
+/// that the search has found.
 const WIDTH: f64 = 0.95e-9;
 const BESIDE: f64 = 0.45e-9;
 
@@ -300,8 +300,8 @@ impl Blocked<'_> {
     }
 
     /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds
-    /// other boards or a lock. Returns true if it finds any. With hints, it keeps two boards for which the proposal
-    /// says that they overlap up to the proposed pitch, and begins with the obstacle of the proposal.
+    /// other boards or a lock. Returns true if it finds any. With hints, it begins with the obstacle of the proposal,
+    /// and keeps two boards that, by the proposal, overlap up to the proposed pitch.
     fn follow(&mut self, hinted: bool) -> bool {
         let Proposal { pitch: proposed, first, last } = self.proposal;
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest

@@ -1,5 +1,5 @@
-//! The least turn radius, enclosed: with every radius up to the lower number a link stalls or locks or boards overlap,
-//! with the upper number none of these happens.
+//! The least turn radius, enclosed. With every radius up to the lower number a link stalls or locks or boards overlap.
+//! With the upper number none of these happens.
 //!
 //! In: a team, a pitch, the ratio of the arcs. Out: the two numbers. "The least turn" in `docs/proofs.md` has the
 //! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
@@ -12,8 +12,8 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
-/// The least radius of a turnaround with which a team turns round: the head comes in from any distance, and until the
-/// last handle has left the turn no two boards touch that share no handle, and no link stalls or locks. Radii above
+/// The least radius of a turnaround with which a team turns round. The head comes in from any distance. Until the last
+/// handle has left the turn, no two boards touch that share no handle, and no link stalls or locks. Radii above
 /// `value_hi` are not covered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastTurn {
@@ -22,8 +22,8 @@ pub struct LeastTurn {
     pub value_lo: f64,
     /// Upper bound, metres: with this radius the team turns round. `None` if this is shown for no radius.
     pub value_hi: Option<f64>,
-    /// Least radius with which the ordinary search finds no event, metres: within 1e-9 m of `value_lo`, and equal to
-    /// `value_hi` if that is within a nanometre too. `None` if the search was given up before.
+    /// Least radius with which the ordinary search finds no event, metres. It is within 1e-9 m of `value_lo`, and equal
+    /// to `value_hi` if that is within a nanometre too. `None` if the search was given up before.
     pub value: Option<f64>,
     /// Metres of the S with the radius `value`.
     pub length: Option<f64>,
@@ -50,8 +50,8 @@ pub struct TurnLimit {
     pub bench_a: u32,
     /// The other of two benches that touch.
     pub bench_b: Option<u32>,
-    /// Metres of path past the beginning of the S: of the rear handle of a lock, the front handle of a stall, the head
-    /// at a contact. Negative before the S.
+    /// Metres of path past the beginning of the S, negative before the S. They lead to the rear handle of a lock, the
+    /// front handle of a stall, or the head at a contact.
     pub past: f64,
 }
 
@@ -75,8 +75,8 @@ const FIRST_INTERVAL: f64 = 1e-3;
 const GROWTH: f64 = 1.5;
 const SHRINK: f64 = 0.5;
 
-/// Greatest width below which other events are tried beside the same one, and the share of the width after such a trial
-/// below which they are tried again.
+/// Greatest width below which other events are tried beside the same event. After such a trial, other events are tried
+/// again below a share of its width.
 const OTHERS_BELOW: f64 = 1e-4;
 const OTHERS_AGAIN: f64 = 0.1;
 
@@ -85,8 +85,8 @@ const BETTER: f64 = 1e-7;
 const FIRST_RATIO_STEP: f64 = 0.7;
 const LEAST_RATIO_STEP: f64 = 2e-3;
 
-/// Encloses the least turn radius of a team on spirals of a pitch, with arcs of a ratio, or with the best ratio that
-/// the search finds if there is none. `progress` receives the share of the work that is done, from 0 to 1.
+/// Encloses the least turn radius of a team on spirals of a pitch. The arcs have the ratio `arc_ratio`, or the best
+/// ratio that the search finds if there is none. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
 /// The team turns round with the least radius that is tested, or its boards overlap on a straight line.

@@ -14,8 +14,8 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::singularities::Singularities;
 use bench_dragon_show::scene::Accepted;
 
-/// Turns outside the turn or the longest link at which a trial of the links starts, and lengths of the longest link
-/// after the turn at which it ends.
+/// Turns outside the turn or the longest link at which a trial of the links starts. The trial ends a number of lengths
+/// of the longest link after the turn.
 const TURNS_BEFORE: f64 = 2.0;
 const LINKS_AFTER: f64 = 6.0;
 
@@ -28,8 +28,8 @@ const TRIAL_BUDGET: u64 = 20_000_000;
 /// Coordinate of a pivot just behind a junction, radians.
 const BESIDE_JUNCTION: f64 = 1e-13;
 
-/// Distances from an event, in links, within which a pivot is searched for; the number of places that are tried; and
-/// the share of a fold's depth that a pivot keeps off the ends of the S.
+/// Distances from an event, in links, within which a pivot is searched for. For each distance, a number of offsets is
+/// tried. A pivot keeps a share of a fold's depth off the ends of the S.
 const REACHES: [f64; 4] = [0.5, 0.1, 0.01, 1e-3];
 const OFFSETS: i32 = 48;
 const ASIDE: f64 = 0.05;
@@ -43,8 +43,8 @@ const WINDOW: f64 = 0.3;
 /// Difference of two radii from which the rate of the deepest place is taken, metres.
 const RATE_STEP: f64 = 1e-6;
 
-/// Greatest multiple of the depth of a fold by which the end of its stretch is beyond the other handle, the number of
-/// halvings that are tried, and the share of the depth that remains at the end.
+/// Greatest multiple of a fold's depth by which the end of the fold's stretch is beyond the other handle. The multiple
+/// is halved in a number of trials. A share of the depth must remain at the end.
 const BEYOND: f64 = 2.0;
 const BEYOND_TRIALS: i32 = 8;
 const REMAINS: f64 = 0.5;
@@ -60,8 +60,8 @@ pub(super) struct Family<'a> {
     pub arc_ratio: f64,
 }
 
-/// An event, as a proof needs it. The coordinate of its places on a spiral is the polar angle less that at the S: such
-/// a place moves little as the radius grows.
+/// An event, as a proof needs it. On a spiral, the coordinate of its places is the polar angle minus the polar angle at
+/// the S. Such a place moves little as the radius grows.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Witness {
     /// One handle of a link at a pivot, the other one before `end` and on the wrong side of the pivot's normal.
@@ -177,8 +177,8 @@ impl Family<'_> {
         witnesses.flatten().flatten().collect()
     }
 
-    /// Returns the fold with the deepest pivot within a distance of a place, both metres along the path, the place from
-    /// the beginning of the S.
+    /// Returns the fold with the deepest pivot within the distance `reach` of the place `near`. Both are metres along
+    /// the path, and the place is counted from the beginning of the S.
     fn pivoted(&self, radius: f64, (kind, link): (EventKind, usize), near: f64, reach: f64) -> Option<Witness> {
         let path = self.path(radius)?;
         let length = self.team.link(link);
@@ -244,8 +244,9 @@ impl Family<'_> {
         }
     }
 
-    /// Returns the deepest overlap of two boards, or of others near them, with the head near a place, metres past the
-    /// beginning of the S: first with a head that stays at the deepest as the radius grows.
+    /// Returns the deepest overlap of two boards, or of others near them, with the head near a place. `past` is the
+    /// place in metres past the beginning of the S. The first overlap has a head that stays at the deepest as the
+    /// radius grows.
     fn overlaps(&self, radius: f64, (a, b): (u32, u32), past: f64) -> Vec<Witness> {
         let others = [(a, b), (a, b + 1), (a, b.saturating_sub(1).max(a + 2)), (a + 1, b + 1)];
         let Some((pair, head)) = self.deepest(radius, &others, past) else { return Vec::new() };
@@ -254,8 +255,8 @@ impl Family<'_> {
         rate.into_iter().chain([0.0]).map(|rate| Witness::Overlap { pair, head, radius, rate }).collect()
     }
 
-    /// Returns the boards of several pairs that overlap most deeply with the head near a place, metres past the
-    /// beginning of the S, and the head's place then.
+    /// Returns the pair of boards that overlap most deeply with the head near a place, and the head's place then.
+    /// `past` is the near place in metres past the beginning of the S.
     fn deepest(&self, radius: f64, pairs: &[(u32, u32)], past: f64) -> Option<((u32, u32), Place)> {
         let window = WINDOW * self.team.shortest_link();
         let lead_in = self.spiral_between(radius, radius.max(self.team.longest_link()) + BOARDS_BEFORE * self.pitch);
@@ -287,8 +288,8 @@ fn bisect(holds: impl Fn(f64) -> bool, low: f64, high: f64) -> f64 {
 struct Folded {
     /// A place beyond the other handle, but not so far that the product changes its sign.
     end: Param,
-    /// Product of the pivot's tangent and the link, metres. If it is negative, the link has stalled or locked, and the
-    /// number is no less than minus a multiple of the metres by which `end` is further than the link from the pivot.
+    /// Product of the pivot's tangent and the link, metres. If it is negative, the link has stalled or locked. The
+    /// number is then at least minus a multiple of the metres by which `end` is further than the link from the pivot.
     merit: f64,
 }
 

@@ -16,7 +16,7 @@ const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, w
 const MOST_HANDLES: usize = 300;
 
 /// Returns the least clearance of boards 0 and 1 to any other board, with the head `head_radius` metres from the
-/// centre; `None` if a link has no follower.
+/// centre. Returns `None` if a link has no follower.
 fn least_clearance(team: &Team, pitch: f64, head_radius: f64) -> Option<f64> {
     let path = Path::spiral(pitch, head_radius / pitch);
     // Two turns behind the first two boards.
