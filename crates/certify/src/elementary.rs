@@ -50,9 +50,9 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     // The remainders are below z 2^-60 and 2^-79.
     let sine_of_rest = z - z * square * (1.0 / 6.0 - square * (1.0 / 120.0));
     let versine_of_rest = square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)));
-    // In units of u z, 2 of the error is from z, and 1 each from its sine, the product with the sine, and the bracket's
-    // sum. Less than 1 is from the remainders and all that has the factor z or u. In units of u, the sum `rest` adds
-    // `rest`. `lost`, below u, is off by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
+    // In units of u z, the error is 2 from z, 1 from its sine and 1 from the product with it. The bracket's sum adds 1,
+    // and the remainders and all that has the factor z or u add less than 1. In units of u, the sum `rest` adds `rest`.
+    // `lost`, below u, is off by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
     let error = error + f64::EPSILON * (6.0 * z.abs() + rest.abs()) + 7e-25 * quarters.abs();
     let around = |kept: f64, bracket: f64| {
         let sum = kept + bracket;
@@ -123,8 +123,9 @@ const fn reciprocals<const N: usize>(divisors: [f64; N]) -> [Interval; N] {
     reciprocals
 }
 
-/// Returns 1 - s q1 (1 - s q2 (1 - ...)) for s from 0 to 1. This is the sum of a series whose terms have the factors -s
-/// q1, -s q2 and so on. All partial sums are from 0 to 1, so that the ends of products are the products of ends.
+/// Returns 1 - s q1 (1 - s q2 (1 - ...)) for s from 0 to 1, the sum of a series. The terms of this series have the
+/// factors -s q1, -s q2 and so on. All partial sums are from 0 to 1, so that the ends of products are the products of
+/// ends.
 fn alternating(s: Interval, factors: &[Interval]) -> Interval {
     factors.iter().rev().fold(Interval::ONE, |sum, factor| {
         let least = ((s.lo.max(0.0) * factor.lo).next_down() * sum.lo).next_down();
