@@ -73,7 +73,7 @@ impl DelayLockedLoop {
 
     /// Corrects the estimate by a reading.
     ///
-    /// If the latest readings are off in one direction, the first readings were late or the source has moved: the
+    /// If the latest readings are off in one direction, the first readings were late or the source has moved. Then the
     /// position counts as less certain, so that the next readings correct it at once.
     pub fn correct(&mut self, at_ns: u64, position: f64) {
         let Noise { jitter, drift, .. } = self.noise;

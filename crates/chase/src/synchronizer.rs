@@ -14,7 +14,7 @@ const GATE: f64 = 0.040;
 const EVEN: f64 = 0.025;
 /// The greatest step of position and of time between two readings of one run, seconds.
 const MOST_STEP: f64 = 1.5;
-/// How long readings that are evenly late are a stall, seconds.
+/// Duration for which evenly late readings count as a stall, seconds.
 const LATE: f64 = 0.5;
 /// How long a repeated label is a sender's repetition, seconds, and how often it comes.
 const STANDING: f64 = 0.15;

@@ -1,6 +1,6 @@
 //! A tracked performer: from places on the stage to a place on the path, and from there to a simulated time. Pure.
 //!
-//! A place is projected on the path near the latest one only: turns of a coil are half a metre apart, and the nearest
+//! A place is projected on the path near the latest place only. Turns of a coil are half a metre apart, and the nearest
 //! point of the whole path would often be on another turn.
 
 use bench_dragon_motion::Motion;

@@ -163,7 +163,7 @@ impl Subscription {
     }
 
     /// Closes a connection whose publisher has gone. The remaining publishers count as stale for a while, unless a show
-    /// runs here: then one of them may belong to the next show, which is about to send.
+    /// runs here. Then one of the publishers may belong to the next show, which is about to send.
     pub fn leave(&self, connection: Connection) {
         let remaining = publishers(&connection.poses_service);
         // In this order: a show serves commands before it has a publisher.
@@ -197,8 +197,8 @@ impl Subscription {
         nodes
     }
 
-    /// Returns true if frames are passed over that a show of this machine may send, because another process is
-    /// selected: the end of a tunnel, selected while no show ran here.
+    /// Returns true if frames are passed over that a show of this machine may send. Another process is selected then:
+    /// the end of a tunnel, selected while no show ran here.
     pub fn passes_over_the_show(&self, connection: &Connection) -> bool {
         let Selection::Following { selected, passes_over: true, .. } = &connection.selection else { return false };
         let process = |node: &UniqueNodeId| node.pid::<ipc::Service>().ok();
@@ -206,8 +206,8 @@ impl Subscription {
         !shows.is_empty() && shows.iter().all(|show| process(show) != process(&selected.origin.node))
     }
 
-    /// Opens services that did not exist when the connection was made: a publisher creates its services one after
-    /// another, and a publisher without alerts never creates that service.
+    /// Opens services that did not exist when the connection was made. A publisher creates its services one after
+    /// another, and a publisher without alerts never creates the service of alerts.
     ///
     /// # Errors
     /// [`OpenError::Full`] if a new service has no memory left, [`OpenError::Incompatible`] if its messages have

@@ -2,8 +2,8 @@
 //!
 //! In: frames as they come, and a moment of CLOCK_MONOTONIC. Out: positions, headings and velocities at that moment,
 //! also between frames. The display runs a period behind the stream, at any rate. The error falls with the fourth power
-//! of the frames' distance (de Boor, A Practical Guide to Splines, IV.6: h^4 / 384 times the greatest fourth
-//! derivative).
+//! of the frames' distance h. Its bound is h^4 / 384 times the greatest fourth derivative (de Boor, A Practical Guide
+//! to Splines, IV.6).
 
 use std::collections::VecDeque;
 
@@ -79,7 +79,7 @@ impl HermiteReader {
     }
 
     /// Adds the next frame of a stream, and drops the frames of another run. A frame of another machine has a
-    /// `deadline_ns` of that machine's clock, which cannot be compared with moments here: replace it by the time of
+    /// `deadline_ns` of that machine's clock, which cannot be compared with moments here. Replace it by the time of
     /// arrival.
     pub fn push(&mut self, header: &FrameHeader, handles: &[HandlePose]) {
         if self.frames.back().is_some_and(|last| last.header.run_id != header.run_id) {
@@ -101,7 +101,7 @@ impl HermiteReader {
 
     /// Fills `handles` with the poses at a moment, CLOCK_MONOTONIC in nanoseconds, and returns its simulated time in
     /// seconds. Returns `None` if no frame has come. There is no interpolation before the oldest kept frame, after the
-    /// newest, and at a jump of simulated time: there the nearest earlier frame, or the oldest, is returned.
+    /// newest, and at a jump of simulated time. There the nearest earlier frame, or the oldest, is returned.
     ///
     /// Headings follow from the positions, as in the frames. Without velocities in the stream the path between two
     /// frames is a straight line.
@@ -154,8 +154,8 @@ fn set_headings(handles: &mut [HandlePose], tails: &[usize]) {
     }
 }
 
-/// One coordinate and its rate, of the polynomial of least degree through both positions and those velocities that
-/// `ends` trusts: cubic, quadratic, or a straight line.
+/// One coordinate and its rate, of a cubic, a quadratic or a straight line. This is the polynomial of least degree
+/// through both positions and those velocities that `ends` trusts.
 fn coordinate(at: [f64; 2], rate: [f64; 2], ends: (bool, bool), length: f64, u: f64) -> (f64, f64) {
     let step = at[1] - at[0];
     let [first, last] = rate.map(|rate| rate * length);
@@ -220,8 +220,8 @@ mod tests {
         reader
     }
 
-    /// The greatest distance of a handle from where the safe solver has it, and of a heading, over a second of
-    /// moments that no frame has.
+    /// The greatest distance of a handle from where the safe solver has it, and the greatest difference of a heading.
+    /// The moments are spread over `seconds`, and only the first is a frame's.
     fn worst(start: f64, rate: f64, seconds: f64) -> (f64, f64) {
         let scene = scene();
         let reader = reader(Playback { start, rate, ..Playback::of(&scene) }, (seconds * rate) as u64 + 2);

@@ -12,8 +12,8 @@ use ::iceoryx2::prelude::*;
 pub use error::{OpenError, failed, incomplete, port_error, service_error};
 pub use memory::{SHARED_MEMORY, check_room_to_subscribe, free_bytes, reserve_pages};
 
-/// Publishers that a service admits: the show's, and the end of a tunnel to other machines, which opens a publisher and
-/// a subscriber of every service.
+/// Publishers that a service admits: the show's, and the end of a tunnel to other machines. The end of a tunnel opens a
+/// publisher and a subscriber of every service.
 pub const MOST_PUBLISHERS: usize = 2;
 /// The attribute of a service of frames with the name of its publisher's clock
 /// ([`monotonic_clock_name`](crate::clock::monotonic_clock_name)). Tunnels between machines create services without it.

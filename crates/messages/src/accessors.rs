@@ -29,8 +29,8 @@ impl ControlResponse {
 }
 
 impl Stage {
-    /// Returns the dragon of a handle or a bench by its number through all handles, and its number within the dragon;
-    /// `None` for the number of an obstacle.
+    /// Returns the dragon of a handle or a bench by its number through all handles, and the number within the dragon.
+    /// Returns `None` for the number of an obstacle.
     ///
     /// # Examples
     ///

@@ -11,8 +11,8 @@ pub const RATES: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 /// The most periods of a step: the greatest whole number up to which a double counts exactly.
 pub const MOST_PERIODS: u64 = 1 << f64::MANTISSA_DIGITS;
 
-/// The value of a request for the state whose response has, as its `time_scale`, the rate at which the show plays or
-/// will play on: a show that is paused or held has another rate in force, 0.
+/// The value of a request for the state. The response then has, as its `time_scale`, the rate at which the show plays
+/// or will play on. A show that is paused or held has another rate in force, 0.
 pub const PLAYING_RATE: f64 = 1.0;
 
 /// A command. Its number on the wire is its place in [`Command::TABLE`].

@@ -1,6 +1,6 @@
 //! The memory layouts that publishers write and subscribers in any language read.
 //!
-//! Depends on nothing but serde and iceoryx2's [`ZeroCopySend`]: states, levels and kinds are plain numbers here, and
+//! Depends on nothing but serde and iceoryx2's [`ZeroCopySend`]. States, levels and kinds are plain numbers here.
 //! `convert` of the crate `show` fills them in, and the accessors of this crate give them their types. Everything is
 //! little-endian, `#[repr(C)]` and without implicit padding. A type's name ends in the version of its layout, so that a
 //! subscriber built for another layout is refused instead of reading nonsense.
@@ -60,10 +60,10 @@ pub struct HandlePose {
 /// nearest single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at
 /// 8 m, 0.06 mm at 1 km).
 ///
-/// Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head
-/// first: one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the
-/// index `i` is of the handle `i * every`, the last pose of the last handle. Several dragons follow one another, each
-/// with its own head and tail.
+/// Over iceoryx2 the payload of `<name>/poses32` is a slice of these, the head first: one handle in `every`, and the
+/// tail. A scene can request this service. The service's attribute `every` holds that number: the pose with the index
+/// `i` is of the handle `i * every`, the last pose of the last handle. Several dragons follow one another, each with
+/// its own head and tail.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/HandlePose32/1")]
 #[repr(C)]
@@ -118,9 +118,9 @@ pub struct FrameHeader {
     /// Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged after the end of the
     /// show.
     pub time_scale: f64,
-    /// Metres between the nearest two boards that share no handle, negative when they overlap; of a scene with
-    /// obstacles the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than three
-    /// benches and no obstacles.
+    /// Metres between the nearest two boards that share no handle, negative when they overlap. In a scene with
+    /// obstacles it is the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than
+    /// three benches and no obstacles.
     pub min_clearance: f64,
     /// The number of handles in this message.
     pub handles: u32,
@@ -139,9 +139,9 @@ pub struct FrameHeader {
 
 /// A change of the alert level, or a step of the countdown towards an event.
 ///
-/// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level, or a board
-/// and an obstacle that are nearer. The fields that begin with `event` are the event the alert is about: the next
-/// contact, obstacle, stall or lock while the level is clear or approaching, else the event that has happened. An
+/// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, or a nearer board and
+/// obstacle, at every level. The fields that begin with `event` are the event that the alert is about. While the level
+/// is clear or approaching, this is the next contact, obstacle, stall or lock, else the event that has happened. An
 /// obstacle stands where a second bench would, by its number: the number of handles plus its place in the scene, the
 /// boundary last.
 ///
@@ -181,8 +181,8 @@ pub struct CollisionAlert {
     pub event_time: f64,
     /// `event_time - sim_time`, simulated seconds; negative once it has passed; NaN if there is no event.
     pub time_to_event: f64,
-    /// Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle;
-    /// negative when they overlap; NaN if there are neither.
+    /// Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle.
+    /// Negative when they overlap; NaN if there are neither.
     pub clearance: f64,
     /// The midpoint between the nearest two boards, metres right of the centre; NaN if there are fewer than three
     /// benches.
@@ -190,8 +190,9 @@ pub struct CollisionAlert {
     /// The midpoint between the nearest two boards, metres up from the centre; NaN if there are fewer than three
     /// benches.
     pub y: f64,
-    /// The place of the event, metres right of the centre: the touching point of a contact, the point of a board
-    /// nearest to an obstacle, the rear handle of the bench that stalls or locks; NaN if there is no event.
+    /// The place of the event, metres right of the centre; NaN if there is no event. It is the touching point of a
+    /// contact, or the point of a board nearest to an obstacle. For a bench that stalls or locks, it is the rear
+    /// handle.
     pub event_x: f64,
     /// The place of the event, metres up from the centre; NaN if there is no event.
     pub event_y: f64,
@@ -296,8 +297,8 @@ impl<'de> Deserialize<'de> for SceneName {
 
 /// The status of the loop, once a second.
 ///
-/// Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
-/// all durations are in nanoseconds.
+/// Figures that end in `_second` are of the last second alone. Figures that end in `_total` are since the start of the
+/// run. All durations are in nanoseconds.
 ///
 /// Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
 ///

@@ -1,6 +1,6 @@
 //! The messages between a publisher and its subscribers.
 //!
-//! [`layouts`] are the structs in shared memory; [`state`], [`control`] and [`chase`] have the types of their numbers;
+//! [`layouts`] are the structs in shared memory. [`state`], [`control`] and [`chase`] have the types of their numbers.
 //! [`json`] and [`sentence`] are the same messages for programs and for people. This crate knows no transport and no
 //! solver: publisher and subscribers both depend on it.
 

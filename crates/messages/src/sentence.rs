@@ -51,8 +51,8 @@ pub fn chase_sentence(status: &ChaseStatus) -> String {
     format!("{subject} {}{error}{distance}", state.map_or("in an unknown state", ChaseState::words))
 }
 
-/// Returns the name of the obstacle that an alert is about: that of its event, or else the nearest one; `None` if it is
-/// about boards alone.
+/// Returns the name of the obstacle that an alert is about: the obstacle of its event, or else the nearest obstacle.
+/// Returns `None` if the alert is about boards alone.
 pub fn obstacle_in<'a>(stage: &'a Stage, alert: &CollisionAlert) -> Option<&'a str> {
     obstacle_name(stage, alert.event_bench_b).or_else(|| obstacle_name(stage, alert.bench_b))
 }
@@ -132,8 +132,8 @@ pub fn time_until(simulated_seconds: f64, time_scale: f64) -> String {
     if time_scale > 0.0 { format!("in {:.1} s", simulated_seconds / time_scale) } else { "not while paused".to_owned() }
 }
 
-/// Returns a number with the fewest digits that read back to the same bits: with an exponent outside 1e-6 to 1e15,
-/// where Rust would write every zero.
+/// Returns a number with the fewest digits that read back to the same bits. Outside 1e-6 to 1e15, where Rust would
+/// write every zero, the number has an exponent.
 pub fn number(value: f64) -> String {
     let is_plain = value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs());
     if is_plain { value.to_string() } else { format!("{value:e}") }

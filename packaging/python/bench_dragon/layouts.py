@@ -2,7 +2,7 @@
 # BENCH_DRAGON_WRITE=1 cargo test --test repository msgs::
 """The memory layouts of bench-dragon's messages, once, for every Python subscriber.
 
-Each class is what iceoryx2 compares with the publisher's type: its name ends in the layout's version, so that a
+Each class is what iceoryx2 compares with the publisher's type. Its name ends in the layout's version, so that a
 publisher with another layout is refused.
 """
 
@@ -166,10 +166,10 @@ class HandlePose32(Message):
     nearest single-precision float. The error along each axis is at most 6e-8 of the distance from the centre (0.5 um at
     8 m, 0.06 mm at 1 km).
 
-    Over iceoryx2 the payload of `<name>/poses32`, a service that a scene can request, is a slice of these, the head
-    first: one handle in `every`, and the tail. The service's attribute `every` holds that number: the pose with the
-    index `i` is of the handle `i * every`, the last pose of the last handle. Several dragons follow one another, each
-    with its own head and tail.
+    Over iceoryx2 the payload of `<name>/poses32` is a slice of these, the head first: one handle in `every`, and the
+    tail. A scene can request this service. The service's attribute `every` holds that number: the pose with the index
+    `i` is of the handle `i * every`, the last pose of the last handle. Several dragons follow one another, each with
+    its own head and tail.
     """
 
     LAYOUT = 1
@@ -217,9 +217,9 @@ class FrameHeader(Message):
     # Simulated seconds per second of wall time, as in force; 0 while paused or held, unchanged after the end of the
     # show.
     time_scale: float
-    # Metres between the nearest two boards that share no handle, negative when they overlap; of a scene with obstacles
-    # the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than three benches and
-    # no obstacles.
+    # Metres between the nearest two boards that share no handle, negative when they overlap. In a scene with obstacles
+    # it is the least clearance of boards and obstacles. NaN if the scene has no `[alerts]`, or fewer than three benches
+    # and no obstacles.
     min_clearance: float
     # The number of handles in this message.
     handles: int
@@ -256,9 +256,9 @@ class FrameHeader(Message):
 class CollisionAlert(Message):
     """A change of the alert level, or a step of the countdown towards an event.
 
-    `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, at every level, or a board
-    and an obstacle that are nearer. The fields that begin with `event` are the event the alert is about: the next
-    contact, obstacle, stall or lock while the level is clear or approaching, else the event that has happened. An
+    `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, or a nearer board and
+    obstacle, at every level. The fields that begin with `event` are the event that the alert is about. While the level
+    is clear or approaching, this is the next contact, obstacle, stall or lock, else the event that has happened. An
     obstacle stands where a second bench would, by its number: the number of handles plus its place in the scene, the
     boundary last.
 
@@ -278,7 +278,7 @@ class CollisionAlert(Message):
     event_time: float
     # `event_time - sim_time`, simulated seconds; negative once it has passed; NaN if there is no event.
     time_to_event: float
-    # Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle; negative
+    # Metres between the nearest two boards in that frame, or between a board and the keep-out of an obstacle. Negative
     # when they overlap; NaN if there are neither.
     clearance: float
     # The midpoint between the nearest two boards, metres right of the centre; NaN if there are fewer than three
@@ -286,8 +286,8 @@ class CollisionAlert(Message):
     x: float
     # The midpoint between the nearest two boards, metres up from the centre; NaN if there are fewer than three benches.
     y: float
-    # The place of the event, metres right of the centre: the touching point of a contact, the point of a board nearest
-    # to an obstacle, the rear handle of the bench that stalls or locks; NaN if there is no event.
+    # The place of the event, metres right of the centre; NaN if there is no event. It is the touching point of a
+    # contact, or the point of a board nearest to an obstacle. For a bench that stalls or locks, it is the rear handle.
     event_x: float
     # The place of the event, metres up from the centre; NaN if there is no event.
     event_y: float
@@ -328,8 +328,8 @@ class CollisionAlert(Message):
 class LoopStatus(Message):
     """The status of the loop, once a second.
 
-    Figures that end in `_second` are of the last second alone, those that end in `_total` since the start of the run;
-    all durations are in nanoseconds.
+    Figures that end in `_second` are of the last second alone. Figures that end in `_total` are since the start of the
+    run. All durations are in nanoseconds.
 
     Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
     """
@@ -593,12 +593,12 @@ class StageSegment(Message):
     heading: float
     # Metres along it.
     length: float
-    # Of an arc, 1/m, positive if it turns left; of a line 0; of a spiral NaN, if its centre is the stage's origin and
-    # its turns begin on the x axis. Of a spiral that the scene places elsewhere, the curvature at its beginning:
+    # Of an arc, 1/m, positive if it turns left; of a line 0. NaN for a spiral whose centre is the stage's origin and
+    # whose turns begin on the x axis. Of a spiral that the scene places elsewhere, the curvature at its beginning:
     # beginning, heading and the side of the curvature say where it lies.
     curvature: float
-    # Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned; of a placed
-    # one: before it is placed); else NaN.
+    # Of a spiral, the polar angle at which it begins, radians; else NaN. For an outward spiral this is the angle before
+    # it is turned, for a placed spiral the angle before it is placed.
     theta_first: float
     # Of a spiral, the polar angle at which it ends, radians; else NaN.
     theta_last: float
@@ -763,8 +763,8 @@ class Stage(Message):
     the obstacle j, from 0.
 
     Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments
-    of the path, layout 3 gave them their name, layout 4 added the time line: the freeze time, the events and the cues,
-    layout 5 the hash of the scene's text, layout 6 the dragons, the obstacles and a path of any length.
+    of the path, layout 3 gave them their name. Layout 4 added the time line: the freeze time, the events and the cues.
+    Layout 5 added the hash of the scene's text. Layout 6 added the dragons, the obstacles and a path of any length.
     """
 
     LAYOUT = 6

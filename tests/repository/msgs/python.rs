@@ -5,7 +5,7 @@ use crate::msgs::source::{Docs, Enumeration, Kind, Layout, Source, links, withou
 
 const HEAD: &str = r#""""The memory layouts of bench-dragon's messages, once, for every Python subscriber.
 
-Each class is what iceoryx2 compares with the publisher's type: its name ends in the layout's version, so that a
+Each class is what iceoryx2 compares with the publisher's type. Its name ends in the layout's version, so that a
 publisher with another layout is refused.
 """
 

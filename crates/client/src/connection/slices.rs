@@ -1,5 +1,7 @@
-//! The services whose messages have a header and a list: `<name>/stage` with the segments of paths and outlines, and
-//! `<name>/scene` with the text of the scene as bytes.
+//! The services whose messages have a header and a list:
+//!
+//! - `<name>/stage` with the segments of paths and outlines,
+//! - `<name>/scene` with the text of the scene as bytes.
 
 use std::fmt::Debug;
 

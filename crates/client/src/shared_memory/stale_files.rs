@@ -1,5 +1,5 @@
-//! Stale files of processes that were killed during their start. iceoryx2 cleans up after killed processes whenever a
-//! node is created or dropped, but 0.10.0 fails at files that such a process had not finished:
+//! Stale files of processes that were killed during their start. The library iceoryx2 cleans up after killed processes
+//! whenever a node is created or dropped. Its version 0.10.0 fails at files that such a process had not finished:
 //!
 //! - in a node's folder: it cannot remove the folder, leaves the whole dead node, and fails again each time;
 //! - in shared memory: it waits without end for the file to be finished, and so does the program that created the node;

@@ -32,12 +32,12 @@ pub struct StageSegment {
     pub heading: f64,
     /// Metres along it.
     pub length: f64,
-    /// Of an arc, 1/m, positive if it turns left; of a line 0; of a spiral NaN, if its centre is the stage's origin and
-    /// its turns begin on the x axis. Of a spiral that the scene places elsewhere, the curvature at its beginning:
+    /// Of an arc, 1/m, positive if it turns left; of a line 0. NaN for a spiral whose centre is the stage's origin and
+    /// whose turns begin on the x axis. Of a spiral that the scene places elsewhere, the curvature at its beginning:
     /// beginning, heading and the side of the curvature say where it lies.
     pub curvature: f64,
-    /// Of a spiral, the polar angle at which it begins, radians (for an outward one: before it is turned; of a placed
-    /// one: before it is placed); else NaN.
+    /// Of a spiral, the polar angle at which it begins, radians; else NaN. For an outward spiral this is the angle
+    /// before it is turned, for a placed spiral the angle before it is placed.
     pub theta_first: f64,
     /// Of a spiral, the polar angle at which it ends, radians; else NaN.
     pub theta_last: f64,
@@ -274,8 +274,8 @@ pub struct StageCue {
 /// the obstacle j, from 0.
 ///
 /// Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments
-/// of the path, layout 3 gave them their name, layout 4 added the time line: the freeze time, the events and the cues,
-/// layout 5 the hash of the scene's text, layout 6 the dragons, the obstacles and a path of any length.
+/// of the path, layout 3 gave them their name. Layout 4 added the time line: the freeze time, the events and the cues.
+/// Layout 5 added the hash of the scene's text. Layout 6 added the dragons, the obstacles and a path of any length.
 ///
 /// # Examples
 ///

@@ -55,7 +55,7 @@ pub struct Recovered {
     pub lost_messages: u64,
     /// Messages whose channel cannot be read.
     pub unknown: u64,
-    /// Bytes behind a length that cannot be, up to the next readable record or the end.
+    /// Bytes skipped after an invalid length, up to the next readable record or the end.
     pub lost_bytes: u64,
     /// True if the file has its end.
     pub whole: bool,

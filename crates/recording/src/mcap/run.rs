@@ -94,9 +94,9 @@ impl Run {
         }
     }
 
-    /// Returns the log time of a message: its own time, but not before the file's first frame if it belongs to that
-    /// frame or an earlier one. An older message, as a late subscriber gets it, would leave a gap. Ticks are compared,
-    /// since a clock can be set back.
+    /// Returns the log time of a message: its own time, with a lower bound. The log time of a message of the file's
+    /// first frame, or of an earlier frame, is not before that first frame. An older message, as a late subscriber gets
+    /// it, would leave a gap. Ticks are compared, since a clock can be set back.
     pub fn log_time(&self, message: &Event) -> u64 {
         let ((stamp_ns, tick), began) = (message.stamp(), self.file_began_stamp_ns);
         match tick.cmp(&self.file_began_tick) {
