@@ -1,8 +1,8 @@
 //! Cost of the least clearance of a frame: all pairs against the live algorithm, and one pair.
 //!
 //! Every case averages over a run of consecutive frames at one place of the show. On the paper's spiral, the place is
-//! given in hundredths of the head's way to the contact; for longer teams, of the way that leaves the head 4 m from the
-//! centre.
+//! given in hundredths of the head's way to the contact. For longer teams, it is given in hundredths of the way that
+//! leaves the head 4 m from the centre.
 
 use bench_dragon::motion::clearance::{ClearanceMonitor, board, least_clearance_all_pairs};
 use bench_dragon::motion::model::curve::Side;

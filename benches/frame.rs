@@ -1,6 +1,11 @@
-//! Cost of a frame: each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000; the floor
-//! below which no solver can go; the safe solver beside it in the same run; whole shows with and without alerts; the
-//! events; and a frame's way into shared memory.
+//! Cost of a frame:
+//!
+//! - each solver at 60 Hz and 1 kHz, with and without velocities, for teams of 10 to 100,000;
+//! - the floor below which no solver can go;
+//! - the safe solver beside it in the same run;
+//! - whole shows with and without alerts;
+//! - the events;
+//! - a frame's way into shared memory.
 //!
 //! `cargo bench --bench frame`
 
@@ -66,8 +71,8 @@ fn newton_on_a_turnaround(bencher: Bencher, rate: f64) {
     play(bencher, &mut Newton::new(path, team(223), 1.0, Velocities::Computed), 224, rate);
 }
 
-/// Newton's method with no guess except the link's length over the radius, on theta in one double, with the system's
-/// sine and cosine: a careful first implementation.
+/// Newton's method with no guess except the link's length over the radius. It works on theta in one double, with the
+/// system's sine and cosine: a careful first implementation.
 #[divan::bench(sample_count = 500, sample_size = 20)]
 fn newton_cold_without_care(bencher: Bencher) {
     let (radius_per_radian, team) = (0.55 / TAU, team(223));
@@ -200,7 +205,7 @@ fn show(bencher: Bencher, with: &str) {
     });
 }
 
-/// The same at the greatest cost of the clearance: the nearest boards are about as near as every pair on two turns, so
+/// The same at the greatest cost of the clearance. The nearest boards are about as near as every pair on two turns, so
 /// no bench can be left out.
 #[divan::bench(sample_count = 500, sample_size = 4)]
 fn show_where_every_turn_is_as_near(bencher: Bencher) {

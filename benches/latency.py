@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Latency from sending to receiving: the live publisher beside a bare iceoryx2 publisher of the same payload.
 
-Both send 224 handles and a header of 80 bytes 1,000 times a second to one subscriber, which waits on the event; in
-turn, for some rounds, so that changes of the machine's load affect both. Needs:
+Both send 224 handles and a header of 80 bytes 1,000 times a second to one subscriber, which waits on the event. They
+run in turn, for some rounds, so that changes of the machine's load affect both. Needs:
 
     cargo build --release && cargo build --release --example bare
     python3 benches/latency.py [--seconds 20] [--rounds 3]

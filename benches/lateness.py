@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Wake-up lateness: the live loop beside cyclictest, on the same core, at the same interval and priority.
 
-In turn, for some rounds, so that changes of the machine's load affect both; and either once with CPUs that may sleep
-and once with CPUs that are kept awake (cyclictest --latency, bench-dragon run --cpu-latency: cyclictest keeps them
-awake by default). cyclictest is Debian's package rt-tests; real-time priority and waking CPUs need root. --priority 0
-compares without a priority. The live loop also counts the periods that a late wake-up delayed (coordinated omission);
-cyclictest counts only the wake-up, which is to its advantage. Needs:
+The two run in turn, for some rounds, so that changes of the machine's load affect both. Each runs once with CPUs that
+may sleep and once with CPUs that are kept awake. The options for this are cyclictest --latency and bench-dragon run
+--cpu-latency. By default cyclictest keeps CPUs awake. It is Debian's package rt-tests; real-time priority and waking
+CPUs need root. The option --priority 0 compares without a priority. The live loop also counts the periods that a late
+wake-up delayed (coordinated omission). But cyclictest counts only the wake-up, which is to its advantage. Needs:
 
     apt-get install rt-tests && cargo build --release
     python3 benches/lateness.py [--seconds 20] [--rounds 3] [--cpu 1] [--priority 80] [--interval-us 1000]

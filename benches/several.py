@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 """Cost of a second and a tenth dragon: publishers under different names on one machine, all read by one `metrics`.
 
-For each rate, one, two and ten publishers of the same scene in turn, for some rounds, so that changes of the machine's
-load affect all. Of each publisher: its CPU time and resident memory, the lateness of its loop, the periods it skipped;
-and the frames that the reader missed. Prints medians over publishers and rounds, sums for skipped and missed, and
-beside each the ratio to one publisher alone. The load of the machine is printed above: other programs affect all
-figures. Needs:
+For each rate, one, two and ten publishers of the same scene run in turn. The turns last some rounds, so that changes of
+the machine's load affect all. Measured of each publisher: CPU time and resident memory, the lateness of its loop,
+skipped periods, and frames that the reader missed. Prints medians over publishers and rounds, sums for skipped and
+missed, and beside each the ratio to one publisher alone. The load of the machine is printed above: other programs
+affect all figures. Needs:
 
     cargo build --release
     python3 benches/several.py [--seconds 15] [--rounds 3] [--counts 1,2,10] [--rates 60,1000] [--scene FILE]
 
-With --one-show N in place of --scene, each publisher has one show of N dragons of 223 benches that coil into each other
-in pairs, with alerts: for example --one-show 16 --counts 1 --rates 60 --rounds 1 --seconds 60.
+With --one-show N in place of --scene, each publisher has one show of N dragons of 223 benches, with alerts. The dragons
+coil into each other in pairs. Example: --one-show 16 --counts 1 --rates 60 --rounds 1 --seconds 60.
 """
 
 import argparse

@@ -1,11 +1,10 @@
-//! Cost of a step of the loop, by the size of the team: the solver, the clearance, the way into shared memory, and the
-//! whole step, beside copying as many bytes into the same memory. The parts are measured in turn, frame by frame, in
-//! one run, with one subscriber that takes every frame; the figures are medians.
+//! Cost of a step of the loop, by the size of the team. The measured parts are the solver, the clearance, the way into
+//! shared memory, and the whole step. Beside them, as many bytes are copied into the same memory. The parts are
+//! measured in turn, frame by frame, in one run, with one subscriber that takes every frame. The figures are medians.
 //!
 //! Then the step of the paper's team again, beside the same step with one and with two empty command queues.
 //!
-//! And the step of the paper's team at 10 kHz, without and with a log of the run (`run --log`), and the log's work
-//! after the step.
+//! And the step of the paper's team at 10 kHz, without and with a log (`run --log`), and the log's work after the step.
 //!
 //! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the
 //! command queues alone: `cargo bench --bench step -- queues`, or the log: `cargo bench --bench step -- log`
@@ -30,8 +29,8 @@ use bench_dragon::show::{Playback, Show};
 const SIZES: [usize; 4] = [223, 5_000, 100_000, 1_000_000];
 /// Start of the show, simulated seconds; it plays at 60 Hz from there.
 const START: f64 = 200.0;
-/// Frames of a part before the turn of the next part: few enough that all parts see the same machine, and enough that a
-/// part finds its own memory in the caches as the loop would.
+/// Frames of a part before the turn of the next part. They are few enough that all parts see the same machine. They are
+/// enough that a part finds its own memory in the caches as the loop would.
 const BATCH: usize = 4;
 /// Rounds before the first counted round: every page has been written by then.
 const WARM_UP: usize = 1;

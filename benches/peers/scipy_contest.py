@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """The contest problem behind the paper's scene, as it is usually solved: SciPy, handle by handle, step by step.
 
-Problem A of the 2024 China Undergraduate Mathematical Contest in Modeling. The head's polar angle by brentq from the
-arc length; each follower by brentq (--method fsolve: by fsolve) as the next place outward at the distance of its link.
-The contact is the first tested time at which the rectangles of two benches overlap by the separating axis theorem (all
-pairs near enough at once, in NumPy); with --refine, the root of the least gap between it and the time before. Speeds
-are left out. Prints the largest error of the positions at 300 s against the figures of 50 digits in tests/truth, the
-contact's error, and the time needed. Needs: pip install numpy scipy
+Problem A of the 2024 China Undergraduate Mathematical Contest in Modeling. SciPy's brentq finds the head's polar angle
+from the arc length. It finds each follower as the next place outward at the distance of its link; --method fsolve uses
+fsolve for this. The contact is the first tested time at which the rectangles of two benches overlap. The test is the
+separating axis theorem, for all pairs near enough at once, in NumPy. With --refine, the contact is the root of the
+least gap between this time and the time before. Speeds are left out. Prints the largest error of the positions at 300 s
+against the figures of 50 digits in tests/truth, the contact's error, and the time needed. Needs: pip install numpy
+scipy
 
     python3 benches/peers/scipy_contest.py [--method brentq|fsolve] [--step 1] [--start 0] [--refine]
 """
