@@ -14,7 +14,7 @@ PR_CAPBSET_DROP, CAP_SYS_NICE = 24, 23
 @contextlib.contextmanager
 def browsers():
     """Returns an object that starts a Chromium. As root, Chromium would raise its priority above all other processes,
-    which would then miss their deadlines; processes started from here on have no right to that."""
+    which would then miss their deadlines. Processes started from here on have no right to that."""
     # Refused to users other than root, whose browsers have no such right anyway.
     ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_SYS_NICE, 0, 0, 0)
     with sync_playwright() as playwright:

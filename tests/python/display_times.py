@@ -2,8 +2,8 @@
 
     display_times.py --transport iceoryx2|ros2 --name NAME --moments N --delay D
 
-Prints a JSON line for each time until N of them were between two frames: the simulated time, the interval of the frames
-on both sides, which is longer if the publisher skipped some, the places and the headings.
+Prints a JSON line for each time until N of them were between two frames. A line has the simulated time, the interval of
+the frames on both sides, the places and the headings. The interval is longer if the publisher skipped some frames.
 """
 
 import argparse

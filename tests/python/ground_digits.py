@@ -3,7 +3,7 @@
     ground_digits.py SCENE.toml TIME
 
 TIME, seconds, is a guess, correct to a microsecond. The clearance of each board is enclosed half a unit of the last
-digit before and after the time printed: all are positive before, and one is negative after. `ground.py` tests that
+digit before and after the time printed. All are positive before, and one is negative after. `ground.py` tests that
 nothing is met earlier. The scene, in coordinates of its path, is that of `second_judge.py`. It shares no code with the
 program.
 """

@@ -2,8 +2,8 @@
 
     log_hash.py --name NAME --rate HZ --seconds S
 
-Prints a JSON line for each second with every frame: its number, first and last tick, frames, and BLAKE3 over bytes 8 to
-23 and 48 to 95 of each header and all bytes of its poses.
+Prints a JSON line for each second with every frame. The line has the number of the second, its first and last tick, its
+frames, and BLAKE3. The hash is over bytes 8 to 23 and 48 to 95 of each header and all bytes of its poses.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
     psn_dragons.py
 
-Listens to a free UDP port and prints it as the first line. Ends with the first packet of names after a packet of
-positions, and prints a JSON line with the names and the positions of all trackers, by their numbers.
+Listens to a free UDP port and prints it as the first line. Ends when packets of names and of positions have come. Then
+prints a JSON line with the names and the positions of all trackers, by their numbers.
 """
 
 import json

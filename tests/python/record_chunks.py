@@ -2,8 +2,8 @@
 
     record_chunks.py FILE
 
-Prints a JSON line for each chunk: the byte after its record, and of each message in it the topic, the sequence, the log
-time and BLAKE3 of its data; or, of a file without chunks, nothing.
+Prints a JSON line for each chunk, or nothing for a file without chunks. The line has the byte after the chunk's record.
+Of each message in the chunk it has the topic, the sequence, the log time and BLAKE3 of the message's data.
 """
 
 import json

@@ -3,9 +3,9 @@
     record_peer.py subscribe --name NAME --kept FILE
     record_peer.py compare --name NAME --kept FILE --recordings FILE...
 
-`subscribe` prints `ready`, then `frame` at the first frame, and ends when a publisher has come and gone: FILE then
+`subscribe` prints `ready`, then `frame` at the first frame, and ends when a publisher has come and gone. FILE then
 holds the bytes of every message. `compare` decodes every message of every topic of the recordings with
-mcap-ros2-support, and the same files with rosbags; it prints their number by topic, or fails.
+mcap-ros2-support, and the same files with rosbags. It prints their number by topic, or fails.
 """
 
 import argparse

@@ -2,7 +2,7 @@
 
     ros2_content.py --name NAME --seconds S --topic handles|poses --reliability reliable|best_effort
 
-Reads the raw CDR (decoding it in Python would be slower than the publisher) and prints one JSON line: the number of
+Reads the raw CDR, since decoding it in Python would be slower than the publisher. Prints one JSON line: the number of
 messages, of sequences missing between the first and the last, of compared messages, and of those that differ.
 """
 

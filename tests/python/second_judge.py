@@ -2,18 +2,22 @@
 
     second_judge.py [--places N] [--seed S] CERTIFICATE...
 
-Of a certificate of events it checks each event at both ends of its enclosure, first touches of obstacles among them; at
-N random times of the stretches that are said to be clear, or to move forward, all boards, links and obstacles. Of one
-of the least clearance it checks all boards at N random times and at N times near the least, and the two nearest; of one of
-the greatest speed the speeds of all handles at N random times, and the fastest; of one of the least pitch N random
-pitches that are said to end with an overlap or a lock, and N places of the head with the pitch that is free. In N
-random steps of each it checks that the spans contain the handles, and that boards are as far apart as is said. Of several
+The checks are by question:
+
+- Events: each event at both ends of its enclosure, first touches of obstacles among them. At N random times of the
+  stretches that are said to be clear, or to move forward: all boards, links and obstacles.
+- The least clearance: all boards at N random times and at N times near the least, and the two nearest.
+- The greatest speed: the speeds of all handles at N random times, and the fastest.
+- The least pitch: N random pitches that are said to end with an overlap or a lock. Also N places of the head with the
+  pitch that is free.
+
+In N random steps of each certificate, the spans contain the handles, and boards are as far apart as is said. Of several
 dragons it checks each alone, and each two on the stage at times of the show. Path and chain are built as docs/proofs.md
-defines them: a follower is the first point backward along the path at the distance of the link, enclosed in numbers of
+defines them. A follower is the first point backward along the path at the distance of the link, enclosed in numbers of
 192 bits.
 
-Prints a JSON object for each file: `refused` and `undecided`, a sentence or null, and the numbers of what was checked,
-with the random places that were undecided.
+Prints a JSON object for each file. Its `refused` and `undecided` are a sentence or null. The numbers of what was
+checked follow, with the random places that were undecided.
 """
 
 import argparse
@@ -664,8 +668,8 @@ class Judge:
         after = scene.chain(scene.place(hi), link + 1)[link]
         if front[0] != after[0]:
             raise Undecided("a lock beside a junction")
-        # The link's length at places around the rear handle: if it is on both sides less than the link, whichever place
-        # of [front, after] the front handle has, a follower cannot leave unnoticed.
+        # The distances of places around the rear handle. If they are less than the link on both sides, a follower
+        # cannot leave unnoticed. This holds for whichever place of [front, after] the front handle has.
         square = scene.links[link] ** 2
         meanwhile = scene.point((front[0], hull(front[1], after[1])))
 

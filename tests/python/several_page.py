@@ -2,7 +2,7 @@
 
     several_page.py SCENARIO PROGRAM NAME
 
-Starts a server and publishers under the service names NAME_a and NAME_b, tests the words and the picture of the page,
+Starts a server and publishers under the service names NAME_a and NAME_b. Tests the words and the picture of the page,
 and reads the state of the publishers themselves. Ends with exit code 0, or with a sentence on the error.
 """
 

@@ -99,8 +99,8 @@ def obstacles_are_drawn():
 
 
 def lines_join_what_is_nearest():
-    """In calm motion and while the show stands: from the two nearest boards to each other, and from a board to the edge
-    of the nearest keep-out, in metres that this test computes from the drawn places."""
+    """In calm motion and while the show stands. Lines join the two nearest boards, and a board and the edge of the
+    nearest keep-out. This test computes their metres from the drawn places."""
     with server() as url, started("--scene", SQUARE, "run", "--quiet", "--json", "--start", "95", "--time-scale", "0.05"), browser() as (page, complaints):
         page.goto(url)
         drawn(page)
@@ -138,8 +138,8 @@ def lines_join_what_is_nearest():
 
 
 def curve_stays_in_its_place():
-    """The curve of the clearance covers no other part of the panel while the show plays, at any size that shows it, and
-    its words are whole and below it."""
+    """The curve of the clearance covers no other part of the panel while the show plays, at any size that shows it. Its
+    words are whole and below it."""
     with server() as url, started("--scene", SQUARE, "run", "--quiet", "--json", "--start", "95", "--time-scale", "0.05"), browser() as (page, complaints):
         for width, height in [*SIZES, (1280, 800), (1366, 768), (1600, 900)]:
             page.set_viewport_size({"width": width, "height": height})

@@ -44,8 +44,8 @@ def points_of(label):
 
 
 def labels_of(page):
-    """Returns each bench's label with the board that it points at: where its line ends, or the board nearest to every
-    part of a box without a line."""
+    """Returns each bench's label with the board that it points at. This is the board where its line ends, or the board
+    nearest to every part of a box without a line."""
     handles, origin, right, up, labels = page.evaluate(LABELS)
     handles = numpy.array(handles).reshape(-1, 5)[:, :2]
     origin, right, up = map(numpy.array, (origin, right, up))

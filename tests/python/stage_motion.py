@@ -63,7 +63,7 @@ def solved_at(times):
 
 def between_frames_is_where_the_solver_has_it():
     """At 10 Hz: single precision is 6.7e-7 m up to 16 m from the centre, straight lines would be 0.14 mm off. The test
-    is at the start of the show, where the bends are widest: there four frames that a busy machine leaves out in a row
+    is at the start of the show, where the bends are widest. There four frames that a busy machine leaves out in a row
     cost 2.4e-7 m."""
     random = numpy.random.default_rng()
     with server() as url, publisher("--rate", "10"), browser(screen=None) as (page, complaints):

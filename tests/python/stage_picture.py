@@ -2,7 +2,7 @@
 
     stage_picture.py SCENARIO PROGRAM NAME
 
-Starts a server and publishers under the service name NAME, tests the words and the picture of the page, and compares
+Starts a server and publishers under the service name NAME. Tests the words and the picture of the page, and compares
 the picture with the exact positions in tests/truth. Ends with exit code 0, or with a sentence on the error.
 stage_motion.py tests the motion between two frames.
 """

@@ -1,5 +1,5 @@
-"""The stage picture in its places: in a kiosk, in another page's frame, on small screens, in forced colours, before a
-show that ended long ago, and with 5,000 benches. Same browser and arguments as stage_picture.py.
+"""The stage picture in its places: in a kiosk, in another page's frame, on small screens, and in forced colours. Also
+before a show that ended long ago, and with 5,000 benches. Same browser and arguments as stage_picture.py.
 
     stage_places.py SCENARIO PROGRAM NAME
 """

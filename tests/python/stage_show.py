@@ -1,5 +1,5 @@
-"""The stage picture on a stage, in the same browser and with the same arguments as stage_picture.py: the words after #,
-the coming event and its place, the picture after a publisher's death, colours, contrast, languages.
+"""The stage picture on a stage, in the same browser and with the same arguments as stage_picture.py. Tested are the
+words after #, the coming event and its place, the picture after a publisher's death, colours, contrast, languages.
 
     stage_show.py SCENARIO PROGRAM NAME
 """
@@ -403,8 +403,8 @@ def coming_lanterns_burn_white():
 
 
 def colours_mean_the_same_all_along():
-    """A turnaround, through its turn, where a handle reaches 1.6 times the head's speed, and to its end: one scale of
-    colours, and a countdown to its end."""
+    """A turnaround, through its turn and to its end, has one scale of colours, and a countdown to its end. In the turn
+    a handle reaches 1.6 times the head's speed."""
     scene = "config/turnaround.toml"
     rows = subprocess.run([PROGRAM, "events", "--scene", scene, "--json"], capture_output=True, text=True, check=True).stdout.splitlines()
     end = next(event["time"] for event in map(json.loads, rows) if event["event"] == "path_end")

@@ -1,5 +1,5 @@
-"""The transport state in the page's header, in the same browser and with the same arguments as stage_picture.py:
-playing, paused, held, waiting for go, ended, disconnected.
+"""The transport state in the page's header: playing, paused, held, waiting for go, ended, disconnected. Same browser
+and arguments as stage_picture.py.
 
     stage_transport.py SCENARIO PROGRAM NAME
 """

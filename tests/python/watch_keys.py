@@ -194,8 +194,8 @@ def terminal_is_restored():
 
 
 def foreground_later():
-    # A shell starts it in the background, while the shell owns the terminal's keys. fg brings it to the front, and
-    # sends no signal to a running program.
+    # A shell starts the monitor in the background, while the shell owns the terminal's keys. The command fg brings it
+    # to the front, and sends no signal to a running program.
     with publisher("--start", "100", "--paused"):
         child, master = pty.fork()
         if child == 0:
