@@ -1,8 +1,9 @@
 //! The loop itself allocates nothing after its first frame. Allocations are counted over the whole loop, across a
 //! contact and a loop of the show. The shared memory and the log are real.
 //!
-//! iceoryx2 0.10.0 keeps the state of each loaned sample in an `Rc`, made by `loan` and freed by `send`: one small
-//! allocation for every frame and every alert, which its interface does not avoid. The test demands exactly these.
+//! iceoryx2 0.10.0 keeps the state of each loaned sample in an `Rc`, made by `loan` and freed by `send`. This is one
+//! small allocation for every frame and every alert, which its interface does not avoid. The test demands exactly
+//! these.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -31,7 +32,7 @@ thread_local! {
 /// The system's allocator, with a count of each thread's calls.
 struct Counting;
 
-// SAFETY: every call goes to the system's allocator unchanged; counting touches a thread-local number that is
+// SAFETY: every call goes to the system's allocator unchanged. Counting touches a thread-local number that is
 // initialised at compile time and has no destructor, so that it never allocates itself.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {

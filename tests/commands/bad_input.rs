@@ -1,4 +1,4 @@
-//! Inputs that a user can get wrong: each case ends with exit code 2 and one clear sentence on standard error, nothing
+//! Inputs that a user can get wrong. Each case ends with exit code 2 and one clear sentence on standard error, nothing
 //! on standard output, and no panic.
 
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! Certificates of events, made by the search and checked by `proof`: certificates of scenes with every kind of event
+//! Certificates of events, made by the search and checked by `proof`. Certificates of scenes with every kind of event
 //! are accepted and agree with the ordinary search. A changed certificate is refused, or is still true.
 //!
 //! `BENCH_DRAGON_LONG=1` makes a thousand changes in place of some dozens, and adds larger scenes.

@@ -1,5 +1,10 @@
-//! `draw`, as another program reads its SVG: the places of boards against the handles that `solve` prints, clipping,
-//! words and marks at a time, sequences, and the colours against the page's style sheet.
+//! `draw`, as another program reads its SVG:
+//!
+//! - the places of boards against the handles that `solve` prints,
+//! - clipping,
+//! - words and marks at a time,
+//! - sequences,
+//! - the colours against the page's style sheet.
 
 mod colours;
 mod labels;

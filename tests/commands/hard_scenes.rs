@@ -1,5 +1,5 @@
 //! Scenes that an earlier program answered wrongly, late or not at all. Each was found by a brute force that shares no
-//! code with the program; the figures are those of the brute force, or follow from the scene.
+//! code with the program. The figures are those of the brute force, or follow from the scene.
 
 use crate::harness;
 

@@ -1,5 +1,5 @@
 //! The contents of the packages that `packaging/build` makes, as far as they follow from the files of this checkout and
-//! from the program; the versions that publisher and subscribers compare.
+//! from the program. Also the versions that publisher and subscribers compare.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! The checker accepts every certificate that is written of events, of the least clearance and of the greatest speed:
-//! on tight routes, full turns, S-bends near a lock, and on the random scenes of the oracle.
+//! The checker accepts every certificate that is written of events, of the least clearance and of the greatest speed.
+//! The scenes are tight routes, full turns, S-bends near a lock, and the random scenes of the oracle.
 //!
 //! `BENCH_DRAGON_LONG=1` makes 100,000 scenes in place of 200, `BENCH_DRAGON_CASES=few` 40.
 //! `BENCH_DRAGON_SCENES=FROM-TO` makes those with these numbers.
@@ -194,7 +194,7 @@ fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosur
     Some((proved.least_clearance.unwrap(), enclosed))
 }
 
-/// Boards that come nearest at the very lock that ends the show: the certificate ends a nanometre before the lock, and
+/// Boards that come nearest at the very lock that ends the show. The certificate ends a nanometre before the lock. It
 /// still has an upper bound, unless its steps end before the place of that bound.
 #[test]
 fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound() {
@@ -339,7 +339,7 @@ fn every_certificate_of_a_tight_route_is_accepted() {
     assert!(proved > count && none > count / 2 && undecided * 10 < proved + none, "{statuses:?}");
 }
 
-/// Places beside a contact have a second double: spans that are hardly wider than a unit in the last place are read as
+/// Places beside a contact have a second double. Spans that are hardly wider than a unit in the last place are read as
 /// they were written.
 #[test]
 fn certificates_of_slow_contacts_are_accepted() {
@@ -352,9 +352,12 @@ fn certificates_of_slow_contacts_are_accepted() {
     }
 }
 
-/// Certificates that an earlier checker refused: places beside a junction at coordinate 0, boards that are apart only
-/// along the line between their middles, a lock whose window has to be wider than the last step, steps that are shorter
-/// than the distance of two doubles.
+/// Certificates that an earlier checker refused:
+///
+/// - places beside a junction at coordinate 0,
+/// - boards that are apart only along the line between their middles,
+/// - a lock whose window has to be wider than the last step,
+/// - steps that are shorter than the distance of two doubles.
 #[test]
 fn certificates_that_were_refused_are_accepted() {
     for name in ["beside_a_junction", "apart_between_middles", "wide_lock_window", "short_steps_at_a_lock"] {
@@ -364,8 +367,8 @@ fn certificates_that_were_refused_are_accepted() {
     }
 }
 
-/// A search that halts on its way to a contact claims no more than before it: the head's rear handle cannot be enclosed
-/// between the contact and the lock, which are a nanometre apart.
+/// A search that halts on its way to a contact claims no more than before that way. The head's rear handle cannot be
+/// enclosed between the contact and the lock, which are a nanometre apart.
 #[test]
 fn a_certificate_that_ends_on_the_way_to_a_contact_is_accepted() {
     let text = std::fs::read_to_string("tests/scenes/halt_before_a_contact.toml").unwrap();
@@ -373,7 +376,7 @@ fn a_certificate_that_ends_on_the_way_to_a_contact_is_accepted() {
     assert_eq!(results[0], Status::Undecided, "{results:?}");
 }
 
-/// The turns of a piece whose length is given are known to more digits than a double has: rounded, they end this spiral
+/// The turns of a piece whose length is given are known to more digits than a double has. Rounded, they end this spiral
 /// eleven units of the last place beyond its end.
 #[test]
 fn certificates_of_pieces_with_a_length_are_accepted() {
@@ -394,8 +397,8 @@ fn certificates_of_pieces_with_a_length_are_accepted() {
     }
 }
 
-/// A certificate of the least clearance, the greatest speed or the least pitch is refused without any one of its lines,
-/// and with a result that claims a little more.
+/// A certificate of the least clearance, the greatest speed or the least pitch is refused without any one of its lines.
+/// It is also refused with a result that claims a little more.
 #[test]
 fn changed_certificates_of_other_questions_are_refused() {
     let team = "[team]\nbenches = 5\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\
@@ -476,8 +479,8 @@ fn a_speed_beyond_the_end_of_the_path_is_refused() {
     assert!(refused.contains("ratio_lo of this handle does not follow"), "{refused}");
 }
 
-/// A link that is nearly as long as its circle is wide: over a long step, the enclosure of its rear product has zero in
-/// it, and the checker divides by the product though the link is rigid.
+/// A link that is nearly as long as its circle is wide. Over a long step, the enclosure of its rear product has zero in
+/// it. The checker divides by the product though the link is rigid.
 #[test]
 fn a_speed_on_a_circle_hardly_wider_than_the_link_is_accepted() {
     let text = "[team]\nbenches = 3\nhead_length = 0.898\nbody_length = 1.695\nwidth = 0.066\nhole_inset = 0.1\n\

@@ -38,8 +38,8 @@ fn select(motion: &Motion, accuracy: f64, velocities: Velocities) -> Option<Sele
     selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, accuracy)
 }
 
-/// Returns `count` times up to `end` that the selection has not used: multiples of the golden ratio, every third in the
-/// last fiftieth, and some near the junctions.
+/// Returns times up to `end` that the selection has not used. They are `count` multiples of the golden ratio, every
+/// third in the last fiftieth, and some times near the junctions.
 fn other_times(motion: &Motion, end: f64, count: usize) -> Vec<f64> {
     let share = |k: usize| (k as f64 * 0.618_033_988_749_895 + 0.137).fract();
     let mut times: Vec<f64> =
@@ -122,7 +122,7 @@ fn every_accuracy_is_kept_on_every_scene_and_a_coarser_one_costs_no_more() {
     }
 }
 
-/// Both instruction sets and the portable path, with and without velocities, from every format of a table: each has its
+/// Both instruction sets and the portable path, with and without velocities, from every format of a table. Each has its
 /// own machine code, so each is tested.
 #[test]
 fn every_instruction_set_keeps_every_accuracy_against_the_reference() {

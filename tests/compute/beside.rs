@@ -1,5 +1,6 @@
-//! The proved enclosures of the least clearance of obstacles: against the brute force of `tests/compute/oracle` with
-//! distances by parry2d, against the ordinary search, and by the checker, which refuses changed certificates.
+//! The proved enclosures of the least clearance of obstacles. They are compared with the brute force of
+//! `tests/compute/oracle`, with distances by parry2d, and with the ordinary search. The checker accepts them, and
+//! refuses changed certificates.
 //!
 //! `BENCH_DRAGON_LONG=1` makes 3,000 scenes in place of 120, `BENCH_DRAGON_CASES=few` 30.
 
@@ -211,7 +212,7 @@ fn changed_certificates_of_clearances_are_refused() {
     }
 }
 
-/// Boards that overlap a wall by 20 mm all the way: a claim of a little more overlap follows from Lemma 11 with m < 0,
+/// Boards that overlap a wall by 20 mm all the way. A claim of a little more overlap follows from Lemma 11 with m < 0,
 /// a claim of less is false. No translation of 0.3 m frees boards between two walls, or boards within a polygon.
 #[test]
 fn claims_of_overlaps_are_checked() {

@@ -157,9 +157,11 @@ fn a_wide_enclosure_has_a_reason() {
 #[test]
 fn every_scene_of_the_repository_agrees() {
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
-    // The search gives up, and reports that: handles at distances that no double can tell from the link's, paths of
-    // 1e10 metres, boards that stay a fraction of a millimetre apart for a kilometre, a contact so near a lock that the
-    // rear handle cannot be enclosed between them.
+    // The search gives up, and reports that, for:
+    // - handles at distances that no double can tell from the link's,
+    // - paths of 1e10 metres,
+    // - boards that stay a fraction of a millimetre apart for a kilometre,
+    // - a contact so near a lock that the rear handle cannot be enclosed between them.
     let given_up = [
         "bigspeed",
         "halt_before_a_contact",
@@ -237,8 +239,8 @@ fn random_scenes_agree() {
 
 #[test]
 fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
-    // The least pitch with which the head reaches a radius: a little below, two boards touch outside; a little above,
-    // they pass, and touch further in.
+    // The least pitch with which the head reaches a radius. A little below it, two boards touch outside. A little above
+    // it, they pass, and touch further in.
     const REACH: f64 = 2.0;
     let team = *Scene::paper().team();
     let least = bench_dragon::certify::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;

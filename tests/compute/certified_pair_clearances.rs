@@ -1,5 +1,5 @@
-//! Certificates of the least clearances of several dragons: the checker accepts them, a brute force over the show's
-//! time finds nothing nearer and the stated boards as near, and changed certificates are refused.
+//! Certificates of the least clearances of several dragons. The checker accepts them, and refuses changed certificates.
+//! A brute force over the show's time finds nothing nearer, and the stated boards as near.
 //!
 //! `BENCH_DRAGON_LONG=1` makes 600 pairs in place of 40, `BENCH_DRAGON_CASES=few` 12.
 
@@ -73,8 +73,8 @@ fn least_at(ensemble: &Ensemble, dragons: &[usize], time: f64) -> Option<f64> {
     Some(least)
 }
 
-/// Compares a claim with a brute force at times up to its end, more of them where the boards are nearest, and at the
-/// stated time of the least.
+/// Compares a claim with a brute force at times up to its end, and at the stated time of the least. More of the times
+/// are where the boards are nearest.
 fn compare(ensemble: &Ensemble, claim: &ProvedClearance, (end, stated): (f64, Option<f64>), text: &str) {
     let until = if claim.until == Until::Time { claim.time_until.unwrap() } else { end };
     let stands = claim.dragons.iter().map(|dragon| &ensemble.dragons()[*dragon]);

@@ -1,5 +1,5 @@
-//! Obstacles in frames: the least clearance of every frame against all benches and obstacles, alerts, the end of the
-//! show, and the same results at every rate and placement.
+//! Obstacles in frames: the least clearance of every frame against all benches and obstacles, alerts, and the end of
+//! the show. The results are the same at every rate and placement.
 
 use bench_dragon::messages::state::{EventKind, FrameState, Level};
 use bench_dragon::motion::clearance::{board, least_clearance_all_pairs};

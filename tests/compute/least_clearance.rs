@@ -1,5 +1,5 @@
-//! The proved enclosures of a show's least clearance and of the least pitch, compared with poses of the brute force in
-//! `tests/compute/oracle`, with distances by parry2d.
+//! The proved enclosures of a show's least clearance and of the least pitch. They are compared with poses of the brute
+//! force in `tests/compute/oracle`, with distances by parry2d.
 
 use bench_dragon::certify::plan::{LeastPitch, Overlap, least_pitch};
 use bench_dragon::certify::{ClearanceEnclosure, ClearanceHints, enclose_least_clearance};
@@ -109,8 +109,8 @@ fn random_shows_are_no_nearer_than_is_proved() {
     assert!(tried >= 20 && proved >= 14, "{proved} of {tried}");
 }
 
-/// Compares the least pitch of a scene's team with the brute force: the two boards overlap with `value_lo`, and all
-/// boards near the head are apart, sampled densely on the last turns, with `value_hi`.
+/// Compares the least pitch of a scene's team with the brute force. The two boards overlap with `value_lo`. With
+/// `value_hi`, all boards near the head are apart, sampled densely on the last turns.
 fn least_pitch_compared(text: &str, radius: f64) -> LeastPitch {
     let scene = Scene::parse(text, "test", "test").unwrap();
     let plan = least_pitch(scene.team(), radius, &mut |_| ()).unwrap();
@@ -159,8 +159,8 @@ fn the_least_pitch_to_4_5_m_is_enclosed_to_a_nanometre() {
 
 #[test]
 fn least_pitches_of_other_teams_and_radii_are_those_of_the_brute_force() {
-    // Benches, lengths of the boards, width, inset, radius. Boards that touch a turn apart, at the radius and outside,
-    // pairs (0, k) and (1, k); wide boards that touch the next but one; a radius below half a link.
+    // Benches, lengths of the boards, width, inset, radius. Some boards touch a turn apart, at the radius and outside,
+    // as pairs (0, k) and (1, k). Wide boards touch the next but one. One radius is below half a link.
     let teams = [
         (20, 0.52, 0.57, 0.054, 0.135, 0.18),
         (20, 0.67, 0.4, 0.15, 0.05, 0.9),

@@ -63,7 +63,7 @@ fn the_turnaround_is_free_and_its_least_clearance_is_that_of_dense_sampling() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Time reversal: with equal links, a chain in the turn, run backwards and turned by half a turn, is the chain in
+    /// Time reversal with equal links. A chain in the turn, run backwards and turned by half a turn, is the chain in
     /// the turn whose arcs are exchanged.
     #[test]
     fn the_way_out_is_the_way_in_backwards(ratio in 0.5..2.0f64, head in 40.0..110.0f64) {
@@ -85,7 +85,7 @@ proptest! {
     }
 }
 
-/// Through the whole turn at 1 kHz: no handle goes further from frame to frame than its speed allows, velocities are
+/// Through the whole turn at 1 kHz, no handle goes further from frame to frame than its speed allows. Velocities are
 /// those of the motion, and the alert level does not flicker.
 #[test]
 fn nothing_jumps_at_the_junctions_and_no_alert_flickers() {

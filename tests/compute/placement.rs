@@ -1,5 +1,5 @@
-//! A motion has the same times and digits anywhere on the stage: it is solved and proved in its path's own coordinates,
-//! and placed where it leaves.
+//! A motion has the same times and digits anywhere on the stage. It is solved and proved in its path's own coordinates,
+//! and placed where it leaves them.
 
 use bench_dragon::certify::{CertificateLine, MOST_STEPS, certify};
 use bench_dragon::messages::state::EventKind;
@@ -147,7 +147,7 @@ fn frames_of_a_route_are_those_at_the_origin_moved_by_the_start() {
     }
 }
 
-/// Frames, alerts and the stage of a show with `[placement]` are those without it, mirrored, turned and moved; the
+/// Frames, alerts and the stage of a show with `[placement]` are those without it, mirrored, turned and moved. The
 /// clearance and the certificate are the same.
 #[test]
 fn a_placed_show_is_the_show_transformed() {

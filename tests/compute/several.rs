@@ -1,5 +1,9 @@
-//! Several dragons in one show: first contacts against a brute force that shares no code with the search, cases by
-//! hand, frames against the solvers of each dragon, and bad input.
+//! Several dragons in one show:
+//!
+//! - first contacts against a brute force that shares no code with the search,
+//! - cases by hand,
+//! - frames against the solvers of each dragon,
+//! - bad input.
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::{least_clearance_all_pairs, nearest_between_all_pairs};
@@ -99,8 +103,8 @@ fn least_gap(boards: &[(usize, Corners)]) -> (f64, (usize, usize)) {
     least
 }
 
-/// The first contact up to a time by small steps: no step is longer than the gap over a speed that no board reaches, or
-/// than 20 microseconds.
+/// The first contact up to a time by small steps. No step is longer than the gap over a speed that no board reaches, or
+/// than 20 microseconds if that is longer.
 pub fn brute_force(ensemble: &Ensemble, until: f64) -> Option<(f64, (usize, usize))> {
     let fastest: f64 = 5.0 * ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).sum::<f64>();
     let (mut time, mut before) = (0.0, 0.0);

@@ -25,7 +25,7 @@ fn playback() -> Playback {
 }
 
 /// The frames of a loop equal those of a separate solver at times counted in whole ticks, whichever frames were
-/// computed before: a skipped period or another run changes no bit.
+/// computed before. A skipped period or another run changes no bit.
 #[test]
 fn a_frame_is_that_of_its_tick_whatever_came_before() {
     let (start, rate) = (400.0, 60.0);

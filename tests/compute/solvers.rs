@@ -1,8 +1,12 @@
-//! One suite that every solver runs, on every kind of path: the figures of 50 digits and the README's table of them,
-//! the promise against the reference of 38 digits, the consequences of rigidity, and the same bits every time.
+//! One suite that every solver runs, on every kind of path:
 //!
-//! The promise: for the pose at the given double `time`, the error is at most max(accuracy, 8 eps (r + distance
-//! travelled)), and links hold to 1e-12 link + 4 ulp(r) and the rounding of the numbers that a segment is made of.
+//! - the figures of 50 digits and the README's table of them,
+//! - the promise against the reference of 38 digits,
+//! - the consequences of rigidity,
+//! - the same bits every time.
+//!
+//! The promise is for the pose at the given double `time`. The error is at most max(accuracy, 8 eps (r + distance
+//! travelled)). Links hold to 1e-12 link + 4 ulp(r) and the rounding of the numbers that a segment is made of.
 //! `BENCH_DRAGON_LONG=1` runs 10,000 random scenes of each kind.
 
 mod bits;
@@ -89,8 +93,8 @@ impl Subject {
         std::iter::once(newton).chain(tables).collect()
     }
 
-    /// Asserts the properties of a chain alone: finite, links as long as promised, headings that fit the positions,
-    /// velocities along the path and equal at both ends of a link along the link.
+    /// Asserts the properties of a chain alone. It is finite, its links are as long as promised, and its headings fit
+    /// the positions. Its velocities are along the path, and equal at both ends of a link along the link.
     fn assert_sound(&self, chain: &Chain, time: f64, who: &str) {
         let team = self.motion.team();
         let at = || format!("{who} at {time} s: {:?} {team:?}", self.motion.description());

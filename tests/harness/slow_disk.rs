@@ -1,6 +1,6 @@
-//! A slow disk for one process: preloaded into the process (`LD_PRELOAD`), this library replaces the C library's
-//! `fsync`. The first file of a node and the first file of a service take three seconds each, as on a disk under load;
-//! every other file takes its usual time.
+//! A slow disk for one process. Preloaded into the process (`LD_PRELOAD`), this library replaces the C library's
+//! `fsync`. The first file of a node and the first file of a service take three seconds each, as on a disk under load.
+//! Every other file takes its usual time.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};

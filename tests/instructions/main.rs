@@ -8,8 +8,8 @@
 //! BENCH_DRAGON_WRITE=1 cargo test --release --test instructions
 //! ```
 //!
-//! and commits the baseline. Another compiler or C library changes counts by some percent without a change of the code:
-//! with a baseline of other tools a part fails only at 25 %.
+//! and commits the baseline. Another compiler or C library changes counts by some percent without a change of the code.
+//! With a baseline of other tools a part therefore fails only at 25 %.
 
 #[path = "../harness/mod.rs"]
 mod harness;

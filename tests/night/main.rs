@@ -1,6 +1,7 @@
-//! Bad nights: the loop, the show, the command queues, the statistics and a transport's queue, on simulated time and
-//! under a simulated scheduler, from one seed. Late wake-ups, stalls, a wall clock that is set, slow and dying
-//! subscribers, floods of commands, a full shared memory; the promises of the design must hold nevertheless.
+//! Bad nights of the loop, the show, the command queues, the statistics and a transport's queue. They run on simulated
+//! time and under a simulated scheduler, from one seed. The nights have late wake-ups, stalls, a wall clock that is
+//! set, slow and dying subscribers, floods of commands, a full shared memory. The promises of the design must hold
+//! nevertheless.
 //!
 //! `BENCH_DRAGON_NIGHT_HOURS=hours` simulates that number of hours, `BENCH_DRAGON_NIGHT=seed` one night, with its last
 //! events.

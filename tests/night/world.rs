@@ -1,4 +1,4 @@
-//! Simulated time and the scheduler. The loop runs until it sleeps or spends time; then all due actors run, in order of
+//! Simulated time and the scheduler. The loop runs until it sleeps or spends time. Then all due actors run, in order of
 //! time, each with the delay that the seed gives.
 //!
 //! [`World`] is the loop's [`Clock`]. Each program beside the loop is an [`Actor`]: one step of a thread or of a

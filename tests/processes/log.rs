@@ -1,5 +1,5 @@
-//! `run --log` and `verify`, as programs: a show under control, a turnaround, a show that loops, a publisher that is
-//! killed, a full file, and a reader of frames in Python that computes the same hashes.
+//! `run --log` and `verify`, as programs. The cases are a show under control, a turnaround, a show that loops, a
+//! publisher that is killed, and a full file. A reader of frames in Python computes the same hashes.
 
 use crate::harness;
 

@@ -86,8 +86,8 @@ fn its_type_hints_are_strict() {
     assert!(output.status.success(), "{}", text(&output.stdout));
 }
 
-/// Prints the greatest difference between the heading of a dragon's last handle and the direction of its last bench,
-/// for a reader without the stage and for one with it, half-way between two frames.
+/// Prints the greatest difference between the heading of a dragon's last handle and the direction of its last bench.
+/// One reader is without the stage and one with it; the moment is half-way between two frames.
 const LAST_HEADINGS_OF_TWO: &str = "
 import json, math, sys
 from bench_dragon import HermiteReader, subscribe

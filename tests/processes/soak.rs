@@ -21,7 +21,7 @@ use harness::{
 };
 
 /// Limits that any machine keeps. A subscriber that does not run for a while leaves frames in its queue, whose memory
-/// the publisher then touches for the first time: 9 to 13 kB for each of up to 1000.
+/// the publisher then touches for the first time. This is 9 to 13 kB for each of up to 1000 frames.
 const ANY_SPEED: [&str; 6] = ["--max-skipped", "100%", "--max-lateness-p999", "3600s", "--max-rss-growth", "20MB"];
 
 fn number(value: &Value, key: &str) -> u64 {
@@ -87,7 +87,7 @@ fn twenty_seconds_pass_with_nothing_missed() {
     place.assert_clean();
 }
 
-/// Asserts that the files beside a report agree with it, by independent readers: the JSON fits its schema, the
+/// Asserts that the files beside a report agree with it, by independent readers. The JSON fits its schema, the
 /// histograms have the percentiles of the JSON, and the show of the log is that of the frames.
 fn assert_can_be_sent(place: &Place, report: &Value) {
     let publisher = &report["publisher"];

@@ -1,7 +1,7 @@
 //! The promises of every transport, tested from another process: one suite, which each transport runs.
 //!
-//! A transport joins by a reader in tests/python/transport_peer.py, a test at the end that calls [`suite`], and, if a
-//! scene must request it, its settings in [`publisher`].
+//! A transport joins by a reader in tests/python/transport_peer.py and a test at the end that calls [`suite`]. If a
+//! scene must request the transport, it also needs its settings in [`publisher`].
 
 use crate::harness;
 
@@ -61,7 +61,7 @@ fn number(line: &Value, field: &str) -> u64 {
 /// nothing for that reader.
 const DISCOVERY: u64 = 2 * RATE;
 
-/// Checks the frames of one run: none is lost except `left_out`, which the transport counted itself because it was
+/// Checks the frames of one run. None is lost except `left_out`, which the transport counted itself because it was
 /// behind, and over ROS 2 those of the discovery. Each frame has the time of its tick and complete content.
 fn check_frames(transport: &str, frames: &[&Value], left_out: u64) {
     let sequence = |frame: &Value| number(frame, "sequence");

@@ -3,8 +3,8 @@
     chase_tracker.py --leader NAME --follower NAME --from PORT --to PORT --seconds S --result FILE
 
 The leader's `send psn` sends to the first port, the follower's `chase psn` listens at the second. Writes a JSON object
-with the distances of the follower's head from the leader's along the path. The distances begin 3 s after the first
-packet and 1 s after the follower's start.
+with the distances of the follower's head from the leader's along the path. The distances begin at least 3 s after the
+first packet, and at least 1 s after the follower's start.
 """
 
 import argparse

@@ -7,9 +7,9 @@
 //! ```
 //!
 //! and commit the written files. Without the variable the first test fails if a file differs. A new field needs its
-//! line in the layout, the next version in the layout's `type_name`, and its value in the code that fills in the
-//! message. A new message also needs its line in `ros::MESSAGES`, in `msgs/CMakeLists.txt` and in the comparisons
-//! below.
+//! line in the layout, and the next version in the layout's `type_name`. It also needs its value in the code that fills
+//! in the message. A new message also needs its line in `ros::MESSAGES`, in `msgs/CMakeLists.txt` and in the
+//! comparisons below.
 //!
 //! The generator reads the text of the sources and does not check itself. All other tests compare the files with the
 //! compiled Rust types, by serde's output and by the offsets of their fields in memory.

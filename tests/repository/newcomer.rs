@@ -1,10 +1,11 @@
-//! A newcomer's half hour: every command that a page prints for copying is read from the page and run, in a copy of the
-//! repository, in the order of the page. The lists of `list.rs` name the commands that are not run, each with its
+//! A newcomer's half hour. Every command that a page prints for copying is read from the page. It is run in a copy of
+//! the repository, in the order of the page. The lists of `list.rs` name the commands that are not run, each with its
 //! reason.
 //!
 //! `bench-dragon` and `cargo run --release --` are the program that Cargo has built for this test. Each page has a
 //! separate checkout, network and iceoryx2, so that pages do not interfere. Programs that run until they are stopped
-//! continue until the section ends, or until the next one of their kind begins; then Ctrl-C must end them with code 0.
+//! continue until the section ends, or until the next program of their kind begins. After that, Ctrl-C must end them
+//! with code 0.
 
 mod list;
 mod pages;

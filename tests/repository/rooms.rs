@@ -142,8 +142,8 @@ fn a_pattern_of_a_layout_names_every_field() {
     assert!(seen > 10, "{seen} patterns");
 }
 
-/// `tests/run` names the test programs: one that it does not name would never run, and neither would tests of a crate
-/// that are no unit tests.
+/// `tests/run` names the test programs. A program that it does not name would never run, and neither would tests of a
+/// crate that are no unit tests.
 #[test]
 fn tests_run_runs_every_test_program() {
     let run = include_str!("../run");

@@ -1,5 +1,5 @@
-//! ROS 2 topics and services as Fast DDS, the default of ROS 2, receives and calls them: a real Fast DDS process
-//! (`tests/fastdds/peer.cpp`), built at the first use.
+//! ROS 2 topics and services as Fast DDS, the default of ROS 2, receives and calls them. The peer is a real Fast DDS
+//! process (`tests/fastdds/peer.cpp`), built at the first use.
 #![cfg(feature = "ros2")]
 
 mod streams;
@@ -260,7 +260,7 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     stopped(publisher);
 }
 
-/// The publisher counts a killed subscriber for its lease, here a day, and RustDDS then refuses to write more than the
+/// The publisher counts a killed subscriber for its lease, here a day. RustDDS then refuses to write more than the
 /// memory of a topic holds: 64 MB, here some 330 messages.
 #[test]
 fn a_killed_subscriber_stops_no_other() {

@@ -162,7 +162,7 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
     assert!(handles.len() > 1 && end(&output)["counts"]["poses"].as_u64().unwrap() > 1);
     let summary = stopped(publisher);
     // A thirtieth of a second is left out only if both of its periods were skipped, or before stage and scene have
-    // come, for which the process waits up to two seconds.
+    // come. The process waits for these up to two seconds.
     let number = |value: &Value| value.as_u64().unwrap();
     let [frames, skipped] = ["frames", "skipped"].map(|key| number(&summary[key]));
     let offered = number(&summary["ros2"]["frames"]) + number(&summary["ros2"]["skipped"]);

@@ -114,7 +114,7 @@ fn certified(folder: &Path, name: &str, scene: &str, questions: &[&str]) -> Vec<
             files.push(file);
             continue;
         }
-        // A show that runs into a lock has no greatest speed; a scene with obstacles has only events; the search of a
+        // A show that runs into a lock has no greatest speed. A scene with obstacles has only events. The search of a
         // proof may give up.
         let said = text(&output.stderr);
         let is_unanswered =

@@ -124,8 +124,8 @@ impl Found {
             && claim.hi.is_none_or(|hi| self.least.get_or_init(least).is_none_or(|least| least <= hi + CLOSE))
     }
 
-    /// Returns true if no handle is faster in a frame than the upper bound, and the lower bound is not above the ratio
-    /// that the search for the greatest one finds.
+    /// Returns true if no handle is faster in a frame than the upper bound. Also, the lower bound must not be above the
+    /// greatest ratio that the search finds.
     fn has_speed(&self, claim: &ProvedSpeed) -> bool {
         let ratio = |x: &f64, y: &f64| x.hypot(*y) / self.scene.motion.head_speed();
         let is_slow =

@@ -1,5 +1,5 @@
 //! The checker's result for a scene beside the program's events. Each kind of event happens in both or neither, at one
-//! place of the head and for one bench or pair; otherwise it must be ambiguous, within rounding of not happening.
+//! place of the head and for one bench or pair. Otherwise it must be ambiguous, within rounding of not happening.
 
 use super::Event;
 use super::chain::{Chain, Team, last_bits};

@@ -166,7 +166,7 @@ impl Curve {
 }
 
 /// As [`Curve::leaves`], by sphere tracing. Over x metres back the square of the distance grows by at most 2 (rate) x +
-/// (1 + reach curvature) x^2, so the first place at `reach` is never passed.
+/// (1 + reach curvature) x^2. So the first place at `reach` is never passed.
 fn leaves_spiral(
     curve: &Curve,
     radius_per_radian: f64,
@@ -296,8 +296,8 @@ impl Path {
         self.push(curve, 0.0, angle);
     }
 
-    /// The centre is where the pole of the tangent's normal says: the tangent leans by atan(1 / theta) against the
-    /// circle about the centre, towards it or away from it.
+    /// The centre is where the pole of the tangent's normal says. The tangent leans by atan(1 / theta) against the
+    /// circle about the centre, towards the centre or away from it.
     fn push_spiral(&mut self, radius_per_radian: f64, radius: f64, outward: f64, angle: f64, left: bool) {
         let (point, tangent) = self.last_point_and_tangent();
         let side = if left { 1.0 } else { -1.0 };

@@ -1,11 +1,11 @@
 //! The stalls and jumps of one link anywhere on a path, by the place of its front handle.
 //!
-//! Both depend on the place of the front handle alone, so a path is searched once for each length of link, by halving
-//! until a stretch is certain to hold neither.
+//! Both depend on the place of the front handle alone, so a path is searched once for each length of link. The search
+//! halves a stretch until it is certain to hold neither.
 
 use super::geometry::{Param, Path};
 
-/// Jumps below this share of the link cannot be distinguished from a very fast follower: over the last bit of its place
+/// Jumps below this share of the link cannot be distinguished from a very fast follower. Over the last bit of a place
 /// near a fold, 1e-13 m in 100, a follower moves by the root of that.
 const DOUBTFUL_JUMP: f64 = 3e-6;
 /// A smaller jump, as a share of the link, is not counted.
@@ -69,7 +69,7 @@ impl<'a> Link<'a> {
         Configuration { front, rear, front_cosine: bench.dot(&tangent), rear_cosine: bench.dot(&rear_tangent) }
     }
 
-    /// Returns true for a path that turns by less than `MOST` in the 1.4 links behind every front handle: its chord is
+    /// Returns true for a path that turns by less than `MOST` in the 1.4 links behind every front handle. Its chord is
     /// at least 1.4 cos(MOST / 2) > 1 link, and grows all the way. So there is neither stall nor jump.
     fn is_regular(&self, from: Param, to: Param) -> bool {
         const MOST: f64 = 1.5;

@@ -99,8 +99,9 @@ fn scene_of(benches: u32, hole_inset: f64, path: &str) -> String {
     )
 }
 
-/// Returns certificates of few lines of each question. Events: on a line, on one on which boards overlap from the
-/// start, on a bend, a stall and a lock on a spiral, obstacles that are avoided or touched.
+/// Returns certificates of few lines of each question. Certificates of events are on a line, on a line on which boards
+/// overlap from the start, and on a bend. Others have a stall and a lock on a spiral, or obstacles that are avoided or
+/// touched.
 fn seeds() -> Vec<Vec<u8>> {
     let line = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"line\"\nlength = 0.1\n";
     let bend = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nradius = 5.0\nside = \"left\"\nturns = 0.01\n";

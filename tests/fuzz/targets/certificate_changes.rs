@@ -1,5 +1,5 @@
-//! Changes of certificates that keep what bytes at random would never get right: lines of every kind, places in order,
-//! claims with numbers near the true ones.
+//! Changes of certificates that keep what bytes at random would never get right. These are lines of every kind, places
+//! in order, and claims with numbers near the true ones.
 
 use fastrand::Rng;
 use serde_json::{Value, json};
@@ -50,8 +50,8 @@ pub fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
     lines_of(&lines)
 }
 
-/// Changes a certificate so that it stays well formed, and often valid: a step in two, wider spans, a weaker claim, a
-/// line of another kind with the places of a step.
+/// Changes a certificate so that it stays well formed, and often valid. A change is a step in two, wider spans, a
+/// weaker claim, or a line of another kind with the places of a step.
 fn rearrange(lines: &mut Vec<Value>, random: &mut Rng) {
     let results = first_result(lines);
     let at = random.usize(1..results);

@@ -1,6 +1,6 @@
 //! The small log as `verify` reads it: a true verdict, or the line with the error.
 //!
-//! If `verify` reports the same bits, this file writes the log again from its show and its commands with code of its
+//! If `verify` reports the same bits, this file writes the log again from its show and its commands. Its code is its
 //! own: lines, checks and hashes by docs/recordings.md.
 
 use std::collections::HashMap;

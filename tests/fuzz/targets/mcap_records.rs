@@ -96,9 +96,9 @@ pub fn parsed(data: &[u8]) -> Option<Vec<Record>> {
     Some(records)
 }
 
-/// Returns the messages in chunks and those before the first chunk of a file whose every chunk is whole, readable and
-/// complete; behind a length beyond the file, those of all chunks that begin at any byte. Returns `None` for any other
-/// file.
+/// Returns the messages in chunks, and those before the first chunk, of a file whose every chunk is whole, readable and
+/// complete. Behind a length beyond the file, it takes the messages of all chunks that begin at any byte. Returns
+/// `None` for any other file.
 pub fn messages(data: &[u8]) -> Option<Vec<Known>> {
     let mut records = parsed(data)?;
     let bytes = |records: &[Record]| records.iter().map(|record| 9 + record.body.len()).sum::<usize>();

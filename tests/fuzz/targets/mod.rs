@@ -2,8 +2,8 @@
 //! error.
 //!
 //! `tests/fuzz/main.rs` calls them with a fixed number of seeded cases, `fuzz/fuzz_targets/` from libFuzzer. Besides
-//! its function a target has initial inputs, and a way to change an input that keeps parts which random bytes would
-//! never get right: TOML, checks, lengths, masks.
+//! its function a target has initial inputs, and a way to change an input. The change keeps parts which random bytes
+//! would never get right: TOML, checks, lengths, masks.
 
 pub mod bytes;
 pub mod certificate;

@@ -137,8 +137,8 @@ fn head_end(bytes: &[u8]) -> usize {
     [after(b"\n\n"), after(b"\n\r\n")].into_iter().flatten().min().unwrap_or(bytes.len())
 }
 
-/// Returns the WebSocket frames at the start of some bytes, masked as a client's or not masked as a server's: the first
-/// byte and the content of each, and the remaining bytes.
+/// Returns the WebSocket frames at the start of some bytes, masked as a client's or not masked as a server's. A frame
+/// is its first byte and its content. Also returns the remaining bytes.
 fn frames(mut bytes: &[u8], masked: bool) -> (Vec<(u8, Vec<u8>)>, &[u8]) {
     let mut frames = Vec::new();
     while let Some(([first, length], rest)) = bytes.split_first_chunk() {

@@ -181,7 +181,7 @@ fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
     }
 }
 
-/// Returns scenes of each kind of path, most of them very small: the cost of a case is the search for events, and a
+/// Returns scenes of each kind of path, most of them very small. The cost of a case is the search for events, and a
 /// table of a solver or of the clearance.
 pub fn seeds() -> Vec<Vec<u8>> {
     let team = |benches: u32| {

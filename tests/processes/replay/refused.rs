@@ -192,8 +192,8 @@ fn with_a_handle_less(message: Message<'_>) -> Message<'_> {
     message
 }
 
-/// Returns simulated time, the first handle, and the number of alerts and cues, of each frame that the library plays,
-/// and the reason of an early end.
+/// Returns each frame that the library plays: simulated time, the first handle, and the number of alerts and cues. An
+/// early end is an error with its reason, unless the end is expected.
 fn contents(file: &Path, expected_failure: Option<&mut bool>) -> Result<Vec<(u64, u64, usize)>, ReadError> {
     let options = ReplayOptions { pace: Pace::Even(100.0), start: None, looping: false };
     let (mut replay, thread) = Prepared::open(file, options)?.begin()?;
