@@ -324,6 +324,19 @@ def ways(corners):
     return 1.5 * np.hypot(*np.moveaxis(np.diff(corners, axis=1), -1, 0)).max(axis=-1) + 1e-13
 
 
+def selected(benches, possible):
+    """Returns the benches of which an interval is possible, these intervals by bench, and those of any bench."""
+    some = possible.any(axis=(1, 2))
+    return benches[some], possible[some], possible.any(axis=0)
+
+
+def of_possible(measured, corners, possible, shape):
+    """Returns measures of boards at the times of each possible interval, by bench, interval and time, and else infinity."""
+    values = np.full((len(possible), *shape), math.inf)
+    values[possible] = measured(corners.reshape(*values.shape, 4, 2)[possible])
+    return values
+
+
 def first_touch(show, obstacle, times, corners):
     """Returns the time of the first touch and the least clearance that was met, metres."""
     moved = ways(corners)[:, None, :]
@@ -336,8 +349,8 @@ def first_touch(show, obstacle, times, corners):
     while True:
         hits = rows[(values <= 0).any(axis=0)]
         touch = min(touch, hits.min(initial=math.inf))
-        near = (values[..., :-1] + values[..., 1:] <= moved) & (rows[:, :-1] < touch)
-        benches, near = benches[near.any(axis=(1, 2))], near.any(axis=0)
+        possible = (values[..., :-1] + values[..., 1:] <= moved) & (rows[:, :-1] < touch)
+        benches, possible, near = selected(benches, possible)
         if not near.any() or (rows[:, 1] - rows[:, 0]).max() * show.speed < 1e-11:
             return touch, least
         shares = np.linspace(0.0, 1.0, PARTS + 1)
@@ -348,7 +361,8 @@ def first_touch(show, obstacle, times, corners):
         corners = show.corners(rows.ravel(), benches)
         moved = ways(corners)
         limit = moved.max() + obstacle.keep_out
-        values = (obstacle.distances(corners, limit) - obstacle.keep_out).reshape(-1, *rows.shape)
+        measured = lambda boards: obstacle.distances(boards, limit) - obstacle.keep_out
+        values = of_possible(measured, corners, possible[:, near][:, order], rows.shape)
         moved = np.concatenate([moved, moved[:, -1:]], axis=1).reshape(-1, *rows.shape)[..., :-1]
         least = min(least, values.min())
 
@@ -368,7 +382,7 @@ def least_below(show, obstacle, times, corners, than):
             # Between two near times a clearance falls as a parabola does at most.
             apart = max(than + obstacle.keep_out, 1e-4)
             possible &= ends < than + (30.0 + 4.0 / apart) * width**2
-        benches, near = benches[possible.any(axis=(1, 2))], possible.any(axis=0)
+        benches, possible, near = selected(benches, possible)
         if not near.any() or width < 1e-6:
             return least
         shares = np.linspace(0.0, 1.0, PARTS + 1)
@@ -377,7 +391,8 @@ def least_below(show, obstacle, times, corners, than):
         rows = (first * (1 - shares) + last * shares)[order]
         corners = show.corners(rows.ravel(), benches)
         moved = ways(corners)
-        values = signed(obstacle, corners, than + moved.max()).reshape(-1, *rows.shape)
+        measured = lambda boards: signed(obstacle, boards, than + moved.max())
+        values = of_possible(measured, corners, possible[:, near][:, order], rows.shape)
         moved = np.concatenate([moved, moved[:, -1:]], axis=1).reshape(-1, *rows.shape)[..., :-1]
     return least
 
