@@ -128,9 +128,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         output.json(&covered.line())?;
     }
     if let (Some(ensemble), true, true) = (&scene.ensemble, arguments.prove, common.json) {
-        let freeze = timeline.freeze(scene.stops_at_contact());
+        let show_end = timeline.show_end(scene.stops_at_contact());
         let file = arguments.certify.as_deref();
-        for part in several::enclosed((&scene, ensemble, &text.text), freeze, file, common)? {
+        for part in several::enclosed((&scene, ensemble, &text.text), show_end, file, common)? {
             output.json(&part)?;
         }
         return output.finish();
@@ -143,16 +143,16 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     describe(&scene, &mut output)?;
     ahead(&scene, &timeline, &mut output)?;
-    let (found, freeze) = find_least_clearance(&scene, &timeline, common);
+    let (found, show_end) = find_least_clearance(&scene, &timeline, common);
     output.line(&format!("  {}", least_clearance(&scene, found.of_show())))?;
     if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show()) {
         output.line(&format!("  {}", least_clearance_between(&scene, &between)))?;
     }
     let found = found.of_show();
-    let beside = obstacle_clearances(&scene, freeze, common);
+    let beside = obstacle_clearances(&scene, show_end, common);
     let enclosures = match arguments.prove && scene.ensemble.is_none() {
         true => {
-            let hints = (found, beside.as_slice(), freeze);
+            let hints = (found, beside.as_slice(), show_end);
             Some(enclosed(&scene, &text.text, hints, arguments.certify.as_deref(), common)?)
         }
         false => None,
@@ -167,7 +167,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         }
     }
     if let (Some(ensemble), true) = (&scene.ensemble, arguments.prove) {
-        let parts = several::enclosed((&scene, ensemble, &text.text), freeze, arguments.certify.as_deref(), common)?;
+        let parts = several::enclosed((&scene, ensemble, &text.text), show_end, arguments.certify.as_deref(), common)?;
         several::print(&parts, &mut output)?;
     }
     if let Some(covered) = covered {
@@ -192,10 +192,10 @@ fn print_proof(
     common: &Common,
     mut output: Output,
 ) -> Result<(), CommandError> {
-    let (found, freeze) = find_least_clearance(scene, timeline, common);
+    let (found, show_end) = find_least_clearance(scene, timeline, common);
     let found = found.of_show();
-    let beside = obstacle_clearances(scene, freeze, common);
-    let hints = (found, beside.as_slice(), freeze);
+    let beside = obstacle_clearances(scene, show_end, common);
+    let hints = (found, beside.as_slice(), show_end);
     let ClearanceEnclosures { boards, obstacles } = enclosed(scene, text, hints, arguments.certify.as_deref(), common)?;
     output.json(&clearance_line(scene, found, boards))?;
     for found in &beside {
@@ -248,7 +248,7 @@ struct ObstacleLine<'a> {
 
 /// Prints the least clearances of the show as JSON lines.
 fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: Output) -> Result<(), CommandError> {
-    let (found, freeze) = find_least_clearance(scene, timeline, common);
+    let (found, show_end) = find_least_clearance(scene, timeline, common);
     let line = |check, found: Option<TimedClearance>| LeastClearanceLine {
         check,
         clearance: found.map(|found| found.least.value),
@@ -260,7 +260,7 @@ fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: 
     if scene.ensemble.is_some() {
         output.json(&line("clearance_between_dragons", found.between))?;
     }
-    for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, freeze, common) {
+    for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, show_end, common) {
         let obstacle = &scene.ground().obstacles()[obstacle].name;
         let (check, clearance, bench) = ("obstacle", least.value, least.bench);
         output.json(&ObstacleLine { check, obstacle, clearance, time, bench })?;
@@ -269,12 +269,12 @@ fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: 
 }
 
 /// Searches for the least clearance of each obstacle over the whole show.
-fn obstacle_clearances(scene: &Scene, freeze: &TimedEvent, common: &Common) -> Vec<TimedObstacleClearance> {
+fn obstacle_clearances(scene: &Scene, show_end: &TimedEvent, common: &Common) -> Vec<TimedObstacleClearance> {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
     let mut progress = |share: f64| bar.set_position((1000.0 * share) as u64);
     let found = match &scene.ensemble {
-        Some(ensemble) => ensemble.obstacle_clearances(freeze, &mut progress),
-        None => scene.motion.obstacle_clearances(freeze, &mut progress),
+        Some(ensemble) => ensemble.obstacle_clearances(show_end, &mut progress),
+        None => scene.motion.obstacle_clearances(show_end, &mut progress),
     };
     bar.finish_and_clear();
     found
@@ -313,7 +313,7 @@ impl CheckArguments {
 fn enclosed(
     scene: &Scene,
     text: &str,
-    (found, obstacles, freeze): (Option<TimedClearance>, &[TimedObstacleClearance], &TimedEvent),
+    (found, obstacles, show_end): (Option<TimedClearance>, &[TimedObstacleClearance], &TimedEvent),
     file: Option<&Path>,
     common: &Common,
 ) -> Result<ClearanceEnclosures, CommandError> {
@@ -330,13 +330,13 @@ fn enclosed(
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let most_steps = MOST_CLEARANCE_STEPS;
     let Some(mut certificate) = certificate else {
-        let enclosures = enclose_least_clearance(&scene.motion, freeze, hints, most_steps, &mut progress);
+        let enclosures = enclose_least_clearance(&scene.motion, show_end, hints, most_steps, &mut progress);
         bar.finish_and_clear();
         return Ok(enclosures);
     };
     let mut write = |line: &CertificateLine| certificate.write(line);
     let motion = &scene.motion;
-    let enclosures = certify_least_clearance(motion, freeze, hints, text, most_steps, &mut write, &mut progress);
+    let enclosures = certify_least_clearance(motion, show_end, hints, text, most_steps, &mut write, &mut progress);
     bar.finish_and_clear();
     let enclosures = enclosures.map_err(|CertifyError::Write(error)| error)?;
     certificate.finish()?;
@@ -430,7 +430,7 @@ fn proved(scene: &str, file: &Path, common: &Common) -> Result<Vec<String>, Comm
 /// Returns a sentence on each cue, in the order of their times; those that the show does not reach stand last.
 fn cues(scene: &Scene, timeline: &Timeline) -> Vec<String> {
     let (cues, missing) = timed_cues(scene, timeline);
-    let end = timeline.freeze(scene.stops_at_contact()).time;
+    let end = timeline.show_end(scene.stops_at_contact()).time;
     let told = cues.into_iter().map(|cue| {
         let action = match (cue.time > end, cue.pauses) {
             (true, _) => ", after the end of the show",

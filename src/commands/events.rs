@@ -236,17 +236,17 @@ pub fn find_least_clearance<'t>(
     common: &Common,
 ) -> (LeastClearances, &'t TimedEvent) {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
-    let freeze = timeline.freeze(scene.stops_at_contact());
+    let show_end = timeline.show_end(scene.stops_at_contact());
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let found = match &scene.ensemble {
-        Some(ensemble) => ensemble.least_clearances(freeze, &mut progress),
+        Some(ensemble) => ensemble.least_clearances(show_end, &mut progress),
         None => {
-            let own = scene.motion.least_clearance(timeline, freeze, &mut progress);
+            let own = scene.motion.least_clearance(timeline, show_end, &mut progress);
             LeastClearances { own, between: None }
         }
     };
     bar.finish_and_clear();
-    (found, freeze)
+    (found, show_end)
 }
 
 /// Returns a sentence for people on the least clearance of the whole show.

@@ -30,10 +30,10 @@ pub fn scene_facts(text: &str) -> Option<SceneFacts> {
 /// empty ground, where a search gave up, or where it takes too long.
 fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
     let timeline = scene.timeline(&mut |_| ());
-    let freeze = *timeline.freeze(scene.stops_at_contact());
-    let least = least(scene, &timeline, &freeze)?;
+    let show_end = *timeline.show_end(scene.stops_at_contact());
+    let least = least(scene, &timeline, &show_end)?;
     let patience = Instant::now() + PATIENCE;
-    let step = freeze.time / f64::from(POINTS);
+    let step = show_end.time / f64::from(POINTS);
     let mut points = frames(scene, &timeline, 0.0, step, POINTS, patience)?;
     let fine = step / f64::from(POINTS_AT_LEAST);
     points.extend(frames(scene, &timeline, (least.time - step).max(0.0), fine, 2 * POINTS_AT_LEAST, patience)?);
@@ -43,16 +43,16 @@ fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
 }
 
 /// Returns the least clearance of the show; `None` if a search gave up.
-fn least(scene: &Scene, timeline: &Timeline, freeze: &TimedEvent) -> Option<LeastOfShow> {
+fn least(scene: &Scene, timeline: &Timeline, show_end: &TimedEvent) -> Option<LeastOfShow> {
     let mut silent = |_| ();
     let (boards, obstacles) = match &scene.ensemble {
         Some(all) => {
-            (all.least_clearances(freeze, &mut silent).of_show(), all.obstacle_clearances(freeze, &mut silent))
+            (all.least_clearances(show_end, &mut silent).of_show(), all.obstacle_clearances(show_end, &mut silent))
         }
         None => {
             let motion = &scene.motion;
-            let boards = motion.least_clearance(timeline, freeze, &mut silent);
-            (boards, motion.obstacle_clearances(freeze, &mut silent))
+            let boards = motion.least_clearance(timeline, show_end, &mut silent);
+            (boards, motion.obstacle_clearances(show_end, &mut silent))
         }
     };
     let is_whole = boards.is_none_or(|found| found.searched_until.is_none())

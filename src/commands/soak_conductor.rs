@@ -61,7 +61,7 @@ fn facts_of(scene: &Scene) -> ShowFacts {
     let cue = |cue: &Cue| Some((cue.time(&scene.motion, &timeline)?, cue.then == CueAction::Pause));
     let mut cues = Vec::from_iter(scene.cues.iter().filter_map(cue));
     cues.sort_by(|a, b| a.0.total_cmp(&b.0));
-    ShowFacts { end: timeline.freeze(stops).time, cues }
+    ShowFacts { end: timeline.show_end(stops).time, cues }
 }
 
 /// Requests the state of the show in a loop, so that it always awaits an answer, until it is killed.

@@ -74,7 +74,7 @@ pub fn swept(scene: &Scene, timeline: &Timeline, stretch: Stretch<'_>, common: &
     let from = stretch.from.map_or(Ok(0.0), |from| time_of("--from", from, timeline))?;
     let until = match stretch.until {
         Some(until) => time_of("--until", until, timeline)?,
-        None => timeline.freeze(scene.stops_at_contact()).time,
+        None => timeline.show_end(scene.stops_at_contact()).time,
     };
     if until < from {
         return Err(CommandError::BadInput(format!(

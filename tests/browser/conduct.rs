@@ -186,7 +186,10 @@ fn nothing_that_is_sent_stops_the_picture() {
     drop(publisher);
     message(&mut watching, "waiting");
     let gone = ask(&mut socket, r#"{"command":"release","id":2}"#);
-    assert!(gone["code"].is_null() && gone["sentence"].as_str().unwrap().contains("no publisher has the name"), "{gone}");
+    assert!(
+        gone["code"].is_null() && gone["sentence"].as_str().unwrap().contains("no publisher has the name"),
+        "{gone}"
+    );
     let _next = self::publisher(name, &["--start", "200", "--paused"]);
     let state = ask(&mut socket, r#"{"command":"state"}"#);
     assert_eq!((&state["playback"], &state["sim_time"]), (&"paused".into(), &200.0.into()));

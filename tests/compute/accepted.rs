@@ -182,14 +182,14 @@ fn clearance_certified(text: &str) -> Option<Until> {
 fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosure>)> {
     let scene = Scene::parse(text, "tight", "tight").ok()?;
     let timeline = scene.motion.timeline(&mut |_| ());
-    let freeze = timeline.freeze(scene.stops_at_contact());
-    let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ())?.least;
+    let show_end = timeline.show_end(scene.stops_at_contact());
+    let hint = scene.motion.least_clearance(&timeline, show_end, &mut |_| ())?.least;
     let mut enclosed = None;
     let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
     let proved = accepted(text, |write| {
         let most = MOST_STEPS / 4;
         enclosed =
-            certify_least_clearance(&scene.motion, freeze, hints, text, most, write, &mut |_| ()).unwrap().boards;
+            certify_least_clearance(&scene.motion, show_end, hints, text, most, write, &mut |_| ()).unwrap().boards;
     });
     Some((proved.least_clearance.unwrap(), enclosed))
 }
@@ -205,11 +205,11 @@ fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound() {
         index += 1;
         let Ok(scene) = Scene::parse(&text, "tight", "tight") else { continue };
         let timeline = scene.motion.timeline(&mut |_| ());
-        let freeze = timeline.freeze(scene.stops_at_contact());
-        let found = scene.motion.least_clearance(&timeline, freeze, &mut |_| ());
-        let lock = freeze.event.travelled;
+        let show_end = timeline.show_end(scene.stops_at_contact());
+        let found = scene.motion.least_clearance(&timeline, show_end, &mut |_| ());
+        let lock = show_end.event.travelled;
         let is_at_lock = found.is_some_and(|found| found.least.travelled > lock - 1e-9);
-        if freeze.event.kind != EventKind::Lock || !is_at_lock {
+        if show_end.event.kind != EventKind::Lock || !is_at_lock {
             continue;
         }
         at_lock += 1;
@@ -411,12 +411,12 @@ fn changed_certificates_of_other_questions_are_refused() {
                   [path]\nkind = \"spiral\"\npitch = 0.6\nstart_turn = 12.0\n[motion]\nhead_speed = 1.0\n";
     let scene = Scene::parse(&route, "route", "route").unwrap();
     let timeline = scene.motion.timeline(&mut |_| ());
-    let freeze = timeline.freeze(scene.stops_at_contact());
-    let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ()).unwrap().least;
+    let show_end = timeline.show_end(scene.stops_at_contact());
+    let hint = scene.motion.least_clearance(&timeline, show_end, &mut |_| ()).unwrap().least;
     let clearance = written(|write| {
         let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
         let motion = &scene.motion;
-        let found = certify_least_clearance(motion, freeze, hints, &route, MOST_STEPS, write, &mut |_| ()).unwrap();
+        let found = certify_least_clearance(motion, show_end, hints, &route, MOST_STEPS, write, &mut |_| ()).unwrap();
         found.boards.unwrap();
     });
     let speed = written(|write| {

@@ -38,17 +38,17 @@ struct Enclosed {
 fn enclosed(text: &str) -> Enclosed {
     let scene = Scene::parse(text, "beside", "beside").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let timeline = scene.motion.timeline(&mut |_| ());
-    let freeze = *timeline.freeze(scene.stops_at_contact());
-    let boards = scene.motion.least_clearance(&timeline, &freeze, &mut |_| ()).map(|found| found.least);
-    let found = scene.motion.obstacle_clearances(&freeze, &mut |_| ());
+    let show_end = *timeline.show_end(scene.stops_at_contact());
+    let boards = scene.motion.least_clearance(&timeline, &show_end, &mut |_| ()).map(|found| found.least);
+    let found = scene.motion.obstacle_clearances(&show_end, &mut |_| ());
     let hints = ClearanceHints { boards: boards.as_ref(), obstacles: &found };
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
     let motion = &scene.motion;
     let enclosures =
-        certify_least_clearance(motion, &freeze, hints, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+        certify_least_clearance(motion, &show_end, hints, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
     let lines = String::from_utf8(lines).unwrap();
-    Enclosed { found, enclosures, end: freeze.event.travelled, lines, scene }
+    Enclosed { found, enclosures, end: show_end.event.travelled, lines, scene }
 }
 
 fn check(lines: &str) -> Result<Proved, Refused> {

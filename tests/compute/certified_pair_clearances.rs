@@ -22,8 +22,8 @@ fn certificate(text: &str, scene: &Scene) -> (SeveralClearances, String) {
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
     let (ensemble, timeline) = (scene.ensemble.as_ref().unwrap(), scene.timeline(&mut |_| ()));
-    let freeze = timeline.freeze(scene.stops_at_contact());
-    let found = certify_several_clearances(ensemble, freeze, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    let show_end = timeline.show_end(scene.stops_at_contact());
+    let found = certify_several_clearances(ensemble, show_end, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
     (found, String::from_utf8(lines).unwrap())
 }
 
@@ -100,7 +100,7 @@ fn compare(ensemble: &Ensemble, claim: &ProvedClearance, (end, stated): (f64, Op
 }
 
 fn ends_with_a_contact_of_two(scene: &Scene) -> bool {
-    let end = scene.timeline(&mut |_| ()).freeze(true).event;
+    let end = scene.timeline(&mut |_| ()).show_end(true).event;
     let dragon = |bench: Option<u32>| Some(scene.ensemble.as_ref()?.owner(bench? as usize)?.0);
     end.kind == EventKind::Contact && dragon(end.bench_a) != dragon(end.bench_b)
 }
@@ -127,7 +127,7 @@ fn least_clearances_of_random_pairs_are_proved() {
         let proved = check(&lines).unwrap_or_else(|refused| panic!("{cases}: {refused}\n{text}"));
         assert_eq!(proved.least_clearances.len(), 3, "{text}");
         let (ensemble, timeline) = (scene.ensemble.as_ref().unwrap(), scene.timeline(&mut |_| ()));
-        let end = timeline.freeze(scene.stops_at_contact()).time;
+        let end = timeline.show_end(scene.stops_at_contact()).time;
         let own_time = |dragon: usize| {
             let (boards, dragon) = (found.own[dragon].boards?, &ensemble.dragons()[dragon]);
             Some(dragon.delay + dragon.motion.time_at(boards.travelled.max(0.0)))
@@ -248,8 +248,8 @@ fn the_example_scenes_of_several_dragons_have_proved_clearances() {
         println!("{name}: {} bytes, {:?}", lines.len(), proved.least_clearances);
         let ensemble = scene.ensemble.as_ref().unwrap();
         let timeline = scene.timeline(&mut |_| ());
-        let freeze = timeline.freeze(scene.stops_at_contact());
-        let least = ensemble.least_clearances(freeze, &mut |_| ());
+        let show_end = timeline.show_end(scene.stops_at_contact());
+        let least = ensemble.least_clearances(show_end, &mut |_| ());
         assert!(found.own.iter().all(|own| own.boards.is_some_and(|own| own.until.is_none())), "{:?}", found.own);
         let BetweenEnclosure { lo, hi, until, .. } = found.between[0];
         let (value, room) = (least.between.unwrap().least.value, 1e-9);

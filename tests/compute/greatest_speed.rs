@@ -33,12 +33,12 @@ fn speeds(newton: &Newton, travelled: f64, handle: u32, chain: &mut Chain) -> (f
 
 /// Asserts that the proved enclosure holds every speed that the safe solver finds, and that the named handle is as fast
 /// as stated.
-fn assert_holds(scene: &Scene, plan: &GreatestSpeed, freeze: f64, every: f64, who: &str) {
+fn assert_holds(scene: &Scene, plan: &GreatestSpeed, show_end: f64, every: f64, who: &str) {
     let newton = Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed);
     let mut chain = Chain::new(scene.team().handles());
     let rounding = 1.0 + 1e-12;
     let most = LIMIT / plan.value_lo * rounding;
-    for k in 0..(freeze / every) as u32 {
+    for k in 0..(show_end / every) as u32 {
         let at = f64::from(k) * every;
         let (greatest, _) = speeds(&newton, at, 0, &mut chain);
         assert!(greatest <= most, "{who}: {greatest} at {at} m, {plan:?}");
@@ -59,8 +59,8 @@ fn the_scenes_of_the_repository_are_proved_to_a_nanometre_a_second() {
         let scene = load(name);
         let timeline =
             if name == "long" { scene.motion.timeline_without_contact() } else { scene.motion.timeline(&mut |_| ()) };
-        let freeze = timeline.freeze(scene.stops_at_contact());
-        if freeze.event.kind == EventKind::Lock {
+        let show_end = timeline.show_end(scene.stops_at_contact());
+        if show_end.event.kind == EventKind::Lock {
             println!("{name}: lock");
             continue;
         }
@@ -71,7 +71,7 @@ fn the_scenes_of_the_repository_are_proved_to_a_nanometre_a_second() {
         assert!(plan.proved && (0.0..=1e-9).contains(&width), "{name}: {plan:?}");
         let every = if name == "turnaround" { 0.05 } else { 0.2 };
         if scene.team().benches < 1000 {
-            assert_holds(&scene, &plan, freeze.event.travelled, every, name);
+            assert_holds(&scene, &plan, show_end.event.travelled, every, name);
         }
     }
 }

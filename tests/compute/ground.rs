@@ -161,8 +161,8 @@ proptest! {
             let places = one.event.place.zip(other.event.place);
             prop_assert!(places.is_none_or(|(one, other)| (placement.point(one) - other).norm() < 1e-11));
         }
-        let freeze = |k: usize| timelines[k].freeze(true);
-        let least = [own.obstacle_clearances(freeze(0), &mut |_| ()), away.obstacle_clearances(freeze(1), &mut |_| ())];
+        let show_end = |k: usize| timelines[k].show_end(true);
+        let least = [own.obstacle_clearances(show_end(0), &mut |_| ()), away.obstacle_clearances(show_end(1), &mut |_| ())];
         for (one, other) in least[0].iter().zip(&least[1]) {
             prop_assert!((one.least.value - other.least.value).abs() < 1e-11, "{one:?} {other:?}");
         }

@@ -42,12 +42,12 @@ fn least_distance(team: &chain::Team, pose: &chain::Pose, limit: f64) -> f64 {
 fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclosure> {
     let scene = Scene::parse(text, "test", "test").ok()?;
     let timeline = scene.motion.timeline(&mut |_| ());
-    let freeze = timeline.freeze(scene.stops_at_contact());
-    let hint = scene.motion.least_clearance(&timeline, freeze, &mut |_| ())?.least;
+    let show_end = timeline.show_end(scene.stops_at_contact());
+    let hint = scene.motion.least_clearance(&timeline, show_end, &mut |_| ())?.least;
     let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
-    let enclosure = enclose_least_clearance(&scene.motion, freeze, hints, most_steps, &mut |_| ()).boards?;
+    let enclosure = enclose_least_clearance(&scene.motion, show_end, hints, most_steps, &mut |_| ()).boards?;
     let ClearanceEnclosure { lo, hi, travelled, bench_a, bench_b, until, .. } = enclosure;
-    println!("{:?} {enclosure:?}", freeze.event.kind);
+    println!("{:?} {enclosure:?}", show_end.event.kind);
     assert!(lo <= hi && hi - lo <= 1e-9, "{enclosure:?}");
     let (team, path) = scenes::read(text);
     let chain = chain::Chain::new(&path, &team);
@@ -57,7 +57,7 @@ fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclos
     if until.is_none_or(|until| travelled <= until) {
         assert!(lo <= there + ROUNDING, "{there} {enclosure:?}");
     }
-    let end = until.unwrap_or(freeze.event.travelled);
+    let end = until.unwrap_or(show_end.event.travelled);
     // Samples lie near the end too, since a lock comes suddenly.
     let moments = (0..samples).map(|k| end * f64::from(k) / f64::from(samples));
     let last = (4..12).map(|power| (end - 10f64.powi(-power)).max(0.0));

@@ -104,7 +104,7 @@ fn oracle(plan: &Plan, stage: &Stage, show: &Show, run_id: u64, collected: &Rc<R
     let Playback { rate, start, at_end, end_hold, paused, time_scale, .. } = plan.playback;
     let cues = show.cues().iter().map(|cue| ModelCue { time: cue.time, pauses: cue.pauses }).collect();
     let end_hold = (at_end == AtEnd::Loop).then(|| (end_hold * rate).round() as u64);
-    let model = ModelShow { start, end: stage.freeze(&plan.playback), end_hold, cues };
+    let model = ModelShow { start, end: stage.show_end(&plan.playback), end_hold, cues };
     let model = Model::new(model, Formula::new(rate), time_scale, paused);
     let levels = stage.rules().map(|rules| Levels::new(rules, rate));
     Oracle::new(run_id, (rate, model), levels, stage.events(), plan.command_queues.len(), Rc::clone(collected))
@@ -127,7 +127,7 @@ impl Cast {
                 sender: Rc::clone(sender),
                 oracle: Rc::clone(&self.oracle),
                 pause_ns: *pause_ns,
-                end: stage.freeze(&plan.playback),
+                end: stage.show_end(&plan.playback),
                 is_dead: false,
             };
             world.add(Box::new(controller), soon(*pause_ns as u64 + 1));

@@ -77,7 +77,7 @@ impl Stage {
     }
 
     /// Returns the simulated time at which a show of it ends, seconds.
-    pub fn freeze(&self, playback: &Playback) -> f64 {
+    pub fn show_end(&self, playback: &Playback) -> f64 {
         let contact = self.events.iter().find(|(_, state)| *state == FrameState::Contact);
         let stops = self.scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         contact.filter(|_| stops).map_or(self.timeline.end().time, |(time, _)| *time)
@@ -179,7 +179,7 @@ impl Plan {
             end_hold: random.pick(&[0.0, 5.0, 0.3]),
             paused: random.once_in(6),
         };
-        let end = stage.freeze(&playback);
+        let end = stage.show_end(&playback);
         Playback { start: if random.once_in(3) { random.share() * 0.99 * end } else { 0.0 }, ..playback }
     }
 }

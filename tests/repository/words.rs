@@ -1,5 +1,5 @@
-//! No private word is in sources, tests, examples or documents if the field has a standard word, no phrase that must be
-//! read twice, and no sentence of more than 25 words.
+//! The prose of sources, tests, examples and documents. It has no private word where the field has a standard word,
+//! and no phrase that must be read twice. Its sentences have at most 25 words.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -150,18 +150,22 @@ fn prose(file: &Path, text: &str) -> Vec<String> {
         "rs" | "js" | "css" => &["/// ", "//! ", "// ", "/** ", "/* ", "* "],
         _ => &["# "],
     };
-    let (mut lines, mut last, mut is_docstring) = (Vec::new(), "", false);
+    let (mut lines, mut last, mut is_docstring, mut is_string) = (Vec::new(), "", false, false);
     for line in text.lines() {
-        if extension == "py" && (is_docstring || line.trim_start().starts_with("\"\"\"")) {
-            is_docstring ^= line.matches("\"\"\"").count() == 1;
-            lines.push(line.replace("\"\"\"", ""));
+        let is_odd = extension == "py" && line.matches("\"\"\"").count() % 2 == 1;
+        let opened = line.trim_start().strip_prefix("\"\"\"").filter(|_| extension == "py" && !is_string);
+        // Other strings in this place are code.
+        if is_docstring || opened.is_some_and(|text| text.starts_with(char::is_uppercase)) {
+            let begins = if is_docstring { "" } else { "- " };
+            lines.push(format!("{begins}{}", line.replace("\"\"\"", "")));
+            is_docstring ^= is_odd;
             continue;
         }
+        is_string ^= is_odd;
         let (found, mark) = comment(line, marks).unwrap_or(("", ""));
-        // Neighbours of different marks are different texts; a block comment has two marks.
-        let is_other =
-            !last.is_empty() && !mark.is_empty() && mark != last && !(mark == "* " && last.starts_with("/*"));
-        lines.push(if is_other { format!("- {found}") } else { found.to_owned() });
+        // Neighbours of different marks are different texts. A block comment has two marks.
+        let is_same = last.is_empty() || mark.is_empty() || mark == last || mark == "* " && last.starts_with("/*");
+        lines.push(if is_same { found.to_owned() } else { format!("- {found}") });
         last = mark;
     }
     lines

@@ -256,12 +256,12 @@ impl Ensemble {
     }
 
     /// Returns the least clearances of any two boards that share no handle, from the start until the show ends at
-    /// `freeze`. `own` is for boards of one dragon, `between` for boards of two dragons.
-    pub fn least_clearances(&self, freeze: &TimedEvent, progress: &mut dyn FnMut(f64)) -> LeastClearances {
+    /// `show_end`. `own` is for boards of one dragon, `between` for boards of two dragons.
+    pub fn least_clearances(&self, show_end: &TimedEvent, progress: &mut dyn FnMut(f64)) -> LeastClearances {
         let share = 0.5 / self.dragons.len() as f64;
-        let own = |k: usize| self.own_least_clearance(k, freeze, &mut |part| progress(share * (k as f64 + part)));
+        let own = |k: usize| self.own_least_clearance(k, show_end, &mut |part| progress(share * (k as f64 + part)));
         let own = (0..self.dragons.len()).filter_map(own).fold(None, |best, own| Some(nearer(best, own)));
-        let between = self.least_clearance_between(freeze.time, &mut |part| progress(0.5 + 0.5 * part));
+        let between = self.least_clearance_between(show_end.time, &mut |part| progress(0.5 + 0.5 * part));
         LeastClearances { own, between }
     }
 
@@ -270,11 +270,11 @@ impl Ensemble {
     fn own_least_clearance(
         &self,
         dragon: usize,
-        freeze: &TimedEvent,
+        show_end: &TimedEvent,
         progress: &mut dyn FnMut(f64),
     ) -> Option<TimedClearance> {
         let Dragon { delay, motion, .. } = &self.dragons[dragon];
-        let end = self.own_freeze(&self.dragons[dragon], freeze);
+        let end = self.own_end(&self.dragons[dragon], show_end);
         let mut own = motion.least_clearance(&motion.timeline_without_contact(), &end, progress)?;
         let first = self.first_handles[dragon] as u32;
         (own.least.bench_a, own.least.bench_b) = (own.least.bench_a + first, own.least.bench_b + first);
@@ -326,13 +326,13 @@ impl Ensemble {
     /// Returns the least clearance of each obstacle over all dragons, as [`Motion::obstacle_clearances`].
     pub fn obstacle_clearances(
         &self,
-        freeze: &TimedEvent,
+        show_end: &TimedEvent,
         progress: &mut dyn FnMut(f64),
     ) -> Vec<TimedObstacleClearance> {
         let share = 1.0 / self.dragons.len() as f64;
         let mut all: Vec<TimedObstacleClearance> = Vec::new();
         for (k, dragon) in self.dragons.iter().enumerate() {
-            let end = self.own_freeze(dragon, freeze);
+            let end = self.own_end(dragon, show_end);
             for mut own in dragon.motion.obstacle_clearances(&end, &mut |part| progress(share * (k as f64 + part))) {
                 own.least.bench += self.first_handles[k] as u32;
                 own.time += dragon.delay;
@@ -353,9 +353,9 @@ impl Ensemble {
     }
 
     /// Returns the end of the show as an event of one dragon's own motion.
-    fn own_freeze(&self, dragon: &Dragon, freeze: &TimedEvent) -> TimedEvent {
-        let time = dragon.own_time(freeze.time).0;
-        TimedEvent { event: Event { travelled: dragon.motion.travelled_at(time), ..freeze.event }, time }
+    fn own_end(&self, dragon: &Dragon, show_end: &TimedEvent) -> TimedEvent {
+        let time = dragon.own_time(show_end.time).0;
+        TimedEvent { event: Event { travelled: dragon.motion.travelled_at(time), ..show_end.event }, time }
     }
 
     /// Makes the monitor of the live clearance of different dragons. `choices` has the solver of each dragon's frames,

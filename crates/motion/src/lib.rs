@@ -435,12 +435,13 @@ impl Motion {
         self.timed(found.stall.into_iter().chain([end]).collect(), found.searched_until)
     }
 
-    /// Returns the least clearance from the start until the show ends at `freeze`; `None` for fewer than three benches.
+    /// Returns the least clearance from the start until the show ends at `show_end`. For fewer than three benches,
+    /// returns `None`.
     /// `progress` is called as by [`Motion::timeline`].
     pub fn least_clearance(
         &self,
         timeline: &Timeline,
-        freeze: &TimedEvent,
+        show_end: &TimedEvent,
         progress: &mut dyn FnMut(f64),
     ) -> Option<TimedClearance> {
         if self.team.benches < 3 {
@@ -449,7 +450,7 @@ impl Motion {
         let found = self.singularities(&mut |_| ());
         // Before the first contact, every clearance is above that at the contact.
         let from = timeline.find(EventKind::Contact).map_or(0.0, |contact| contact.event.travelled);
-        let to = freeze.event.travelled;
+        let to = show_end.event.travelled;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
         let least = self.advancement(&found).least_clearance(from, to.max(from), &mut budget).ok()?;
         let LeastClearance { travelled, .. } = least.value?;
@@ -460,19 +461,19 @@ impl Motion {
         })
     }
 
-    /// Returns the least clearance of each obstacle from the start until the show ends at `freeze`. `progress` is
+    /// Returns the least clearance of each obstacle from the start until the show ends at `show_end`. `progress` is
     /// called as by [`Motion::timeline`]. The list is empty without obstacles, and if a place inside the motion has no
     /// solution.
     pub fn obstacle_clearances(
         &self,
-        freeze: &TimedEvent,
+        show_end: &TimedEvent,
         progress: &mut dyn FnMut(f64),
     ) -> Vec<TimedObstacleClearance> {
         if self.ground.is_empty() {
             return Vec::new();
         }
         let found = self.singularities(&mut |_| ());
-        let to = freeze.event.travelled;
+        let to = show_end.event.travelled;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
         let ground = self.ground.in_own_frame(&self.placement);
         let Ok((least, reached)) = self.advancement(&found).obstacle_clearances(&ground, 0.0, to, &mut budget) else {

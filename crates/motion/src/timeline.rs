@@ -107,7 +107,7 @@ impl Timeline {
     }
 
     /// Returns the event at which a show ends: the first contact or obstacle if it stops there, else the motion's end.
-    pub fn freeze(&self, stops_at_contact: bool) -> &TimedEvent {
+    pub fn show_end(&self, stops_at_contact: bool) -> &TimedEvent {
         let touches = |timed: &&TimedEvent| matches!(timed.event.kind, EventKind::Contact | EventKind::Obstacle);
         self.events.iter().find(touches).filter(|_| stops_at_contact).unwrap_or(self.end())
     }

@@ -201,7 +201,7 @@ impl Show {
         let mut timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
         timeline.reserve_touch();
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
-        let freeze_time = timeline.freeze(stops).time;
+        let freeze_time = timeline.show_end(stops).time;
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
         let cast = Cast::new(scene);
         let solver_reason = match &cast {

@@ -127,7 +127,7 @@ pub fn measure(
     display: Display,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<DisplayMeasurement>, String> {
-    let end = last_frame_time(timeline.freeze(scene.stops_at_contact()).time);
+    let end = last_frame_time(timeline.show_end(scene.stops_at_contact()).time);
     let truth = truth(scene, &display_times(end, display.rate))?;
     let noise = noise(scene, &truth);
     let mut measurements = Vec::new();

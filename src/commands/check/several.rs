@@ -32,7 +32,7 @@ pub(super) struct Part {
 /// Encloses the least clearances of a show of several dragons. Writes the certificate to `file`.
 pub(super) fn enclosed(
     (scene, ensemble, text): (&Scene, &Ensemble, &str),
-    freeze: &TimedEvent,
+    show_end: &TimedEvent,
     file: Option<&Path>,
     common: &Common,
 ) -> Result<Vec<Part>, CommandError> {
@@ -40,7 +40,7 @@ pub(super) fn enclosed(
     let bar = progress_bar(1000, common).with_message("proving the least clearances");
     let mut write = |line: &CertificateLine| certificate.as_mut().map_or(Ok(()), |certificate| certificate.write(line));
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let found = certify_several_clearances(ensemble, freeze, text, MOST_CLEARANCE_STEPS, &mut write, &mut progress);
+    let found = certify_several_clearances(ensemble, show_end, text, MOST_CLEARANCE_STEPS, &mut write, &mut progress);
     bar.finish_and_clear();
     let found = found.map_err(|CertifyError::Write(error)| error)?;
     if let Some(certificate) = certificate {

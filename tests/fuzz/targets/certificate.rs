@@ -158,11 +158,11 @@ pub fn lines_of(lines: &[Value]) -> Vec<u8> {
 fn clearance(text: &str) -> Vec<u8> {
     let motion = scene(text).expect("a scene").motion;
     let timeline = motion.timeline(&mut |_| ());
-    let freeze = timeline.freeze(true);
-    let hint = motion.least_clearance(&timeline, freeze, &mut |_| ()).expect("three benches").least;
+    let show_end = timeline.show_end(true);
+    let hint = motion.least_clearance(&timeline, show_end, &mut |_| ()).expect("three benches").least;
     written(|write| {
         let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
-        certify_least_clearance(&motion, freeze, hints, text, 1000, write, &mut |_| ()).expect("lines");
+        certify_least_clearance(&motion, show_end, hints, text, 1000, write, &mut |_| ()).expect("lines");
     })
 }
 

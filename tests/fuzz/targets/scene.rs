@@ -125,7 +125,7 @@ fn play(scene: &Scene) {
         None => scene.motion.timeline_without_contact(),
     };
     let is_searched = timeline.searched_until().is_none();
-    let stop = timeline.freeze(scene.stops_at_contact()).time;
+    let stop = timeline.show_end(scene.stops_at_contact()).time;
     assert!(timeline.events().iter().all(|timed| timed.time.is_finite()), "{timeline:?}");
     // Once through the whole show and a little further, whatever its length.
     let playback = Playback::of(scene);

@@ -66,7 +66,7 @@ pub struct BetweenEnclosure {
     pub until: Option<f64>,
 }
 
-/// Encloses least clearances from the start of a show until the show ends at `freeze`, and writes a certificate. The
+/// Encloses least clearances from the start of a show until the show ends at `show_end`, and writes a certificate. The
 /// clearances are those of each dragon, of each obstacle and each dragon, and of each two dragons. `scene` is the text
 /// of the scene. Each search gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
 ///
@@ -74,7 +74,7 @@ pub struct BetweenEnclosure {
 /// [`CertifyError::Write`]
 pub fn certify_several_clearances(
     ensemble: &Ensemble,
-    freeze: &TimedEvent,
+    show_end: &TimedEvent,
     scene: &str,
     most_steps: u64,
     write: Write<'_>,
@@ -86,12 +86,12 @@ pub fn certify_several_clearances(
     let (mut own, mut between, mut done) = (Vec::new(), Vec::new(), 0.0);
     for (number, Dragon { delay, motion, .. }) in dragons.iter().enumerate() {
         write(&CertificateLine::Dragon { dragon: number })?;
-        let end = own_end(ensemble, number, freeze);
+        let end = own_end(ensemble, number, show_end);
         let least = motion.least_clearance(&motion.timeline_without_contact(), &end, &mut |_| ());
         let obstacles = motion.obstacle_clearances(&end, &mut |_| ());
         let least = least.map(|found| found.least);
         let hints = ClearanceHints { boards: least.as_ref(), obstacles: &obstacles };
-        let part = Part { dragons: vec![number], delay: *delay, show_end: Some(freeze.time) };
+        let part = Part { dragons: vec![number], delay: *delay, show_end: Some(show_end.time) };
         own.push(certify_part(motion, (part, &end), hints, most_steps, &mut *write, &mut |share| {
             progress((done + share) / parts);
         })?);
@@ -103,13 +103,13 @@ pub fn certify_several_clearances(
             let end = dragons[k].motion.timeline_without_contact().end().event;
             Side::new(&dragons[k], end, end.kind == EventKind::Lock, None)
         });
-        let hint = ensemble.nearest_of(pair, freeze.time);
+        let hint = ensemble.nearest_of(pair, show_end.time);
         let mut search = PairSearch::new(sides, Aim::Links, most_steps, &mut *write);
-        let contact = contact_of(ensemble, pair, freeze);
+        let contact = contact_of(ensemble, pair, show_end);
         let mut of_pair = |share: f64| progress((done + share) / parts);
-        let enclosure = match contact.filter(|_| freeze.time > 0.0) {
-            Some(benches) => search.until_contact(pair, (freeze.time, benches), &mut of_pair)?,
-            None => search.least(pair, hint, freeze, &mut of_pair)?,
+        let enclosure = match contact.filter(|_| show_end.time > 0.0) {
+            Some(benches) => search.until_contact(pair, (show_end.time, benches), &mut of_pair)?,
+            None => search.least(pair, hint, show_end, &mut of_pair)?,
         };
         between.push(enclosure);
         done += 1.0;
@@ -118,8 +118,8 @@ pub fn certify_several_clearances(
 }
 
 /// Returns the bench of each of two dragons, counted within it, if the show ends with their contact.
-fn contact_of(ensemble: &Ensemble, pair: [usize; 2], freeze: &TimedEvent) -> Option<[usize; 2]> {
-    let Event { kind, bench_a, bench_b, .. } = freeze.event;
+fn contact_of(ensemble: &Ensemble, pair: [usize; 2], show_end: &TimedEvent) -> Option<[usize; 2]> {
+    let Event { kind, bench_a, bench_b, .. } = show_end.event;
     let owners = [bench_a?, bench_b?].map(|bench| ensemble.owner(bench as usize));
     let [(one, a), (other, b)] = [owners[0]?, owners[1]?];
     (kind == EventKind::Contact && [one, other] == pair).then_some([a, b])
@@ -128,15 +128,15 @@ fn contact_of(ensemble: &Ensemble, pair: [usize; 2], freeze: &TimedEvent) -> Opt
 /// Returns the end of a show as an event of one dragon's own motion. The event is the contact or lock of the dragon's
 /// own benches, the path's end, or a place. The place is where the dragon is at the show's end, which is taken as
 /// found.
-fn own_end(ensemble: &Ensemble, dragon: usize, freeze: &TimedEvent) -> TimedEvent {
+fn own_end(ensemble: &Ensemble, dragon: usize, show_end: &TimedEvent) -> TimedEvent {
     let Dragon { motion, .. } = &ensemble.dragons()[dragon];
-    let Event { kind, bench_a, bench_b, place, .. } = freeze.event;
+    let Event { kind, bench_a, bench_b, place, .. } = show_end.event;
     let owned = |bench: Option<u32>| {
         let (owner, own) = ensemble.owner(bench? as usize)?;
         (owner == dragon).then_some(own as u32)
     };
     let (a, b) = (owned(bench_a), owned(bench_b));
-    let own_time = ensemble.dragons()[dragon].own_time(freeze.time).0;
+    let own_time = ensemble.dragons()[dragon].own_time(show_end.time).0;
     let (travelled, length) = (motion.travelled_at(own_time), motion.path().length());
     let is_own = match kind {
         EventKind::Contact => a.is_some() && b.is_some(),
@@ -144,7 +144,7 @@ fn own_end(ensemble: &Ensemble, dragon: usize, freeze: &TimedEvent) -> TimedEven
         _ => false,
     };
     let event = if is_own {
-        Event { kind, travelled: freeze.event.travelled, bench_a: a, bench_b: b, place }
+        Event { kind, travelled: show_end.event.travelled, bench_a: a, bench_b: b, place }
     } else if travelled >= length * (1.0 - 1e-12) - 1e-12 {
         Event { kind: EventKind::PathEnd, travelled: length, bench_a: None, bench_b: None, place: None }
     } else {
@@ -159,12 +159,12 @@ impl PairSearch<'_, '_> {
         &mut self,
         dragons: [usize; 2],
         hint: Option<(f64, [usize; 2])>,
-        freeze: &TimedEvent,
+        show_end: &TimedEvent,
         progress: &mut dyn FnMut(f64),
     ) -> Result<BetweenEnclosure, CertifyError> {
         let locks = self.sides.iter().filter(|side| side.locks);
         let latest = locks.map(|side| side.end - side.seconds(BEFORE_LOCK)).fold(f64::INFINITY, f64::min);
-        let end = freeze.time.min(latest).max(0.0);
+        let end = show_end.time.min(latest).max(0.0);
         // A show that ends with the last path end goes on until both surely stand.
         let stands = self.sides.iter().map(|side| side.end).fold(0.0, f64::max);
         let end = if latest.is_infinite() && end >= stands - ENDING * (1.0 + stands) { end.max(stands) } else { end };

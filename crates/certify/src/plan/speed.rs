@@ -78,7 +78,7 @@ pub fn certify_greatest_speed(
 
 /// Returns the metres that the head travels in the show, and the tolerance of the ratio.
 fn asked(scene: &Scene, timeline: &Timeline, limit: f64) -> Result<(f64, f64), PlanError> {
-    let show_end = timeline.freeze(scene.stops_at_contact());
+    let show_end = timeline.show_end(scene.stops_at_contact());
     if show_end.event.kind == EventKind::Lock {
         return Err(PlanError(format!(
             "the show runs into a lock at {:.9} s: near it a handle goes faster than any limit, or jumps",

@@ -12,17 +12,17 @@ mod ground;
 
 const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
 
-/// Returns the results of the searches for a whole motion: the contact, the least clearance up to `freeze`, the
+/// Returns the results of the searches for a whole motion: the contact, the least clearance up to `show_end`, the
 /// motion's end.
-fn search(path: &Path, team: &Team, freeze: Option<f64>) -> (Option<Event>, Option<LeastClearance>, f64) {
+fn search(path: &Path, team: &Team, show_end: Option<f64>) -> (Option<Event>, Option<LeastClearance>, f64) {
     let mut unreported = |_| {};
     let mut budget = Budget::new(200_000_000, &mut unreported);
     let singular = Singularities::search(path, team, &mut budget);
     let end = singular.end.map_or(singular.searched_until, |end| end.travelled);
     let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns);
     let contact = searches.first_contact(0.0, end, &mut budget).unwrap();
-    let least = searches.least_clearance(0.0, freeze.unwrap_or(end), &mut budget).unwrap();
-    assert!(contact.searched_until >= end && least.searched_until >= freeze.unwrap_or(end));
+    let least = searches.least_clearance(0.0, show_end.unwrap_or(end), &mut budget).unwrap();
+    assert!(contact.searched_until >= end && least.searched_until >= show_end.unwrap_or(end));
     (contact.value, least.value, end)
 }
 

@@ -283,13 +283,13 @@ function outward(seconds, step) {
 }
 
 /**
- * Returns the proof of an event, in a show that ends at `freeze`. `text` is empty for an unknown event, and `canCome`
+ * Returns the proof of an event, in a show that ends at `showEnd`. `text` is empty for an unknown event, and `canCome`
  * is true if the show reaches the event.
  */
-export function proofOf({ event, status, time_lo, time_hi, obstacle }, freeze) {
+export function proofOf({ event, status, time_lo, time_hi, obstacle }, showEnd) {
   const number = obstacle === undefined ? "" : ` ${obstacle + 1}`;
   const kind = capital(say(event)) + number, lo = time_lo === null ? null : outward(time_lo, -1e-9);
-  const isBeyond = lo !== null && time_lo > freeze;
+  const isBeyond = lo !== null && time_lo > showEnd;
   if (status === "proved") {
     const beyond = isBeyond ? say("beyondShow") : "";
     return { text: say("provedBetween", { kind, lo, hi: outward(time_hi, 1e-9), beyond }), canCome: !isBeyond };

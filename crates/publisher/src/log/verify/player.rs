@@ -346,7 +346,7 @@ mod tests {
             text.replace("[motion]\n", "[motion]\nsolver = \"newton\"\n").replace("benches = 223", "benches = 40");
         let scene = Scene::parse(&text, "lock.toml", "lock").unwrap();
         let motion = &scene.motion;
-        let lock = motion.timeline_without_contact().freeze(false).time;
+        let lock = motion.timeline_without_contact().show_end(false).time;
         let mut reference = Reference::of(&scene);
         let mut solver = motion.solver(Velocities::Omitted).solver;
         let mut chain = Chain::new(motion.team().handles());

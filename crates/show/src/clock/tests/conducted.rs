@@ -48,7 +48,7 @@ proptest! {
 
     #[test]
     fn commands_agree_with_counting_tick_by_tick(
-        (start, freeze, end_hold, paused) in shows(),
+        (start, show_end, end_hold, paused) in shows(),
         cues in prop::collection::vec((0i64..40 * 8, any::<bool>()), 0..4),
         list in prop::collection::vec((0u64..150, commands()), 0..30),
     ) {
@@ -68,10 +68,10 @@ proptest! {
             end_hold: end_hold.unwrap_or(0) as f64 / RATE as f64,
             paused,
         };
-        let clock = ShowClock::new(&playback, freeze as f64, times);
+        let clock = ShowClock::new(&playback, show_end as f64, times);
         let show = ModelShow {
             start: start as f64,
-            end: freeze as f64,
+            end: show_end as f64,
             end_hold: end_hold.map(|periods| periods as u64),
             cues,
         };
@@ -110,17 +110,17 @@ proptest! {
     /// same bits.
     #[test]
     fn time_stays_within_the_show_and_two_plays_are_alike(
-        (time_scale, rate, start, freeze) in super::shows(),
+        (time_scale, rate, start, show_end) in super::shows(),
         looping in any::<bool>(),
         list in prop::collection::vec((1u64..100_000, any_command()), 1..60),
     ) {
         let at_end = if looping { AtEnd::Loop } else { AtEnd::Hold };
-        let [mut clock, mut again] = [(); 2].map(|()| super::clock(start, time_scale, rate, freeze, at_end));
+        let [mut clock, mut again] = [(); 2].map(|()| super::clock(start, time_scale, rate, show_end, at_end));
         let (mut tick, mut jumps, mut before) = (0, 0u64, clock.advance(0));
         for (gap, command) in list {
             tick += gap;
             // A seek goes to a share of the show.
-            let command = if let Command::Seek(share) = command { Command::Seek(share * freeze) } else { command };
+            let command = if let Command::Seek(share) = command { Command::Seek(share * show_end) } else { command };
             let code = clock.apply(tick, command);
             prop_assert_eq!(again.apply(tick, command), code);
             let is_jump = matches!(command, Command::Seek(_) | Command::Restart) && code == Some(Code::Done);
@@ -128,7 +128,7 @@ proptest! {
             let (time, other) = (clock.advance(tick), again.advance(tick));
             prop_assert_eq!(time.sim_time.to_bits(), other.sim_time.to_bits());
             prop_assert_eq!(time, other);
-            prop_assert!((0.0..=freeze).contains(&time.sim_time), "{} of {freeze}", time.sim_time);
+            prop_assert!((0.0..=show_end).contains(&time.sim_time), "{} of {show_end}", time.sim_time);
             prop_assert_eq!(u64::from(time.epoch), (jumps + time.shows_played) & 0xffff_ffff);
             if time.epoch == before.epoch {
                 prop_assert!(time.sim_time >= before.sim_time);

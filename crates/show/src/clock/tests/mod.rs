@@ -60,26 +60,26 @@ proptest! {
 
     #[test]
     fn time_never_falls_and_stays_between_start_and_freeze(
-        (time_scale, rate, start, freeze) in shows(),
+        (time_scale, rate, start, show_end) in shows(),
         mut ticks in prop::collection::vec(any::<u64>().prop_flat_map(|limit| 0..=limit >> (limit % 60)), 2..50),
     ) {
-        let clock = clock(start, time_scale, rate, freeze, AtEnd::Hold);
+        let clock = clock(start, time_scale, rate, show_end, AtEnd::Hold);
         prop_assert_eq!(at(&clock, 0).sim_time, start);
         ticks.sort_unstable();
         let mut before = start;
         for tick in ticks {
             let At { sim_time, shows_played, ended } = at(&clock, tick);
-            prop_assert!(before <= sim_time && sim_time <= freeze, "{before} {sim_time} {freeze}");
-            prop_assert_eq!((shows_played, ended), (0, sim_time == freeze));
+            prop_assert!(before <= sim_time && sim_time <= show_end, "{before} {sim_time} {show_end}");
+            prop_assert_eq!((shows_played, ended), (0, sim_time == show_end));
             before = sim_time;
         }
     }
 
     /// The last tick of a showing is the first at its end. Then time starts again and ticks continue.
     #[test]
-    fn a_loop_ends_each_showing_at_its_first_tick_past_the_freeze((time_scale, rate, start, freeze) in shows()) {
-        let looping = clock(start, time_scale, rate, freeze, AtEnd::Loop);
-        let holding = clock(start, time_scale, rate, freeze, AtEnd::Hold);
+    fn a_loop_ends_each_showing_at_its_first_tick_past_the_freeze((time_scale, rate, start, show_end) in shows()) {
+        let looping = clock(start, time_scale, rate, show_end, AtEnd::Loop);
+        let holding = clock(start, time_scale, rate, show_end, AtEnd::Hold);
         let seconds_per_tick = time_scale / rate;
         // Finds the first tick at the end by doubling and halving the step.
         let mut tick: u64 = 0;
@@ -89,13 +89,13 @@ proptest! {
         prop_assume!(tick < 1 << 60);
         prop_assert!(at(&holding, tick).ended && (tick == 0 || !at(&holding, tick - 1).ended));
         // The expected number, to a tick, and to the resolution of doubles there.
-        let fit = (freeze - start) / seconds_per_tick;
-        prop_assert!((tick as f64 - fit).abs() <= 1.0 + 4.0 * f64::EPSILON * (freeze / seconds_per_tick));
+        let fit = (show_end - start) / seconds_per_tick;
+        prop_assert!((tick as f64 - fit).abs() <= 1.0 + 4.0 * f64::EPSILON * (show_end / seconds_per_tick));
         for shows_played in [0, 1, 7] {
             let first = shows_played * (tick + 1);
-            let begins = At { sim_time: start, shows_played, ended: start >= freeze };
+            let begins = At { sim_time: start, shows_played, ended: start >= show_end };
             prop_assert_eq!(at(&looping, first), begins);
-            prop_assert_eq!(at(&looping, first + tick), At { sim_time: freeze, shows_played, ended: true });
+            prop_assert_eq!(at(&looping, first + tick), At { sim_time: show_end, shows_played, ended: true });
             let middle = at(&looping, first + tick / 2);
             prop_assert_eq!(middle, At { shows_played, ..at(&holding, tick / 2) });
         }
