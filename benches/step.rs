@@ -29,8 +29,8 @@ use bench_dragon::show::{Playback, Show};
 const SIZES: [usize; 4] = [223, 5_000, 100_000, 1_000_000];
 /// Start of the show, simulated seconds; it plays at 60 Hz from there.
 const START: f64 = 200.0;
-/// Frames of a part before the turn of the next part. They are few enough that all parts see the same machine. They are
-/// enough that a part finds its own memory in the caches as the loop would.
+/// Frames of a part before the turn of the next part. There are few, so that all parts see the same machine. But there
+/// are enough that a part finds its own memory in the caches as the loop would.
 const BATCH: usize = 4;
 /// Rounds before the first counted round: every page has been written by then.
 const WARM_UP: usize = 1;
@@ -47,7 +47,7 @@ const COPIES: usize = QUEUE + 2;
 
 fn main() {
     if std::env::args().any(|argument| argument == "queues") {
-        return measure_doors();
+        return measure_queues();
     }
     if std::env::args().any(|argument| argument == "log") {
         return measure_log();
@@ -60,7 +60,7 @@ fn main() {
     for benches in if given.is_empty() { SIZES.to_vec() } else { given } {
         measure(benches);
     }
-    measure_doors();
+    measure_queues();
     measure_log();
 }
 
@@ -173,13 +173,13 @@ fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMe
 
 /// Measures steps with no command queue, one and two, in turn: the same show, so that its work costs all of them the
 /// same.
-fn measure_doors() {
+fn measure_queues() {
     let scene = scene(223);
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let timeline = scene.motion.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, mut connection) =
-        publisher_and_subscriber(&format!("bench_{}_doors", std::process::id()), &scene, &show);
+        publisher_and_subscriber(&format!("bench_{}_queues", std::process::id()), &scene, &show);
     let mut show = ShowSource::new(show);
     // The outer ends stay: a queue without a sender behaves differently.
     let (mut queues, outer): (Vec<CommandQueues>, Vec<Vec<CommandSender>>) = (0..3)

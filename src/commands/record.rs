@@ -258,7 +258,7 @@ fn mend(common: &Common, file: &Path, arguments: &RecordArguments) -> Result<(),
             lines.line(&format!("Left out: {unknown} messages whose channel cannot be read."))?;
         }
         if lost_bytes > 0 {
-            lines.line(&format!("Lost: {lost_bytes} bytes behind lengths that cannot be."))?;
+            lines.line(&format!("Lost: {lost_bytes} bytes after invalid lengths."))?;
         }
         lines.line(if whole { "The file has its end." } else { "The file was cut before its end." })?;
     }

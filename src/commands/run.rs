@@ -68,7 +68,7 @@ pub struct RunArguments {
     /// Publish ROS 2 topics too, those of the scene's [publish.ros2] or the default ones
     #[arg(long)]
     ros2: bool,
-    /// Offer ROS 2 services that conduct the show, to every ROS 2 node on the network; needs --ros2 or [publish.ros2]
+    /// Offer ROS 2 services that conduct the show, to every node that discovers this one; needs --ros2 or [publish.ros2]
     #[arg(long)]
     ros2_control: bool,
     #[command(flatten)]

@@ -86,7 +86,7 @@ struct OscArguments {
 /// Arguments of `send ros2`.
 #[derive(Debug, Clone, clap::Args)]
 struct Ros2Arguments {
-    /// Offer services that conduct the show, to every ROS 2 node on the network
+    /// Offer services that conduct the show, to every node that discovers this one
     #[arg(long)]
     control: bool,
     #[command(flatten)]

@@ -143,7 +143,7 @@ fn range(benches: Option<&Benches>, all: usize) -> Result<Range<usize>, CommandE
 
 /// The line of `check --swept --json`.
 #[derive(Serialize)]
-struct Line {
+struct SweptLine {
     check: &'static str,
     /// Square metres.
     area: f64,
@@ -199,7 +199,7 @@ impl Swept {
 
     /// Returns the line of `check --swept --json`.
     pub fn line(&self) -> impl Serialize {
-        Line { check: "swept", area: self.area.area(), from: self.from, until: self.until }
+        SweptLine { check: "swept", area: self.area.area(), from: self.from, until: self.until }
     }
 
     /// Writes the ground to a file as GeoJSON.

@@ -111,7 +111,7 @@ struct Part {
 
 /// A JSON line, with the name of the dragon if there are several.
 #[derive(Serialize)]
-struct Line<'a, M: Serialize> {
+struct TradeLine<'a, M: Serialize> {
     #[serde(skip_serializing_if = "Option::is_none")]
     dragon: Option<&'a str>,
     #[serde(flatten)]
@@ -138,8 +138,8 @@ impl Part {
     ) -> Result<(), CommandError> {
         let dragon = self.dragon.as_deref();
         if json {
-            measurements.iter().try_for_each(|measurement| output.json(&Line { dragon, measurement }))?;
-            return displayed.iter().try_for_each(|measurement| output.json(&Line { dragon, measurement }));
+            measurements.iter().try_for_each(|measurement| output.json(&TradeLine { dragon, measurement }))?;
+            return displayed.iter().try_for_each(|measurement| output.json(&TradeLine { dragon, measurement }));
         }
         if let Some(name) = dragon {
             let benches = self.scene.team().benches;

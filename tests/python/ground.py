@@ -331,7 +331,7 @@ def selected(benches, possible):
 
 
 def of_possible(measured, corners, possible, shape):
-    """Returns measures of boards at the times of each possible interval, by bench, interval and time, and else infinity."""
+    """Returns measures of boards by bench, interval and time: at the times of possible intervals, else infinity."""
     values = np.full((len(possible), *shape), math.inf)
     values[possible] = measured(corners.reshape(*values.shape, 4, 2)[possible])
     return values

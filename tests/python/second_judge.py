@@ -668,8 +668,8 @@ class Judge:
         after = scene.chain(scene.place(hi), link + 1)[link]
         if front[0] != after[0]:
             raise Undecided("a lock beside a junction")
-        # The distances of places around the rear handle. If they are less than the link on both sides, a follower
-        # cannot leave unnoticed. This holds for whichever place of [front, after] the front handle has.
+        # These are distances from the front handle, at every place of [front, after], to places around the rear handle.
+        # If all are less than the link on both sides, a follower cannot leave unnoticed.
         square = scene.links[link] ** 2
         meanwhile = scene.point((front[0], hull(front[1], after[1])))
 

@@ -99,7 +99,7 @@ def obstacles_are_drawn():
 
 
 def lines_join_what_is_nearest():
-    """In calm motion and while the show stands. Lines join the two nearest boards, and a board and the edge of the
+    """In calm motion and while the show stands, lines join the two nearest boards, and a board and the edge of the
     nearest keep-out. This test computes their metres from the drawn places."""
     with server() as url, started("--scene", SQUARE, "run", "--quiet", "--json", "--start", "95", "--time-scale", "0.05"), browser() as (page, complaints):
         page.goto(url)

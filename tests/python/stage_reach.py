@@ -1,5 +1,5 @@
-"""The page for all users: small windows, large letters, keys, paper, languages, screen readers; and the tools of the crew. Same
-browser and arguments as stage_picture.py.
+"""The page for all users: small windows, large letters, keys, paper, languages, screen readers. Also the tools of the
+crew. Same browser and arguments as stage_picture.py.
 
     stage_reach.py SCENARIO PROGRAM NAME
 """

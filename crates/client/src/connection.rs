@@ -197,8 +197,8 @@ impl Subscription {
         nodes
     }
 
-    /// Returns true if frames are passed over that a show of this machine may send. Another process is selected then:
-    /// the end of a tunnel, selected while no show ran here.
+    /// Returns true if frames are passed over that a show of this machine may send. The reason is that another process
+    /// is selected: the end of a tunnel, selected while no show ran here.
     pub fn passes_over_the_show(&self, connection: &Connection) -> bool {
         let Selection::Following { selected, passes_over: true, .. } = &connection.selection else { return false };
         let process = |node: &UniqueNodeId| node.pid::<ipc::Service>().ok();

@@ -2,8 +2,8 @@
 //!
 //! In: a [`Recording`] and [`ReplayOptions`]. Out: a [`Replay`], the loop's [`FrameSource`], and a thread that reads
 //! ahead into a queue of bounded size. A frame is due as many periods after the first as in the recording. If the loop
-//! skips periods, or the disk is late, all later frames shift. No frame is skipped, and no frame is sent in a burst.
-//! Called by the command `replay`.
+//! skips periods, or the disk is late, all later frames shift. Thus no frame is skipped, and none is sent in a
+//! burst. Called by the command `replay`.
 
 mod pass;
 #[cfg(test)]

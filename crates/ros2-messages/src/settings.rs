@@ -84,9 +84,9 @@ impl Topic {
 
     /// Returns the default quality of service.
     ///
-    /// All topics are reliable. A default subscription is reliable and gets nothing from a best-effort publisher. A
-    /// best-effort subscription gets the messages of a reliable publisher. Event-driven messages are kept for late
-    /// subscribers.
+    /// All topics are reliable, because a default subscription is reliable and gets nothing from a best-effort
+    /// publisher. A best-effort subscription also gets the messages of a reliable publisher. Event-driven messages are
+    /// kept for late subscribers.
     pub fn default_qos(self) -> Qos {
         match self {
             Self::Alerts | Self::Stage | Self::Path | Self::Cues => {

@@ -13,7 +13,7 @@ use super::super::{CommandError, Common, Output, progress_bar};
 
 /// The line of `--json`.
 #[derive(Serialize)]
-struct Line<'a> {
+struct RecordingLine<'a> {
     scene_hash: String,
     #[serde(flatten)]
     verdict: &'a RecordingVerdict,
@@ -58,7 +58,7 @@ pub(super) fn verify(common: &Common, file: &Path) -> Result<(), CommandError> {
 fn print(common: &Common, verdict: &RecordingVerdict, scene_hash: String) -> Result<(), CommandError> {
     let mut output = Output::standard();
     if common.json {
-        output.json(&Line { scene_hash, verdict })?;
+        output.json(&RecordingLine { scene_hash, verdict })?;
         return output.finish();
     }
     let RecordingVerdict { frames, max_difference, tolerance, difference, .. } = verdict;

@@ -167,7 +167,7 @@ fn expected() -> String {
     let with_value = Command::TABLE.iter().filter(|entry| needs_value(entry)).map(|entry| entry.name);
     let with_value = with_value.collect::<Vec<_>>().join(" and ");
     format!(
-        "expected JSON such as {{\"command\":\"seek\",\"value\":400}}; the commands are toggle, {names}, of which \
+        "expected JSON such as {{\"command\":\"seek\",\"value\":400}}; the commands are toggle, {names}; \
          {with_value} have a value"
     )
 }
@@ -226,7 +226,7 @@ mod tests {
         assert_eq!(action("hold", None), Ok(Action::Send(Command::Hold)));
         assert_eq!(action("toggle", None), Ok(Action::Toggle));
         let sentence = "expected JSON such as {\"command\":\"seek\",\"value\":400}; the commands are toggle, state, pause, \
-                        resume, rate, seek, step, restart, hold, release, go, of which rate and seek have a value";
+                        resume, rate, seek, step, restart, hold, release, go; rate and seek have a value";
         assert_eq!(action("seek", None), Err(sentence.to_owned()));
         assert!(action("rate", None).is_err() && action("jump", None).is_err() && action("step", Some(0.5)).is_err());
     }
