@@ -51,8 +51,8 @@ pub(super) fn sin_cos(x: f64) -> (Interval, Interval) {
     let sine_of_rest = z - z * square * (1.0 / 6.0 - square * (1.0 / 120.0));
     let versine_of_rest = square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)));
     // In units of u z, the error is 2 from z, 1 from its sine and 1 from the product with it. The bracket's sum adds 1,
-    // and the remainders and all that has the factor z or u add less than 1. In units of u, the sum `rest` adds `rest`.
-    // `lost`, below u, is off by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
+    // and the remainders and all that has the factor z or u add less than 1. In units of u, the sum `rest` adds its
+    // own size. `lost`, below u, is off by u^2, and q pi / 2 by q HALF_PI_REST: together below 7e-25 q.
     let error = error + f64::EPSILON * (6.0 * z.abs() + rest.abs()) + 7e-25 * quarters.abs();
     let around = |kept: f64, bracket: f64| {
         let sum = kept + bracket;

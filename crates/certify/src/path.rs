@@ -144,13 +144,13 @@ impl Curve {
         if let Self::Arc { origin, .. } = self { Some(*origin) } else { None }
     }
 
-    /// Returns the polar angle at a coordinate, or 0 where the coordinate is an arc length.
+    /// Returns the polar angle at a coordinate of a spiral; 0 for a line or an arc.
     pub fn polar_angle(&self, coordinate: f64) -> f64 {
         if matches!(self, Self::Inward { .. } | Self::Outward { .. }) { coordinate } else { 0.0 }
     }
 
-    /// Returns a lower bound of the distance from the centre at a coordinate and before it, metres; minus infinity if
-    /// unknown.
+    /// Returns a lower bound of the distance from the centre, metres, for a coordinate and all places behind it on the
+    /// path. Returns minus infinity if unknown.
     pub fn distance_from_centre(&self, coordinate: f64) -> f64 {
         match self {
             Self::Inward { a, shift, .. } => (*a * coordinate + *a * *shift).lo,
@@ -158,8 +158,8 @@ impl Curve {
         }
     }
 
-    /// Returns true if no handle before a coordinate is faster than the handle there, for links of at most `longest`
-    /// metres: "Lemma 7" in `docs/proofs.md`.
+    /// Returns true if no handle behind the handle at a coordinate is faster than that handle. Links are at most
+    /// `longest` metres. See "Lemma 7" in `docs/proofs.md`. Precondition: the shift is 0.
     pub fn slows_followers(&self, coordinate: f64, longest: Interval) -> bool {
         match self {
             Self::Inward { a, .. } => {

@@ -467,8 +467,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    /// Returns the spans of the handles from 1 on, and a point that two boards are proved to have in common. Meanwhile
-    /// the head is between two grid points. Returns `None` without a proof.
+    /// Returns the spans of the handles from 1 on, and a point. Two boards are proved to have this point in common
+    /// while the head is between two grid points. Returns `None` without a proof.
     fn touch(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
         let benches = benches(event);
         let handles = self.chain.spans(from, to, benches[1] + 1)?;
@@ -512,8 +512,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         (event.bench_b? as usize).checked_sub(self.given.team.benches + 1)
     }
 
-    /// Returns the spans of the handles from 1 on, and a point of the board that is proved to be within the keep-out.
-    /// Meanwhile the head is between two grid points. Returns `None` without a proof.
+    /// Returns the spans of the handles from 1 on, and a point of the board. This point is proved to be within the
+    /// keep-out while the head is between two grid points. Returns `None` without a proof.
     fn reach(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
         let (bench, number) = (event.bench_a? as usize, self.number(event)?);
         let handles = self.chain.spans(from, to, bench + 1)?;

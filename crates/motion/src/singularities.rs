@@ -13,8 +13,8 @@
 //! links. So there are two problems in one variable, a `LinkTrace` each. The first is the head's link for all places of
 //! the head. The second is a body link for all places that handle 1 has come to. The two problems are solved in
 //! lockstep. Every step is proven to hold nothing unseen (`certificate`) or halved, down to the resolution of doubles
-//! (`trace`). Between two turning points of handle 1 its place is monotone in the head's place. So either place is
-//! found from the other by bisection.
+//! (`trace`). Between two turning points of handle 1 its place is monotone in the head's place. So the head's place is
+//! found from handle 1's place by bisection.
 
 mod certificate;
 mod inward;

@@ -26,7 +26,7 @@ const GROWTH: f64 = 1.5;
 const LEAST_SHARE: f64 = 1e-9;
 
 /// Gives `moved` every position of the boards of `benches`, counted from 0, while the head travels `from` to `to`
-/// metres. The head travels step by step. In a step each corner stays within `tolerance` metres of the straight line
+/// metres. The head travels in steps so short that each corner stays within `tolerance` metres of the straight line
 /// between its two ends. This is tested at a quarter, a half and three quarters of the step. `progress` receives the
 /// share that is done, from 0 to 1.
 ///

@@ -75,8 +75,8 @@ const FIRST_INTERVAL: f64 = 1e-3;
 const GROWTH: f64 = 1.5;
 const SHRINK: f64 = 0.5;
 
-/// Greatest width below which other events are tried beside the same event. After such a trial, other events are tried
-/// again below a share of its width.
+/// Greatest width below which other events are tried beside the same event. After such a trial, they are tried again
+/// below a share of the width that the trial has left.
 const OTHERS_BELOW: f64 = 1e-4;
 const OTHERS_AGAIN: f64 = 0.1;
 

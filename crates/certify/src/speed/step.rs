@@ -129,7 +129,7 @@ impl Speeds<'_> {
     fn is_rigid(&self, front: &Spanned, rear: &Spanned) -> bool {
         let segment = rear.span.0.0;
         let curve = &self.chain.exact.segments[segment].curve;
-        segment == front.span.1.0 && (curve.has_constant_curvature())
+        segment == front.span.1.0 && curve.has_constant_curvature()
     }
 
     /// Returns the rate of the ratio of the rear handle's speed to the front's, per metre of the front.

@@ -12,9 +12,9 @@
 //! benches that are far from all later dragons. For the other benches a grid finds the boards nearby.
 //!
 //! Dragons that go side by side hardly approach each other, however fast they go. So a bench keeps a list of the boards
-//! near it. Each entry has a distance and the places of the board's handles at that time, as seen from the bench. In
-//! this frame the bench's front handle is the origin and its link is an axis. A point of a board is a linear function
-//! of the board's two handles. So two boards have approached by no more than [`corner_reach`] times the movement of the
+//! near it. Each entry has a distance and the places of the board's handles at that time, as seen from the bench. Seen
+//! so, the bench's front handle is the origin and its link is an axis. A point of a board is a linear function of the
+//! board's two handles. So two boards have approached by no more than [`corner_reach`] times the movement of the
 //! handles as seen from the bench. A board of the list is measured again only when this bound comes within the limit.
 
 use super::between_table::{BetweenTable, TabledDragon};

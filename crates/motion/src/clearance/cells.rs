@@ -147,8 +147,8 @@ fn largest_difference(a: [f64; 6], (middle, half): (f64, f64), b: [f64; 3], (tim
     shifted.iter().map(|coefficient| coefficient.abs()).sum()
 }
 
-/// Returns the head when alpha of the second handle is at the beginning of a cell. The index is the number of the cell
-/// over all rows. Of several places the first is returned. The places need not be exact.
+/// Returns the head for each cell, with alpha of the second handle at the beginning of the cell. The index is the
+/// number of the cell over all rows. Of several places the first is returned. The places need not be exact.
 pub(super) fn head_grid_points(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Option<HeadGridPoint>>> {
     let cells = |travelled: f64| {
         let (alpha, rate) = follower.second_handle(travelled)?;

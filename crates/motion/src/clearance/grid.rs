@@ -16,8 +16,8 @@ pub(super) struct Grid {
     places: Vec<(f64, f64)>,
 }
 
-/// Lists from one row of squares to the next, modulo their number. Groups of points far from each other rarely share
-/// lists. The squares of a row have consecutive lists.
+/// Lists from one row of squares to the next, modulo their number. With this constant, groups of points far from each
+/// other rarely share lists, and the squares of a row have consecutive lists.
 const ROW: u32 = 0x9E37_79B1;
 
 impl Grid {

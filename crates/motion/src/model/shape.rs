@@ -209,8 +209,8 @@ impl Shape {
         })
     }
 
-    /// Returns on the stage a point of a board, and the point of the shape for a point of a side. Both are given in the
-    /// board's frame.
+    /// Returns two points on the stage: a point of a board, and the point of the shape for a point of a side. The
+    /// arguments `on_board` and `on_side` are in the board's frame.
     fn on_stage(&self, board: &Board, on_board: Vector, on_side: Vector) -> (Point, Point) {
         let on_stage = |local: Vector| board.centre + local.x * board.axis + local.y * board.across();
         let outward = on_board - on_side;

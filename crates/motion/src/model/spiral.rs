@@ -72,8 +72,8 @@ impl Spiral {
     ///
     /// The length follows from s = a/2 (theta w + asinh theta), w = sqrt(1 + theta^2). Both differences are written as
     /// products of the span, so that short spans far out keep all digits:
-    /// - theta w - theta' w' = span (w + theta' (theta + theta') / (w + w')),
-    /// - asinh theta - asinh theta' = asinh(span (theta + theta') / (theta w' + theta' w)).
+    /// 1. theta w - theta' w' = span (w + theta' (theta + theta') / (w + w')),
+    /// 2. asinh theta - asinh theta' = asinh(span (theta + theta') / (theta w' + theta' w)).
     fn inward_length(&self, theta: f64, span: f64) -> f64 {
         if span == 0.0 {
             return 0.0;
@@ -183,8 +183,8 @@ static LEAST_WITH_MAXIMUM: LazyLock<f64> =
 ///
 /// Half the slope of the squared chord over a^2 is H(d) = d + 2 theta sin^2(d/2) + theta (theta + d) sin d, positive up
 /// to pi. If H' >= 0 at pi, it stays so. If not, H has one minimum before 2 pi, and a zero exactly if that minimum is
-/// not above zero. If the first turn has no zero, no later turn has a zero. At sin d = -1, H = (1 - theta)(d + theta),
-/// and the part of the dip below that value shrinks with d.
+/// not above zero. If the first turn has no zero, no later turn has a zero. The reason is that at sin d = -1,
+/// H = (1 - theta)(d + theta), and the part of the dip below that value shrinks with d.
 fn first_chord_maximum(theta: f64) -> Option<f64> {
     let half_slope = |d: f64| {
         let sine = sin(0.5 * d);
@@ -349,8 +349,8 @@ impl Curve for Spiral {
 mod tests {
     use super::*;
 
-    /// Returns the greatest chord before the chords first shrink, in small steps. The chords lead from `theta` on a
-    /// spiral of radius theta to places up to a turn outward. Returns `None` if the chords grow all the time.
+    /// Returns the greatest chord before the chords first shrink. The chords lead from `theta` on a spiral of radius
+    /// theta to places up to a turn outward, in small steps. Returns `None` if the chords grow all the time.
     fn greatest_before_shrinking(theta: f64) -> Option<f64> {
         let place = |phi: f64| Point::new(phi * phi.cos(), phi * phi.sin());
         let chords: Vec<f64> =
