@@ -54,7 +54,7 @@ impl Sides {
         [(along / self.half_length).clamp(-1.0, 1.0), (aside / self.half_width).clamp(-1.0, 1.0)]
     }
 
-    /// Returns the point of a segment nearest to the board, as a share of the way along the segment. Returns also the
+    /// Returns the nearest point of a segment to the board, as a share of the way along the segment. Returns also the
     /// vector from the board to that point.
     pub fn nearest_of([from, to]: [[f64; 2]; 2], board: &Self) -> (f64, [f64; 2]) {
         let along = minus(to, from);
@@ -108,8 +108,8 @@ impl Sides {
         if dot(there, there) <= dot(back, back) { there } else { back.map(std::ops::Neg::neg) }
     }
 
-    /// Returns the corner of this board and the side of another that are nearest to each other, by number. The last
-    /// number is the nearest point's share of the way from the side's first corner to the next, from 0 to 1.
+    /// Returns the corner of this board and the side of another that are nearest to each other, by number. Returns also
+    /// the share of the way along the side, from its first corner to the next, at which its nearest point is.
     pub fn nearest_point(&self, other: &Self) -> (usize, usize, f64) {
         let (own, its) = (self.corners(), other.corners());
         let pairs = (0..4).flat_map(|corner| (0..4).map(move |side| (corner, side)));
