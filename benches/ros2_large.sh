@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The largest team that arrives complete over ROS 2: every message is compared with the shared memory, for growing teams.
-#   cargo build --release && tests/run (for .venv), then benches/ros2_large.sh
+# The largest team that arrives complete over ROS 2. Every message is compared with the shared memory, for growing teams.
+#
+#     cargo build --release && tests/run (for .venv), then benches/ros2_large.sh
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scene=$(mktemp --suffix .toml)

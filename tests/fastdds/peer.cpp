@@ -1,15 +1,15 @@
 // A Fast DDS process that subscribes to topics and calls services as rmw_fastrtps does, with payloads as bytes.
 //
-//   peer subscribe TOPIC TYPE [--best-effort] [--transient-local] [--depth N] [--seconds S] [--samples N]
-//        [--linger S] [--joins N] [--lease S]
-//   peer call SERVICE REQUEST_TYPE RESPONSE_TYPE HEX [--timeout S] [--clients N] [--heartbeat S]
+//     peer subscribe TOPIC TYPE [--best-effort] [--transient-local] [--depth N] [--seconds S] [--samples N]
+//         [--linger S] [--joins N] [--lease S]
+//     peer call SERVICE REQUEST_TYPE RESPONSE_TYPE HEX [--timeout S] [--clients N] [--heartbeat S]
 //
 // Both take --domain D. TOPIC and SERVICE are names on the wire without their prefixes: "rt/", or "rq/" and "rr/".
 // HEX is the request's body, little-endian, without the four bytes of the encapsulation.
 //
-// `subscribe` prints a JSON line for each sample, and one when the subscriber exists and when it has ended, with the
-// quality of service that the publisher offers. It ends
-// after S seconds, or some time after N samples. With --joins that happens N times, each with a participant of its own.
+// `subscribe` prints a JSON line for each sample, and one when the subscriber exists. It prints another when the
+// subscriber has ended, with the quality of service that the publisher offers. It ends after S seconds, or some time
+// after N samples. With --joins that happens N times, each with a participant of its own.
 // `call` makes the first call of N new clients, each with a participant that knows the server before, and prints a JSON
 // line for each. Called by tests/ros2/fast_dds.rs, which builds this file.
 

@@ -199,6 +199,15 @@ fn every_target_is_built_for_libfuzzer_and_every_kept_input_belongs_to_one() {
             assert!(root.join(format!("fuzz/fuzz_targets/{name}.rs")).exists(), "{name}");
         }
     }
+    // The target `command_line` compiles the program's sources.
+    if let Ok(manifest) = std::fs::read_to_string(root.join("fuzz/Cargo.toml")) {
+        let ours: toml::Table = std::fs::read_to_string(root.join("Cargo.toml")).unwrap().parse().unwrap();
+        let manifest: toml::Table = manifest.parse().unwrap();
+        let commands = ours["features"]["commands"].as_array().unwrap().iter().map(|feature| feature.as_str().unwrap());
+        for needed in commands.filter_map(|feature| feature.strip_prefix("dep:")) {
+            assert!(manifest["dependencies"].get(needed).is_some(), "fuzz/Cargo.toml does not have {needed}");
+        }
+    }
     for folder in std::fs::read_dir(root.join("tests/fuzz/corpus")).unwrap() {
         let name = folder.unwrap().file_name();
         assert!(TARGETS.iter().any(|target| name == target.name), "{name:?}");

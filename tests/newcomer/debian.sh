@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# A newcomer on a fresh Debian 12: installs it into a folder, clones this repository there as an ordinary user, runs the
-# first commands of README.md and a subscriber in Python, then tests/run from an empty target folder, which is timed. To be
-# run by hand, as root.
+# A newcomer on a fresh Debian 12. The script installs Debian into a folder and clones this repository there as an
+# ordinary user. It runs the first commands of README.md and a subscriber in Python. Then it runs tests/run from an empty
+# target folder, and times it. To be run by hand, as root.
 # The Rust toolchain and what cargo has downloaded are this machine's; all else comes from Debian and PyPI.
 set -euo pipefail
 [ $# = 1 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER" >&2; exit 2; }

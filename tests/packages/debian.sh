@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The packages on a clean Debian 12, which is installed into a folder: the .deb through lintian, installed, used; the
-# wheel in a fresh venv there, reading a publisher of the .deb; the user unit under systemd, which boots from that
-# folder; removed. As root; needs debootstrap, systemd-container, a mirror, PyPI, and what packaging/build needs.
+# The packages on a clean Debian 12, which is installed into a folder. The .deb passes lintian and is installed, used and
+# removed. The wheel in a fresh venv there reads a publisher of the .deb. The user unit runs under systemd, which boots
+# from that folder. As root; needs debootstrap, systemd-container, a mirror, PyPI, and what packaging/build needs.
 set -euo pipefail
 [ $# = 1 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER" >&2; exit 2; }
 # Mounts of its own, which are gone when it ends.

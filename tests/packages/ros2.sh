@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
-# The ROS 2 packages on a clean Debian 12, which is installed into a folder: colcon builds `msgs` (C and C++) and
-# `bench_dragon` from the archive of packaging/build with Debian's ament and rosidl; `ros2 run` and `ros2 launch` start
-# the publisher. As root; needs debootstrap, a mirror, what packaging/build needs, and in SOURCES the git repositories
-# rosidl_defaults, rcl_interfaces, common_interfaces, launch, launch_ros and ros2cli of github.com/ros2, since Debian
-# has none of them. rclpy, which a plain node of a launch file does not use, is a stand-in: no DDS of ROS 2 runs here.
+# The ROS 2 packages on a clean Debian 12, which is installed into a folder. Colcon builds `msgs` (C and C++) and
+# `bench_dragon` from the archive of packaging/build with Debian's ament and rosidl. `ros2 run` and `ros2 launch` start
+# the publisher. As root; needs debootstrap, a mirror and what packaging/build needs. SOURCES has git repositories of
+# github.com/ros2 that Debian does not have:
+# - rosidl_defaults, rcl_interfaces and common_interfaces,
+# - launch, launch_ros and ros2cli.
+#
+# rclpy, which a plain node of a launch file does not use, is a stand-in: no DDS of ROS 2 runs here.
 set -euo pipefail
 [ $# = 2 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER SOURCES" >&2; exit 2; }
 repository=$(cd "$(dirname "$0")/../.." && pwd)

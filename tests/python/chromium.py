@@ -36,8 +36,8 @@ PLACES = """() => [picture.passes, [picture.toPixel(0, 0), picture.toPixel(1, 1)
 def at_rest(page, seconds=120):
     """Waits until camera and words stand still.
 
-    A show at a millionth of its speed still moves by invisible parts of a pixel. Between two looks there are more than
-    the 250 ms after which words are laid out again, and some passes of the page, however slow the machine.
+    A show at a millionth of its speed still moves by invisible parts of a pixel. Words are laid out again after 250 ms.
+    Between two looks there are more, and some passes of the page, however slow the machine.
     """
     deadline, (before, places) = time.monotonic() + seconds, page.evaluate(PLACES)
     while True:

@@ -306,11 +306,12 @@ class Obstacle:
 
 
 def signed(obstacle, corners, limit=math.inf):
-    """Returns signed distances minus the keep-out. Of many boards that overlap only some are measured, by chance."""
+    """Returns signed distances minus the keep-out. Of many boards that overlap only some are measured, by chance; the
+    others have no number."""
     found = obstacle.distances(corners, limit + obstacle.keep_out)
     deep = np.argwhere(found <= 0)
     most = 10**6 if obstacle.radius else MOST_DEPTHS
-    found[found <= 0] = math.inf
+    found[found <= 0] = math.nan
     if len(deep) > most:
         deep = np.random.default_rng(1).permutation(deep)[:most]
     if len(deep):
@@ -372,22 +373,25 @@ def least_below(show, obstacle, times, corners, than):
     moved = ways(corners)[:, None, :]
     limit = than + moved.max(initial=0)
     rows, values = times[None, :], signed(obstacle, corners, limit)[:, None, :]
-    least, benches = values.min(), np.arange(len(show.links))
+    least, benches = np.nanmin(values), np.arange(len(show.links))
     while len(times) > 1:
-        least = min(least, values.min())
+        least = min(least, np.nanmin(values))
         width = (rows[:, 1] - rows[:, 0]).max() * show.speed
-        ends = np.minimum(values[..., :-1], values[..., 1:])
-        possible = values[..., :-1] + values[..., 1:] - moved < 2 * than
+        ends = np.fmin(values[..., :-1], values[..., 1:])
+        both = values[..., :-1] + values[..., 1:]
+        possible = both - moved < 2 * than
         if width < 1e-3:
             # Between two near times a clearance falls as a parabola does at most.
             apart = max(than + obstacle.keep_out, 1e-4)
             possible &= ends < than + (30.0 + 4.0 / apart) * width**2
+        # A board that was not measured is possible where another is.
+        possible |= np.isnan(both) & possible.any(axis=0)
         benches, possible, near = selected(benches, possible)
         if not near.any() or width < 1e-6:
             return least
         shares = np.linspace(0.0, 1.0, PARTS + 1)
         first, last = rows[:, :-1][near][:, None], rows[:, 1:][near][:, None]
-        order = np.argsort(ends.min(axis=0)[near])[:2000]
+        order = np.argsort(np.fmin.reduce(ends, axis=0)[near])[:2000]
         rows = (first * (1 - shares) + last * shares)[order]
         corners = show.corners(rows.ravel(), benches)
         moved = ways(corners)
@@ -420,11 +424,11 @@ def judge(program, file, counts, is_quiet=False):
         assert abs(end - ends) < TIME, f"the path ends at {ends} s, not {last}"
     stops = scene["motion"].get("on_contact", "stop") == "stop"
     touches = [event["time"] for event in events if event["event"] in ("contact", "obstacle")]
-    freeze = min(touches + [end]) if stops else end
+    show_end = min(touches + [end]) if stops else end
     step = 0.1 * min(show.links) / show.speed
     times = np.linspace(0.0, end, max(math.ceil(end / step), 1) + 1)
     corners = show.corners(times)
-    kept = np.append(times[times < freeze], freeze)
+    kept = np.append(times[times < show_end], show_end)
     kept_corners = corners if len(kept) == len(times) else show.corners(kept)
     given = scene["stage"].get("obstacles", [])
     obstacles = [(entry["name"], Obstacle(show, entry)) for entry in given]
@@ -459,10 +463,10 @@ def judge(program, file, counts, is_quiet=False):
             assert there.min() == -math.inf, f"{name}: {there} m, not {line}"
             counts["not to be freed"] += 1
             continue
-        assert time <= freeze + TIME, f"{name}: {line} after {freeze} s"
+        assert time <= show_end + TIME, f"{name}: {line} after {show_end} s"
         assert abs(there[bench] - value) < room, f"{name}: {there[bench]} m, not {line}"
         below = least_below(show, obstacle, kept, kept_corners, value - room)
-        assert below >= value - room, f"{name}: {below} m by brute force, not {line}, until {freeze} s"
+        assert below >= value - room, f"{name}: {below} m by brute force, not {line}, until {show_end} s"
         counts["least below an overlap" if value < -obstacle.keep_out else "least"] += 1
         if not is_quiet:
             print(f"{name}: least {value:.9f} m of bench {bench}, met {touch and touch['time']}")

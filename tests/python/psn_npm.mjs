@@ -1,5 +1,6 @@
-// What npm's @jwetzell/posistagenet decodes: packets in base64 on standard input, a line each; on standard output a JSON
-// line for every frame of DATA packets that is whole, with all its trackers. The first argument is the package's folder.
+// npm's @jwetzell/posistagenet as a decoder. Standard input has packets in base64, a line each. Standard output has a
+// JSON line for every frame of DATA packets that is whole, with all its trackers. The first argument is the package's
+// folder.
 
 import { createInterface } from 'node:readline';
 import { pathToFileURL } from 'node:url';

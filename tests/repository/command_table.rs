@@ -61,7 +61,7 @@ fn the_page_lists_every_command_and_those_that_a_hold_refuses() {
 #[test]
 fn the_command_line_has_every_command_with_its_help() {
     let mut control = std::process::Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
-    let printed = control.args(["control", "--help"]).env("COLUMNS", "120").output().unwrap();
+    let printed = control.args(["control", "--help"]).env("COLUMNS", "1000").output().unwrap();
     let printed = String::from_utf8(printed.stdout).unwrap();
     let rows = between(&printed, "Commands:\n", "\n\n").lines().map(|line| line.trim().split_once(' ').unwrap());
     let rows = rows.filter(|(name, _)| !["toggle", "help"].contains(name)).map(|(name, help)| (name, help.trim()));

@@ -5,8 +5,6 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::process::Command;
 
-use crate::harness::long;
-
 /// Returns the crates that the library needs with these features.
 fn crates(features: &[&str]) -> BTreeSet<String> {
     let mut tree = Command::new(env!("CARGO"));
@@ -29,8 +27,7 @@ fn a_library_without_the_command_line_needs_none_of_its_crates() {
     assert!(library.contains("iceoryx2") && library.len() <= 75, "{} crates: {library:?}", library.len());
 }
 
-/// The lines of `examples/README.md` make a package that needs those crates and no others. The long run compiles the
-/// example of a subscriber in it.
+/// The lines of `examples/README.md` make a package that needs those crates and no others. `tests/run` compiles them.
 #[test]
 fn a_subscriber_with_the_printed_manifest_needs_the_crates_of_that_library() {
     let page = include_str!("../../examples/README.md");
@@ -40,25 +37,20 @@ fn a_subscriber_with_the_printed_manifest_needs_the_crates_of_that_library() {
     assert!(dependencies.contains("\"../bench-dragon\""), "{dependencies}");
     let dependencies = dependencies.replace("../bench-dragon", root);
     let folder = tempfile::tempdir().unwrap();
-    let package = "[package]\nname = \"subscriber\"\nedition = \"2024\"\n";
+    let package = "[package]\nname = \"subscriber\"\nedition = \"2024\"\n[workspace]\n";
     fs::write(folder.path().join("Cargo.toml"), format!("{package}{dependencies}")).unwrap();
     fs::create_dir(folder.path().join("src")).unwrap();
     fs::copy(format!("{root}/examples/subscriber.rs"), folder.path().join("src/main.rs")).unwrap();
     fs::copy(format!("{root}/Cargo.lock"), folder.path().join("Cargo.lock")).unwrap();
-    let cargo = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO")).args(arguments).arg("--offline").current_dir(folder.path()).output();
-        let output = output.unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).unwrap()
-    };
-    let tree = cargo(&["tree", "--edges", "normal,build", "--prefix", "none", "--format", "{p}"]);
+    let mut tree = Command::new(env!("CARGO"));
+    tree.args(["tree", "--offline", "--edges", "normal,build", "--prefix", "none", "--format", "{p}"]);
+    let output = tree.current_dir(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let tree = String::from_utf8(output.stdout).unwrap();
     let needed: BTreeSet<_> = tree.lines().filter_map(|line| line.split_whitespace().next()).collect();
     let library = crates(&["--no-default-features"]);
     let library: BTreeSet<_> = library.iter().map(String::as_str).chain(["subscriber"]).collect();
     assert_eq!(needed, library);
-    if long() {
-        cargo(&["check", "--target-dir", folder.path().join("target").to_str().unwrap()]);
-    }
 }
 
 /// Returns the packages for this machine with the features that a build enables, a line each.

@@ -83,17 +83,17 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 
 /// Returns true for a text file that people write: code and documents, not pictures and records of measurements.
 fn is_written(path: &Path) -> bool {
-    let written = ["rs", "py", "js", "css", "md", "toml"];
+    let written = ["rs", "py", "js", "mjs", "css", "cpp", "md", "toml", "sh", "msg", "srv"];
     path.extension().is_some_and(|extension| written.iter().any(|written| extension == *written))
 }
 
 /// Returns every written file of the repository except this one, which lists the words.
 fn written() -> Vec<PathBuf> {
-    let folders =
-        ["src", "crates", "tests", "benches", "examples", "docs", "config", "packaging", "msgs", "fuzz/fuzz_targets"];
+    let folders = ["src", "crates", "tests", "benches", "examples", "docs", "config", "packaging", "msgs", "fuzz"];
     let all = folders.into_iter().flat_map(|folder| files(Path::new(folder)));
     let pages = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md"].map(PathBuf::from);
-    let all = all.chain(pages).filter(|file| is_written(file) && !file.ends_with("repository/words.rs"));
+    let is_ours = |file: &PathBuf| is_written(file) && !file.iter().any(|part| part == "target" || part == "corpus");
+    let all = all.chain(pages).filter(|file| is_ours(file) && !file.ends_with("repository/words.rs"));
     let all = Vec::from_iter(all);
     assert!(all.len() > 300, "{} files", all.len());
     all
@@ -147,22 +147,29 @@ fn prose(file: &Path, text: &str) -> Vec<String> {
     let extension = file.extension().unwrap_or_default().to_str().unwrap();
     let marks: &[&str] = match extension {
         "md" => return text.lines().map(str::to_owned).collect(),
-        "rs" | "js" | "css" => &["/// ", "//! ", "// ", "/** ", "/* ", "* "],
+        "rs" | "js" | "mjs" | "css" | "cpp" => &["/// ", "//! ", "// ", "/** ", "/* ", "* "],
         _ => &["# "],
     };
-    let (mut lines, mut last, mut is_docstring, mut is_string) = (Vec::new(), "", false, false);
+    let is_python = extension == "py" || text.starts_with("#!/usr/bin/env python3");
+    let (mut lines, mut last, mut code_before, mut is_string) = (Vec::new(), "", ":", false);
+    // The indentation of a docstring.
+    let mut docstring = None;
     for line in text.lines() {
-        let is_odd = extension == "py" && line.matches("\"\"\"").count() % 2 == 1;
-        let opened = line.trim_start().strip_prefix("\"\"\"").filter(|_| extension == "py" && !is_string);
-        // Other strings in this place are code.
-        if is_docstring || opened.is_some_and(|text| text.starts_with(char::is_uppercase)) {
-            let begins = if is_docstring { "" } else { "- " };
-            lines.push(format!("{begins}{}", line.replace("\"\"\"", "")));
-            is_docstring ^= is_odd;
+        let is_odd = is_python && line.matches("\"\"\"").count() % 2 == 1;
+        let indentation = line.len() - line.trim_start().len();
+        let opens = is_python && !is_string && line.trim_start().starts_with("\"\"\"") && code_before.ends_with(':');
+        if let Some(indented) = docstring.or(opens.then_some(indentation)) {
+            let begins = if docstring.is_some() { "" } else { "- " };
+            lines.push(format!("{begins}{}", line.get(indented..).unwrap_or_default().replace("\"\"\"", "")));
+            docstring = if docstring.is_some() ^ is_odd { Some(indented) } else { None };
+            code_before = "";
             continue;
         }
         is_string ^= is_odd;
         let (found, mark) = comment(line, marks).unwrap_or(("", ""));
+        if mark.is_empty() && !line.trim().is_empty() {
+            code_before = line;
+        }
         // Neighbours of different marks are different texts. A block comment has two marks.
         let is_same = last.is_empty() || mark.is_empty() || mark == last || mark == "* " && last.starts_with("/*");
         lines.push(if is_same { found.to_owned() } else { format!("- {found}") });
@@ -189,7 +196,9 @@ fn paragraphs(lines: &[String]) -> Vec<(usize, String)> {
             text.strip_prefix('<').is_some_and(|rest| rest.starts_with(|c: char| !c.is_whitespace() && c != '='));
         let begins = found.last().is_none_or(|(_, text)| text.is_empty());
         let is_formula = begins && line.starts_with("    ");
-        if text.is_empty() || is_code || is_fence || is_html || is_formula || text.starts_with(['|', '#']) {
+        let is_row = text.len() > 1 && text.starts_with('|') && text.ends_with('|');
+        let is_heading = text.trim_start_matches('#').starts_with(' ');
+        if text.is_empty() || is_code || is_fence || is_html || is_formula || is_row || is_heading {
             found.push((0, String::new()));
             continue;
         }
@@ -203,7 +212,7 @@ fn paragraphs(lines: &[String]) -> Vec<(usize, String)> {
     found
 }
 
-/// Returns the sentences of a paragraph, as words. A code span is one word, and so is a link with its address.
+/// Returns the sentences of a paragraph, as words. A code span is one word.
 fn sentences(paragraph: &str) -> Vec<Vec<&str>> {
     let is_end = |word: &str| {
         let word = word.trim_end_matches(['"', '\'', ')', ']', '*', '_', '`']);
@@ -227,9 +236,10 @@ fn sentences(paragraph: &str) -> Vec<Vec<&str>> {
 
 #[test]
 fn no_sentence_has_more_than_25_words() {
-    let others = ["CHANGELOG.md", "Cargo.toml", "deny.toml", "tests/run"].map(PathBuf::from);
+    let scripts = ["tests/run", "tests/timings", "tests/checked", "packaging/build"];
+    let others = ["CHANGELOG.md", "Cargo.toml", "deny.toml", "tests/repository/words.rs"];
     let (mut found, mut count) = (Vec::new(), 0);
-    for file in written().into_iter().chain(others).chain([PathBuf::from("tests/repository/words.rs")]) {
+    for file in written().into_iter().chain(others.into_iter().chain(scripts).map(PathBuf::from)) {
         let lines = prose(&file, &std::fs::read_to_string(&file).unwrap());
         for (number, paragraph) in paragraphs(&lines) {
             for sentence in sentences(&paragraph) {
@@ -247,9 +257,28 @@ fn no_sentence_has_more_than_25_words() {
 
 #[test]
 fn a_sentence_ends_at_a_full_stop_and_a_code_span_is_a_word() {
-    let lines = ["/// One two", "/// `three three three` [four](address). Five: a . b", "", "// - six", "// - seven."];
-    let lines = prose(Path::new("file.rs"), &lines.join("\n"));
-    let paragraphs = paragraphs(&lines);
-    let counts = paragraphs.iter().flat_map(|(_, text)| sentences(text)).map(|words| words.len());
-    assert_eq!(counts.filter(|count| *count > 0).collect::<Vec<_>>(), [4, 3, 1, 1]);
+    let counts = |file: &str, lines: &[&str]| {
+        let paragraphs = paragraphs(&prose(Path::new(file), &lines.join("\n")));
+        let counts = paragraphs.iter().flat_map(|(_, text)| sentences(text)).map(|words| words.len());
+        counts.filter(|count| *count > 0).collect::<Vec<_>>()
+    };
+    let rust = ["/// One two", "/// `three three three` [four](address). Five: a . b", "", "// - six", "// - seven."];
+    assert_eq!(counts("file.rs", &rust), [4, 3, 1, 1]);
+    let rust =
+        ["/// One", "/// |x| two.", "//! ```", "//! no prose", "//! ```", "//! |no|prose|", "code(); // no prose"];
+    assert_eq!(counts("file.rs", &rust), [3]);
+    let script = ["/** One two,", " * three. Four. */", "// Five.", "function six() {}"];
+    assert_eq!(counts("file.js", &script), [3, 1, 1]);
+    let python = [
+        "def no_prose():",
+        "    \"\"\"One two.",
+        "",
+        "    Three",
+        "    four.",
+        "    \"\"\"",
+        "    x = f(",
+        "\"\"\"no\"\"\")",
+    ];
+    assert_eq!(counts("file.py", &python), [2, 2]);
+    assert_eq!(counts("file.md", &["# No prose", "", "| no | prose |", "", "One <= two."]), [2]);
 }

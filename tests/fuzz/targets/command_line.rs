@@ -17,7 +17,7 @@ use super::Target;
 use super::bytes::{NUMBERS, changed, one, renumbered};
 
 pub const TARGET: Target =
-    Target { name: "command_line", run, seeds, mutate, cases: 4000, hung: Duration::from_secs(5) };
+    Target { name: "command_line", run, seeds, mutate, cases: 4000, hung: Duration::from_secs(15) };
 
 /// Most arguments of a case.
 const MOST_ARGUMENTS: usize = 40;

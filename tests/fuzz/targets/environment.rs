@@ -11,7 +11,7 @@ use super::Target;
 use super::bytes::{changed, one, renumbered};
 
 pub const TARGET: Target =
-    Target { name: "environment", run, seeds, mutate, cases: 100_000, hung: Duration::from_secs(5) };
+    Target { name: "environment", run, seeds, mutate, cases: 100_000, hung: Duration::from_secs(15) };
 
 const VARIABLES: [&str; 5] =
     ["ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_DISTRO"];

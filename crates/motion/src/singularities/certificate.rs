@@ -12,8 +12,8 @@
 //!    step. D <= s - u proves this as far as s - u is less than L. From there the proof goes back in steps within which
 //!    D^2 cannot grow to L^2 ([`Link::nearer_throughout`]). So no nearer point comes to be at the link's distance.
 //! 2. With the second bound, a place `far` is further away than L throughout.
-//! 3. Between the two the distance grows backward: q(s, u) = T(u) . (P(s) - P(u)) > 0, from its values at the corners,
-//!    |q_u| <= 1 + k D and |q_ss| <= k.
+//! 3. Between the two the distance grows backward: q(s, u) = T(u) . (P(s) - P(u)) > 0. This follows from its values at
+//!    the corners, |q_u| <= 1 + k D and |q_ss| <= k.
 //!
 //! Hence there is one root between `far` and `near`. This root is the follower, and by 3 it moves continuously. Its
 //! cosine is at least min q / L.

@@ -10,7 +10,7 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use bench_dragon_client::control::command_client::{Action, ActionResult, CommandClient};
 use bench_dragon_client::control::refusal;
-use bench_dragon_messages::control::{Code, Command, CommandEntry, CommandValue};
+use bench_dragon_messages::control::{Code, Command, CommandEntry, CommandValue, MOST_PERIODS};
 use bench_dragon_messages::state::PlaybackState;
 
 /// Commands of one browser that may be unanswered.
@@ -185,7 +185,7 @@ fn action(name: &str, value: Option<f64>) -> Result<Action, String> {
     };
     match Command::of_number(entry.number, value) {
         Ok(command) => Ok(Action::Send(command)),
-        Err(_) => Err(format!("{name} is refused: expected a whole number of periods from 1")),
+        Err(_) => Err(format!("{name} is refused: expected a whole number of periods from 1 to {MOST_PERIODS}")),
     }
 }
 

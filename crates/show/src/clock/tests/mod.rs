@@ -59,7 +59,7 @@ proptest! {
     }
 
     #[test]
-    fn time_never_falls_and_stays_between_start_and_freeze(
+    fn time_never_falls_and_stays_between_start_and_end(
         (time_scale, rate, start, show_end) in shows(),
         mut ticks in prop::collection::vec(any::<u64>().prop_flat_map(|limit| 0..=limit >> (limit % 60)), 2..50),
     ) {
@@ -77,7 +77,7 @@ proptest! {
 
     /// The last tick of a showing is the first at its end. Then time starts again and ticks continue.
     #[test]
-    fn a_loop_ends_each_showing_at_its_first_tick_past_the_freeze((time_scale, rate, start, show_end) in shows()) {
+    fn a_loop_ends_each_showing_at_its_first_tick_past_the_end((time_scale, rate, start, show_end) in shows()) {
         let looping = clock(start, time_scale, rate, show_end, AtEnd::Loop);
         let holding = clock(start, time_scale, rate, show_end, AtEnd::Hold);
         let seconds_per_tick = time_scale / rate;
@@ -103,7 +103,7 @@ proptest! {
 }
 
 #[test]
-fn a_start_past_the_freeze_has_ended_at_once() {
+fn a_start_past_the_end_has_ended_at_once() {
     for tick in [0, 1, u64::MAX] {
         let expected = At { sim_time: 412.5, shows_played: 0, ended: true };
         assert_eq!(at(&clock(420.0, 1.0, 60.0, 412.5, AtEnd::Hold), tick), expected);
