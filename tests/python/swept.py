@@ -3,8 +3,8 @@
     swept.py PROGRAM SCENE FROM UNTIL FIRST LAST HEAD_LENGTH BODY_LENGTH WIDTH HOLE_INSET [DRAGON:FIRST_HANDLE]
 
 FIRST and LAST are benches counted from 1, of a show of two within the dragon. With `all:HANDLE` in place of a dragon
-they are numbered through, and HANDLE is that which leads no bench. The boards come from `solve`, every 2 mm of the head. Prints the differences,
-and ends with an error where the outlines are more than 1 mm apart.
+they are numbered through, and HANDLE is the handle that leads no bench. The boards come from `solve`, every 2 mm of the
+head. Prints the differences, and ends with an error where the outlines are more than 1 mm apart.
 """
 
 import json
