@@ -1,10 +1,14 @@
 //! The table of commands, compared with every file that repeats its numbers and names.
 
-use bench_dragon::messages::control::{Code, Command, CommandEntry, CommandValue};
+use std::collections::BTreeSet;
+
+use bench_dragon::messages::control::{Code, Command, CommandEntry, CommandValue, RATES};
 
 const LAYOUTS: &str = include_str!("../../crates/messages/src/layouts/control.rs");
 const PYTHON: &str = include_str!("../../packaging/python/bench_dragon/control.py");
 const CONDUCTING: &str = include_str!("../../docs/conducting.md");
+const ROS2: &str = include_str!("../../docs/ros2.md");
+const BAR: &str = include_str!("../../crates/outputs/src/view/conduct.js");
 
 /// Returns the text of `file` between `begin` and the next `end`.
 fn between<'a>(file: &'a str, begin: &str, end: &str) -> &'a str {
@@ -32,6 +36,25 @@ fn the_python_module_has_every_command_and_code() {
     assert_eq!(between(PYTHON, "\nCOMMANDS = (", ")\n"), commands);
     let codes = tuple(Code::TABLE.iter().map(|entry| entry.words).collect());
     assert_eq!(between(PYTHON, "\nCODES = (", ")\n"), codes);
+}
+
+/// Returns the least and the greatest rate, as the pages print them.
+fn rates() -> String {
+    format!("{:e} to {:e}", RATES.start(), RATES.end())
+}
+
+#[test]
+fn the_pages_print_the_range_of_rates() {
+    assert_eq!([CONDUCTING, ROS2].map(|page| page.matches(&rates()).count()), [1, 1]);
+}
+
+/// The stage page sends commands by name, in calls of `command`.
+#[test]
+fn the_stage_page_sends_commands_of_the_table() {
+    let calls = BAR.split("command(").skip(1).map(|rest| rest.split([';', '\n']).next().unwrap());
+    let names: BTreeSet<&str> = calls.flat_map(|call| call.split('"').skip(1).step_by(2)).collect();
+    let unknown: Vec<_> = names.iter().filter(|name| **name != "toggle" && Command::named(name).is_none()).collect();
+    assert!(unknown.is_empty() && names.len() > 7, "{unknown:?} of {names:?}");
 }
 
 /// Returns the cell of the page's first column that a command stands in.

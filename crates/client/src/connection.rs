@@ -287,7 +287,20 @@ impl Subscription {
 impl Connection {
     /// Returns the number of services that are not open.
     fn missing(&self) -> usize {
-        let Self { alerts, cues, status, stage, scene, chase, tick, .. } = self;
+        let Self {
+            poses: _,
+            poses_service: _,
+            alerts,
+            cues,
+            expects_cues: _,
+            status,
+            status_service: _,
+            stage,
+            scene,
+            chase,
+            tick,
+            selection: _,
+        } = self;
         let messages = [alerts.is_some(), cues.is_some(), status.is_some(), stage.is_some()];
         let open = messages.into_iter().chain([scene.is_some(), chase.is_some(), tick.is_some()]);
         open.filter(|open| !open).count()

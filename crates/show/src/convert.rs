@@ -11,6 +11,7 @@ use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::ground::Obstacle;
 use bench_dragon_motion::model::Point;
+use bench_dragon_motion::model::elementary::atan2;
 use bench_dragon_motion::model::segment::{OutlineKind, SegmentOutline};
 use bench_dragon_motion::model::shape::{Shape, ShapeKind};
 use bench_dragon_motion::model::spiral::Direction;
@@ -297,11 +298,14 @@ fn stage_dragon(motion: &Motion, (name, first_handle): (&str, u32), segments: &m
     let on_spiral = motion.description().pitch().is_some();
     for outline in motion.outline() {
         match outline.kind {
-            OutlineKind::Spiral { direction: Direction::Inward, pitch: metres, first, .. } if on_spiral => {
-                (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
+            OutlineKind::Spiral { direction, pitch: metres, first, last: _, curvature: _ } => {
+                if on_spiral && direction == Direction::Inward {
+                    (pitch, start_turn) = (metres, first / std::f64::consts::TAU);
+                } else if !on_spiral && pitch.is_nan() {
+                    pitch = metres;
+                }
             }
-            OutlineKind::Spiral { pitch: metres, .. } if !on_spiral && pitch.is_nan() => pitch = metres,
-            _ => {}
+            OutlineKind::Line | OutlineKind::Arc { curvature: _ } => {}
         }
         segments.push(stage_segment(&outline));
     }
@@ -349,7 +353,7 @@ fn circle(shape: &Shape) -> StageSegment {
 /// Returns a side of a shape.
 fn side(from: Point, to: Point) -> StageSegment {
     let along = to - from;
-    let (heading, length) = (along.y.atan2(along.x), along.norm());
+    let (heading, length) = (atan2(along.y, along.x), along.norm());
     stage_segment(&SegmentOutline { kind: OutlineKind::Line, start: from, heading, length })
 }
 

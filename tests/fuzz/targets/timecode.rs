@@ -10,7 +10,8 @@ use fastrand::Rng;
 use super::Target;
 use super::bytes::changed;
 
-pub const TARGET: Target = Target { name: "timecode", run, seeds, mutate, cases: 20_000, hung: Duration::from_secs(15) };
+pub const TARGET: Target =
+    Target { name: "timecode", run, seeds, mutate, cases: 20_000, hung: Duration::from_secs(15) };
 
 fn run(data: &[u8]) -> bool {
     let Some((kind, bytes)) = data.split_first() else { return false };

@@ -116,8 +116,40 @@ impl Families<'_> {
     }
 
     fn of_status(&self, status: &LoopStatus) -> Vec<Family> {
-        let run = format!("{:016x}", status.run_id);
-        let run = self.labels(&[("run_id", run.as_str()), ("scene", status.scene.as_str())]);
+        let LoopStatus {
+            run_id,
+            tick: _,
+            sequence,
+            stamp_ns: _,
+            sim_time: _,
+            rate,
+            measured_rate,
+            overruns,
+            skipped,
+            shows_played,
+            unforeseen_contacts,
+            unsolved_frames,
+            lateness_p50_second,
+            lateness_p99_second,
+            lateness_max_second,
+            lateness_p50_total,
+            lateness_p99_total,
+            lateness_p999_total,
+            lateness_max_total,
+            step_p50_second,
+            step_p99_second,
+            step_max_second,
+            step_p50_total,
+            step_p99_total,
+            step_p999_total,
+            step_max_total,
+            resident_bytes,
+            subscribers,
+            file_descriptors,
+            ref scene,
+        } = *status;
+        let run = format!("{:016x}", run_id);
+        let run = self.labels(&[("run_id", run.as_str()), ("scene", scene.as_str())]);
         vec![
             Family {
                 name: "bench_dragon_run",
@@ -129,72 +161,61 @@ impl Families<'_> {
             self.count(
                 "bench_dragon_frames_published",
                 "Frames published in this run, as of its latest status.",
-                status.sequence + 1,
+                sequence + 1,
             ),
-            self.count("bench_dragon_periods_skipped", "Periods skipped in this run.", status.skipped),
+            self.count("bench_dragon_periods_skipped", "Periods skipped in this run.", skipped),
             self.count(
                 "bench_dragon_overruns",
                 "Incidents in this run in which at least one period was skipped.",
-                status.overruns,
+                overruns,
             ),
-            self.count("bench_dragon_shows_played", "Shows played to their end in this run.", status.shows_played),
+            self.count("bench_dragon_shows_played", "Shows played to their end in this run.", shows_played),
             self.count(
                 "bench_dragon_unforeseen_contacts",
                 "Contacts that no search had found before the show.",
-                status.unforeseen_contacts,
+                unforeseen_contacts,
             ),
             self.count(
                 "bench_dragon_unsolved_frames",
                 "Frames without a solution, which repeated the frame before.",
-                status.unsolved_frames,
+                unsolved_frames,
             ),
-            self.one(
-                "bench_dragon_requested_rate_hertz",
-                Kind::Gauge,
-                Some("hertz"),
-                "The requested rate.",
-                status.rate,
-            ),
+            self.one("bench_dragon_requested_rate_hertz", Kind::Gauge, Some("hertz"), "The requested rate.", rate),
             self.one(
                 "bench_dragon_measured_rate_hertz",
                 Kind::Gauge,
                 Some("hertz"),
                 "Frames published in the last second.",
-                status.measured_rate,
+                measured_rate,
             ),
             self.summary(
                 "bench_dragon_wakeup_lateness_seconds",
                 "Wake-up lateness of the loop, in the last second and in the whole run; quantile 1 is the maximum.",
-                [status.lateness_p50_second, status.lateness_p99_second, status.lateness_max_second],
-                [
-                    status.lateness_p50_total,
-                    status.lateness_p99_total,
-                    status.lateness_p999_total,
-                    status.lateness_max_total,
-                ],
+                [lateness_p50_second, lateness_p99_second, lateness_max_second],
+                [lateness_p50_total, lateness_p99_total, lateness_p999_total, lateness_max_total],
             ),
             self.summary(
                 "bench_dragon_step_seconds",
                 "Cost of a step of the loop, in the last second and in the whole run; quantile 1 is the maximum.",
-                [status.step_p50_second, status.step_p99_second, status.step_max_second],
-                [status.step_p50_total, status.step_p99_total, status.step_p999_total, status.step_max_total],
+                [step_p50_second, step_p99_second, step_max_second],
+                [step_p50_total, step_p99_total, step_p999_total, step_max_total],
             ),
             self.one(
                 "bench_dragon_resident_memory_bytes",
                 Kind::Gauge,
                 Some("bytes"),
                 "Resident memory of the publisher.",
-                status.resident_bytes as f64,
+                resident_bytes as f64,
             ),
             self.gauge(
                 "bench_dragon_open_file_descriptors",
                 "Open file descriptors of the publisher.",
-                f64::from(status.file_descriptors),
+                f64::from(file_descriptors),
             ),
             self.gauge(
                 "bench_dragon_subscribers",
                 "Subscribers of the frames over shared memory, this process included.",
-                f64::from(status.subscribers),
+                f64::from(subscribers),
             ),
         ]
     }

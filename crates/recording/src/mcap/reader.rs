@@ -393,10 +393,10 @@ impl OpenFile {
             let Some(topic) = topic_of(header.channel_id) else { continue };
             let item = match topic {
                 Topic::Handles => Some(Item::Frame(data.into_owned())),
-                Topic::Alerts => decoded(&data).map(|Stamped { layout, .. }| Item::Alert(layout)),
-                Topic::Cues => decoded(&data).map(|Stamped { layout, .. }| Item::Cue(layout)),
-                Topic::Status => decoded(&data).map(|Stamped { layout, .. }| Item::Status(Box::new(layout))),
-                _ => decoded(&data).map(|Stamped { layout, .. }| Item::Stage(Box::new(layout))),
+                Topic::Alerts => decoded(&data).map(|Stamped { header: _, layout }| Item::Alert(layout)),
+                Topic::Cues => decoded(&data).map(|Stamped { header: _, layout }| Item::Cue(layout)),
+                Topic::Status => decoded(&data).map(|Stamped { header: _, layout }| Item::Status(Box::new(layout))),
+                _ => decoded(&data).map(|Stamped { header: _, layout }| Item::Stage(Box::new(layout))),
             };
             handle(item.ok_or_else(|| damaged(&format_args!("a message of {} cannot be read", topic.name())))?);
         }

@@ -74,6 +74,7 @@ impl Iterator for RandomCommands {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_dragon_messages::control::RATES;
 
     #[test]
     fn a_seed_gives_the_same_list_again_and_another_seed_another() {
@@ -92,7 +93,7 @@ mod tests {
         list.iter().for_each(|(_, command)| counts[command.number_and_value().0 as usize] += 1);
         assert!(counts.iter().all(|count| *count >= 10), "{counts:?}");
         let wrong = |command: &Command| match *command {
-            Command::Rate(rate) => !(1e-6..=1e6).contains(&rate),
+            Command::Rate(rate) => !RATES.contains(&rate),
             Command::Seek(time) => !(0.0..=400.0).contains(&time),
             _ => false,
         };

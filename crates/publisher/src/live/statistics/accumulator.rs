@@ -184,30 +184,40 @@ impl Accumulator {
     /// Returns the status of the time since the latest one. Returns `None` if no time has passed, and before the first
     /// frame. The same fields are 0 as in [`Accumulator::status_if_due`].
     pub fn status(&mut self, now_ns: u64) -> Option<LoopStatus> {
-        let sample = self.latest?;
+        let Sample {
+            tick,
+            sim_time,
+            shows_played,
+            unforeseen_contacts,
+            unsolved_frames,
+            counts,
+            lateness_ns: _,
+            step_ns: _,
+            subscribers,
+        } = self.latest?;
         let elapsed_ns = now_ns.saturating_sub(self.second_began_ns);
         if elapsed_ns == 0 {
             return None;
         }
-        let frames = sample.counts.frames - self.frames_before;
+        let frames = counts.frames - self.frames_before;
         let [late, late_total] = [&self.second, &self.total].map(|over| Percentiles::of(&over.lateness));
         let [step, step_total] = [&self.second, &self.total].map(|over| Percentiles::of(&over.step));
-        self.frames_before = sample.counts.frames;
+        self.frames_before = counts.frames;
         self.second_began_ns = now_ns;
         self.second.clear();
         Some(LoopStatus {
             run_id: self.run_id,
-            tick: sample.tick,
-            sequence: sample.counts.frames - 1,
+            tick,
+            sequence: counts.frames - 1,
             stamp_ns: 0,
-            sim_time: sample.sim_time,
+            sim_time,
             rate: self.rate,
             measured_rate: frames as f64 * 1e9 / elapsed_ns as f64,
-            overruns: sample.counts.overruns,
-            skipped: sample.counts.skipped,
-            shows_played: sample.shows_played,
-            unforeseen_contacts: sample.unforeseen_contacts,
-            unsolved_frames: sample.unsolved_frames,
+            overruns: counts.overruns,
+            skipped: counts.skipped,
+            shows_played,
+            unforeseen_contacts,
+            unsolved_frames,
             lateness_p50_second: late.p50,
             lateness_p99_second: late.p99,
             lateness_max_second: late.max,
@@ -223,7 +233,7 @@ impl Accumulator {
             step_p999_total: step_total.p999,
             step_max_total: step_total.max,
             resident_bytes: 0,
-            subscribers: sample.subscribers,
+            subscribers,
             file_descriptors: 0,
             scene: self.scene,
         })
