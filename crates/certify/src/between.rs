@@ -95,18 +95,18 @@ fn alone(
     CertificateSearch::new(given, ground::barriers(motion), write).section(progress)
 }
 
-/// What stretches of time are to show of the boards of two dragons.
+/// The claim about two dragons that stretches of time are to show.
 #[derive(Debug, Clone, Copy)]
 enum Aim {
-    /// That no two touch.
+    /// No boards of the two touch.
     Clear,
-    /// Nothing: only that no link locks.
+    /// No link locks; no claim about boards.
     Links,
-    /// That they are more than some metres apart.
+    /// Boards of the two are more than some metres apart.
     Apart(f64),
 }
 
-/// The search for what two dragons do, by stretches of time.
+/// The search for the proofs about two dragons, by stretches of time.
 struct PairSearch<'a, 'w> {
     sides: [Side<'a>; 2],
     aim: Aim,
@@ -130,7 +130,7 @@ impl<'a, 'w> PairSearch<'a, 'w> {
 }
 
 impl PairSearch<'_, '_> {
-    /// Writes the lines up to `to`, given the contact that the ordinary search has found, and returns what they prove.
+    /// Writes the lines up to `to`, given the contact that the ordinary search has found, and returns their result.
     fn run(
         &mut self,
         hint: Option<(f64, [usize; 2])>,

@@ -78,13 +78,13 @@ impl Capsule {
     /// middles of both.
     pub fn distances_squared(&self, other: &Self) -> Interval {
         let along = dot(other.tangent, minus(self.point, other.point)).abs();
-        // That of any place of this span, with the tangent at the other's middle.
+        // A bound of the distance along the tangent at the other's middle, for any place of this span.
         let slope = along + dot(other.tangent, self.tangent).abs() * self.half + Interval::point(self.radius);
         self.distance_squared(other.point) + other.rest(slope, Interval::point(self.most_apart(other)))
     }
 
-    /// Returns how much the squared distance from a point changes from the middle to any place of the span. `slope` is
-    /// that along the tangent at the middle, `most` an upper bound of the distance.
+    /// Encloses the change of the squared distance from a point between the middle and any place of the span. `slope`
+    /// is the distance along the tangent at the middle, `most` an upper bound of the distance.
     fn rest(&self, slope: Interval, most: Interval) -> Interval {
         let half = Interval::point(self.half);
         Interval::within((slope * 2.0 * half + (Interval::ONE + most * self.curvature) * half.square()).hi)

@@ -108,9 +108,9 @@ pub struct ClearanceHints<'h> {
 /// The enclosures of a show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClearanceEnclosures {
-    /// That of two boards; `None` if not even the hint can be shown.
+    /// The enclosure of two boards; `None` if not even the hint can be shown.
     pub boards: Option<ClearanceEnclosure>,
-    /// By obstacle; `None` if nothing of it can be shown.
+    /// The enclosure of each obstacle; `None` if nothing of it can be shown.
     pub obstacles: Vec<Option<ObstacleEnclosure>>,
 }
 
@@ -213,7 +213,7 @@ pub(super) struct Descent<'a, 'w> {
     upper: Option<Upper>,
     /// A fixed lower bound to prove, in metres.
     floor: Option<f64>,
-    /// By obstacle: what is known of its clearance.
+    /// The bounds of the clearance of each obstacle so far.
     beside: Vec<Beside>,
     /// True if the steps have come to the end of the show.
     is_complete: bool,
@@ -441,8 +441,8 @@ impl<'a, 'w> Descent<'a, 'w> {
         self.beside(0.0, 1.0, |travelled| travelled.lo >= 0.0)
     }
 
-    /// Encloses the least clearance of a show that ends at its first contact. It is 0 if boards are apart at the start,
-    /// overlap shortly after the contact, and handles move continuously between the two.
+    /// Encloses the least clearance of a show that ends at its first contact. This clearance is 0 if boards are apart
+    /// at the start, overlap shortly after the contact, and handles move continuously between the two.
     fn touch(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Option<ClearanceEnclosure> {
         let benches = [event.bench_a?, event.bench_b?].map(|bench| bench as usize);
         let after = self.after_start()?;

@@ -382,8 +382,8 @@ impl FirstOrderBoard {
         (norm(minus(own, its)) + own_error + its_error).hi
     }
 
-    /// Returns true if two boards are proved to stay further apart than `metres`. It tries the direction of greatest
-    /// distance in the middle of the step, then the directions of the faces.
+    /// Returns true if two boards are proved to stay further apart than `metres`. The proof tries the direction of
+    /// greatest distance in the middle of the step, then the directions of the faces.
     pub fn is_further_than(&self, metres: f64, other: &Self, when: When) -> bool {
         let boards = [self.in_doubles(), other.in_doubles()];
         let separated = separation_board_board(&boards[0], &boards[1]);

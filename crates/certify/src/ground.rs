@@ -170,7 +170,7 @@ impl Barrier {
             let on_side = from + along * share.clamp(0.0, 1.0);
             let between: Vector = minus(point.map(Interval::point), [on_side.x, on_side.y].map(Interval::point));
             let metres = norm(between).hi;
-            // Where nothing has to be kept away from, the point of the side itself is in the board.
+            // If no distance has to be kept, the point of the side itself is in the board.
             if most == 0.0 { metres <= *rounding } else { metres + rounding <= most }
         })
     }
@@ -195,7 +195,7 @@ impl BoardOverStep<'_> {
         self.first_order.map_or_else(|| self.moving.in_doubles(), |(first, _)| first.in_doubles())
     }
 
-    /// Returns the point of the board of which it is tested that it is outside a shape.
+    /// Returns the point of the board that is tested to be outside a shape.
     fn inner_point(&self) -> Point {
         self.first_order.map_or_else(|| self.moving.front_point(), |(first, _)| first.front_point()).into()
     }

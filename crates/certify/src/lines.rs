@@ -127,8 +127,8 @@ pub enum CertificateLine<'a> {
         /// For a follower that vanishes: places behind and ahead of it that it cannot pass.
         #[serde(skip_serializing_if = "Option::is_none")]
         window: Option<Span>,
-        /// For a follower that jumps: two places ahead of it. It cannot pass the first place, and the next follower is
-        /// at the second place or ahead of it.
+        /// For a follower that jumps: two places ahead of it. The follower cannot pass the first place, and the next
+        /// follower is at the second place or ahead of it.
         #[serde(skip_serializing_if = "Option::is_none")]
         jump: Option<Span>,
     },
@@ -262,7 +262,7 @@ impl CertificateLine<'_> {
     /// Writes the line as JSON, with a line feed.
     ///
     /// # Errors
-    /// Those of the output.
+    /// The errors of the output.
     pub fn write(&self, output: &mut dyn Write) -> io::Result<()> {
         let mut line = serde_json::to_vec(self)?;
         line.push(b'\n');
@@ -338,7 +338,7 @@ pub struct CertifiedClearance {
     /// Simulated seconds of that end, for [`Until::Time`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_until: Option<f64>,
-    /// The bench of the two that is nearer the head, or that of the first of two dragons, counted from 0.
+    /// The bench of the two that is nearer the head, or the bench of the first of two dragons, counted from 0.
     pub bench_a: Option<usize>,
     /// The other bench.
     pub bench_b: Option<usize>,
@@ -384,7 +384,7 @@ pub struct Step {
     pub clear: bool,
     /// The spans of the handles from 1 on.
     pub spans: Vec<Span>,
-    /// The obstacles of which all boards stay clear in this step and before.
+    /// The obstacles that all boards avoid in this step and before.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub free: Vec<usize>,
     /// Metres that boards are further apart in this step.
@@ -441,7 +441,7 @@ pub enum Status {
         #[serde(skip_serializing_if = "Option::is_none")]
         time_lo: Option<f64>,
     },
-    /// There is no such event before a time. Later is not known.
+    /// There is no such event before a time. Nothing is proved about later times.
     Undecided {
         /// Simulated seconds.
         time_lo: f64,

@@ -497,8 +497,8 @@ impl ExactPath {
         if curve.grows() { metres } else { -metres }
     }
 
-    /// Returns a span with all places whose coordinates are within `by` of that of a place, if they are strictly inside
-    /// its segment.
+    /// Returns a span with all places whose coordinates differ from a place's by at most `by`, if they are strictly
+    /// inside its segment.
     pub fn around(&self, place: Place, by: f64) -> Option<Span> {
         let by = if by == 0.0 { 0.0 } else { WIDER * by + LEAST };
         let ends = [place.plus(-by, true), place.plus(by, true)];
@@ -596,7 +596,7 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
     ExactPath { segments }
 }
 
-/// The relative error of [`spiral_ends`]: some hundred times that of a few operations of [`DoubleDouble`].
+/// The relative error of [`spiral_ends`]: some hundred times the error of a few operations of [`DoubleDouble`].
 const OF_SUMS: f64 = 1e-28;
 
 /// Returns the polar angles at the ends of a route's spiral, within a part [`OF_SUMS`] of the greater one.

@@ -57,7 +57,7 @@ pub(super) struct CertificateSearch<'a, 'w> {
     proofs: [Option<Status>; 4],
     /// True if the path's end is shown.
     ends_with_path: bool,
-    /// The obstacles of which steps still claim to stay clear, and by obstacle the result.
+    /// The obstacles that steps still claim to avoid, and the result of each obstacle.
     free: Vec<usize>,
     of_obstacles: Vec<Option<Status>>,
     /// Length of the next step to try, metres.
@@ -67,7 +67,7 @@ pub(super) struct CertificateSearch<'a, 'w> {
     written: usize,
 }
 
-/// What the lines about one dragon prove.
+/// The proved results of the lines about one dragon.
 pub(super) struct Section {
     pub events: Vec<CertifiedEvent>,
     /// The place of the head at the end of the last step.
@@ -143,13 +143,13 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         self
     }
 
-    /// Writes the certificate and returns what it proves.
+    /// Writes the certificate and returns the results for its events.
     pub fn run(self, progress: &mut dyn FnMut(f64)) -> Result<Vec<CertifiedEvent>, CertifyError> {
         first_line(&mut *self.write, self.given.scene)?;
         Ok(self.section(progress)?.events)
     }
 
-    /// Writes the lines after the first, and returns what they prove.
+    /// Writes the lines after the first, and returns their results.
     pub fn section(mut self, progress: &mut dyn FnMut(f64)) -> Result<Section, CertifyError> {
         let stuck = match self.motion(progress) {
             Ok(()) => None,

@@ -173,7 +173,7 @@ pub(super) struct Listed<'c, 'a> {
     pub handles: Vec<Spanned>,
     /// Pad of the last handle, metres.
     pad: f64,
-    /// Multiples of the pad to try, and the number of those that were too small for the last handle.
+    /// Multiples of the pad to try, and the number of multiples that were too small for the last handle.
     multiples: &'static [f64],
     too_small: usize,
     /// Metres added to every pad, for a path that is an interval of paths.
@@ -353,7 +353,8 @@ impl<'c, 'a> Listed<'c, 'a> {
         Ok(())
     }
 
-    /// Returns the boards that obstacles concern: all, those that are not listed as one, or boards 0 and 1.
+    /// Returns the boards that obstacles concern: all, with the boards that are not listed as one board, or boards 0
+    /// and 1.
     pub fn boards_on_ground(&self, links: Links) -> Vec<MovingBoard> {
         let (chain, benches) = (self.chain, self.chain.team.benches);
         let listed = self.handles.len() - 1;

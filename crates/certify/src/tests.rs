@@ -125,7 +125,8 @@ fn elementary_functions_hold_what_192_bits_find() {
     }
 }
 
-/// The limit of places ends a search: each result says up to when it holds, and why not further.
+/// The limit of places ends a search: each result states the time up to which it holds, and the reason why it holds no
+/// further.
 #[test]
 fn a_certificate_with_too_many_places_says_so() {
     let scene = Scene::paper();

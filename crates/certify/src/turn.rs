@@ -27,8 +27,8 @@ use bench_dragon_motion::model::team::Team;
 const MOST_STRETCHES: u32 = 2_000;
 const MOST_HALVINGS: u32 = 48;
 
-/// The metres by which places are uncertain as a multiple of those of the points, with room for terms of the second
-/// order. Two points count, each with half of its width.
+/// The uncertainty of places over the uncertainty of the points, with room for terms of the second order. Two points
+/// count, each with half of its width.
 const BLUR: f64 = 1.1;
 
 /// All turnarounds of a team whose turn radius is in an interval.
@@ -40,14 +40,14 @@ pub(crate) struct Turns<'a> {
     exact: ExactPath,
     /// The turnaround with the middle radius.
     middle: ExactPath,
-    /// The same in doubles. It only gives the starting guess of the handles.
+    /// The same turnaround in doubles, only for the starting guess of the handles.
     path: Path,
 }
 
 impl<'a> Turns<'a> {
-    /// Creates the turnarounds of this pitch and arc ratio with turn radii between two. `path` is that with the middle
-    /// radius. Places of an arc are those of `path`. A place of a spiral is that of `path` at the same polar angle
-    /// behind A or beyond -A.
+    /// Creates the turnarounds of this pitch and arc ratio with turn radii between two. `path` is the turnaround with
+    /// the middle radius. Places of an arc are places of `path`. A place of a spiral is the place of `path` at the same
+    /// polar angle behind A or beyond -A.
     pub fn new(team: &'a Team, (pitch, arc_ratio): (f64, f64), radii: [f64; 2], path: Path) -> Self {
         let radius = Interval { lo: radii[0], hi: radii[1] };
         let a = Interval::point(pitch).over(pi() * 2.0);

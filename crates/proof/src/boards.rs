@@ -264,8 +264,8 @@ impl Rough {
         points.iter().map(|point| dot(n, *point)).fold(f64::INFINITY, f64::min) - self.extent(n)
     }
 
-    /// Returns directions in which points may be apart from the board. They are the normals of its edges and of a side,
-    /// and those between the nearest corners and between the middles.
+    /// Returns directions in which points may be apart from the board. The directions are the normals of its edges and
+    /// of a side, and the directions between the nearest corners and between the middles.
     fn directions_to(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let [x, y] = self.direction();
         let mut directions = vec![[x, y], [-y, x], [-x, -y], [y, -x]];
@@ -319,8 +319,8 @@ impl Rough {
 }
 
 /// Returns true if Lemma 3, *Ring*, shows some boards to be more than `metres` apart from all body boards further out.
-/// The handles of the former are at most `reach` metres from the centre of the spiral. The handles of the latter are at
-/// least `ring` metres from it.
+/// The handles of these boards are at most `reach` metres from the centre of the spiral. The handles of the boards
+/// further out are at least `ring` metres from it.
 pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval, metres: &Interval) -> bool {
     let half_link = team.link(1) * Interval::new(0.5);
     let half_width = team.width * Interval::new(0.5);

@@ -372,8 +372,8 @@ fn rough_angle(length: f64, first: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The metres to the angle found are those asked for, with more digits than a double has, up to a centimetre from
-    /// the centre.
+    /// The metres to the angle found are the requested metres, with more digits than a double has, up to a centimetre
+    /// from the centre.
     #[test]
     fn the_angle_after_some_metres_of_a_spiral() {
         let a = Interval::new(1.7) / elementary::turns(1.0);

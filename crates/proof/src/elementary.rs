@@ -106,7 +106,8 @@ fn odd_series(z: &Interval, sign: f64) -> Interval {
     sum * z
 }
 
-/// Returns the arctangent of a number of at least 0. It grows, so that those of the ends are enough.
+/// Returns the arctangent of a number of at least 0. The arctangent grows, so that the arctangents of the ends are
+/// enough.
 pub(super) fn atan(tangent: &Interval) -> Interval {
     let lower = -(-tangent).upper();
     atan_at(&lower).hull(&atan_at(&tangent.upper()))

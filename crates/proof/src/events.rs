@@ -85,8 +85,8 @@ fn touching_chain(scene: &Scene, steps: &Steps, head: Span, spans: &[Span]) -> R
     }
 }
 
-/// Returns the handles with the head in a span, of which some place is in the motion and no step that counts ends
-/// before it.
+/// Returns the handles with the head in a span. Some place of the span must be in the motion, and the span must not
+/// begin beyond the end of the last step that counts.
 ///
 /// # Errors
 /// The condition that does not follow.

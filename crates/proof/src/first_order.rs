@@ -261,8 +261,8 @@ impl FirstOrderBoard {
         }
     }
 
-    /// Returns a point of the board, by its parts along the board and to the left. They are shares of half its length
-    /// and half its width.
+    /// Returns a point of the board, by its parts along the board and to the left. The parts are shares of half its
+    /// length and half its width.
     fn point(&self, [ahead, left]: [f64; 2], when: When) -> Linear {
         let along = self.along(when);
         let share = self.half_length / self.link * Interval::new(ahead);

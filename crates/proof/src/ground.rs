@@ -126,7 +126,7 @@ impl Obstacle {
             }
         }
         self.sides().iter().any(|[from, to]| {
-            // A point of the side, near the one that is nearest.
+            // A point of the side, near its nearest point.
             let (along, offset) = (to.minus(from), point.minus(from));
             let share = (offset.dot(&along).rough() / along.norm_squared().rough()).clamp(0.0, 1.0);
             let on_side = from.plus(&along.scaled(&Interval::new(share)));
@@ -195,7 +195,7 @@ pub(super) struct PlacementText {
     mirror: bool,
 }
 
-/// The way from the stage's coordinates to those of a path that starts at `start` in its own.
+/// The mapping from the stage's coordinates to the coordinates of a path, in which the path starts at `start`.
 pub(super) struct Mapping {
     origin: Vector,
     sine: Interval,
@@ -219,7 +219,7 @@ impl Mapping {
         Ok(Self { origin, sine, cosine, mirror: placement.mirror, start })
     }
 
-    /// Returns the way of a path that is where its own coordinates say.
+    /// Returns the mapping of a path whose own coordinates are the stage's.
     pub fn unmoved() -> Self {
         let zero = Vector::new(0.0, 0.0);
         Self { origin: zero, sine: Interval::new(0.0), cosine: Interval::new(1.0), mirror: false, start: zero }

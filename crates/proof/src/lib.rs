@@ -1,8 +1,8 @@
 //! The checker of certificates: the rules of docs/proofs.md, and nothing else. `verify`, `check
 //! --certificate` and `view --certificate` call it.
 //!
-//! In: the lines of a certificate. Out: its proved claims, or the first line that does not follow. It depends on no
-//! other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
+//! In: the lines of a certificate. Out: its proved claims, or the first line that does not follow. This crate depends
+//! on no other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
 
 mod apart;
 mod boards;
@@ -63,12 +63,12 @@ pub struct Proved {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub dragons: Vec<String>,
     /// The results for contact, stall, lock and path end, in this order, and for each obstacle; none in a certificate
-    /// of another question. With several dragons, those of each, and then the contacts of each two.
+    /// of another question. With several dragons, the results of each, and then the contacts of each two.
     pub results: Vec<ProvedEvent>,
     /// The least clearance, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_clearance: Option<ProvedClearance>,
-    /// With several dragons, that of each, and then that of each two.
+    /// With several dragons, the least clearance of each, and then of each two.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub least_clearances: Vec<ProvedClearance>,
     /// The least clearance of each obstacle, in a certificate of that question; with several dragons, for each of them.

@@ -223,8 +223,8 @@ pub struct ProvedEvent {
     /// counted within each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub dragons: Vec<usize>,
-    /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. It is not
-    /// checked.
+    /// The reason for `undecided`, or for times far apart, from the program that wrote the certificate. The reason is
+    /// not checked.
     #[serde(default)]
     pub because: Option<String>,
 }
@@ -256,7 +256,7 @@ pub struct ProvedClearance {
     /// Seconds of that end, for [`Until::Time`].
     #[serde(default)]
     pub time_until: Option<f64>,
-    /// The bench of the two that is nearer the head, or that of the first of two dragons, counted from 0.
+    /// The bench of the two that is nearer the head, or the bench of the first of two dragons, counted from 0.
     #[serde(default)]
     pub bench_a: Option<usize>,
     /// The other bench.

@@ -243,7 +243,7 @@ fn quotient(high: u128, low: u128, divisor: u128) -> (u128, bool) {
 fn digit(high: u128, next: u64, divisor: u128) -> (u64, u128) {
     let (upper, lower) = (divisor >> 64, divisor & u128::from(u64::MAX));
     let mut digit = (high / upper).min(u128::from(u64::MAX));
-    // The rest of the division by the upper half alone, and what the lower half takes from it.
+    // The rest of the division by the upper half alone, and the part that the lower half takes from it.
     let mut rest = high - digit * upper;
     while rest >> 64 == 0 && digit * lower > (rest << 64 | u128::from(next)) {
         digit -= 1;

@@ -54,12 +54,12 @@ pub(super) enum Claim<'c> {
 /// The section of two dragons.
 pub(super) struct Pair {
     pub dragons: [usize; 2],
-    /// Seconds up to which stretches follow one another from the start. The two flags are true if all of them were
-    /// clear, and if all say how far boards are apart.
+    /// Seconds up to which stretches follow one another from the start. The first flag is true if all stretches were
+    /// clear, the second if all have a number `apart`.
     end: Option<f64>,
     all_clear: bool,
     all_apart: bool,
-    /// The end of the last stretch that says how far boards are apart, and the least of these metres.
+    /// The end of the last stretch with a number `apart`, and the least of these numbers, metres.
     apart: Option<(f64, f64)>,
     /// Two benches that overlap, and seconds.
     meeting: Option<([usize; 2], f64)>,
@@ -262,8 +262,8 @@ impl Pair {
         }
     }
 
-    /// Checks and adds a contact of two boards at a time. The motions go on until then by the sections of both dragons
-    /// alone, if they are given, or else by the steps of the two.
+    /// Checks and adds a contact of two boards at a time. The sections of both dragons alone, if they are given, or
+    /// else the steps of the two, must prove that the motions continue until then.
     ///
     /// # Errors
     /// The condition that does not follow.

@@ -47,8 +47,8 @@ impl Sides {
         least - most
     }
 
-    /// Returns the point of the board nearest to another point, by its parts along the board and to the left. They are
-    /// shares of half its length and half its width, from -1 to 1.
+    /// Returns the point of the board nearest to another point, by its parts along the board and to the left. The parts
+    /// are shares of half its length and half its width, from -1 to 1.
     pub fn shares_of(&self, point: [f64; 2]) -> [f64; 2] {
         let [along, aside] = self.seen(minus(point, self.centre));
         [(along / self.half_length).clamp(-1.0, 1.0), (aside / self.half_width).clamp(-1.0, 1.0)]
@@ -76,8 +76,8 @@ impl Sides {
         all.min_by(|one, other| square(one).total_cmp(&square(other))).unwrap_or((0.0, [0.0; 2]))
     }
 
-    /// Returns unit vectors along which segments may be apart from the board. They lead to the nearest point of each
-    /// segment, or are normals of each segment or of the board's sides.
+    /// Returns unit vectors along which segments may be apart from the board. The vectors lead to the nearest point of
+    /// each segment, or are normals of each segment or of the board's sides.
     pub fn directions_to(&self, segments: &[[[f64; 2]; 2]]) -> Vec<[f64; 2]> {
         let [x, y] = self.axis;
         let mut directions = vec![[x, y], [-y, x], [-x, -y], [y, -x]];

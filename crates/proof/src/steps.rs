@@ -19,11 +19,11 @@ pub(super) struct Step {
     pub moving: bool,
     pub clear: bool,
     pub spans: Vec<Span>,
-    /// The obstacles of which all boards are said to stay clear.
+    /// Claim: all boards stay clear of these obstacles.
     pub free: Vec<usize>,
-    /// Metres that boards are said to be more apart.
+    /// Claim: boards are further apart than these metres.
     pub apart: Option<f64>,
-    /// By obstacle: metres that its clearance is said to be more than.
+    /// Claim by obstacle: its clearance is more than these metres.
     pub beside: Vec<Option<f64>>,
     /// Places of all listed handles with the head at one place.
     pub at: Vec<Place>,
@@ -36,9 +36,9 @@ pub(super) struct Steps {
     /// The ends of the last moving step and of the last clear step.
     pub moving_end: Option<Place>,
     pub clear_end: Option<Place>,
-    /// The end of the last step that says how far boards are apart.
+    /// The end of the last step with a number `apart`.
     pub apart_end: Option<Place>,
-    /// True if all steps were moving, if all were clear, and if all say how far boards are apart.
+    /// True if all steps were moving, if all were clear, and if all have a number `apart`.
     pub all_moving: bool,
     pub all_clear: bool,
     pub all_apart: bool,
@@ -46,7 +46,7 @@ pub(super) struct Steps {
     pub apart: f64,
     /// By obstacle: the end of the last step that stays clear of it, and true if all steps did.
     free: Vec<(Option<Place>, bool)>,
-    /// By obstacle: what is known of its clearance.
+    /// The proved clearance of each obstacle.
     beside: Vec<Beside>,
     /// Spans of the last step.
     pub spans: Vec<Span>,
@@ -65,11 +65,11 @@ pub(super) struct Steps {
 /// The clearance of an obstacle in the steps so far.
 #[derive(Clone, Copy)]
 pub(super) struct Beside {
-    /// The end of the last step that says something of it.
+    /// The end of the last step with a number for the obstacle.
     pub end: Option<Place>,
-    /// True if all steps do.
+    /// True if all steps have a number for the obstacle.
     pub all: bool,
-    /// Metres that it was more than up to `end`.
+    /// The clearance was more than these metres up to `end`.
     pub least: f64,
 }
 
@@ -264,7 +264,7 @@ impl Steps {
         Ok(())
     }
 
-    /// Returns what is known of the clearance of an obstacle.
+    /// Returns the proved clearance of an obstacle.
     pub fn beside(&self, obstacle: usize) -> Beside {
         let nothing = Beside { all: false, ..NOTHING };
         self.beside.get(obstacle).copied().unwrap_or(nothing)

@@ -42,9 +42,9 @@ pub(super) struct UpperBetween {
 /// The enclosures of a show of several dragons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeveralClearances {
-    /// Those of each dragon alone, at its own travel.
+    /// The enclosures of each dragon alone, at its own travel.
     pub own: Vec<ClearanceEnclosures>,
-    /// Those of each two, in the order of [`pairs`].
+    /// The enclosures of each two, in the order of [`pairs`].
     pub between: Vec<BetweenEnclosure>,
 }
 
@@ -165,7 +165,7 @@ impl PairSearch<'_, '_> {
         let locks = self.sides.iter().filter(|side| side.locks);
         let latest = locks.map(|side| side.end - side.seconds(BEFORE_LOCK)).fold(f64::INFINITY, f64::min);
         let end = show_end.time.min(latest).max(0.0);
-        // A show that ends with the last path end goes on until both surely stand.
+        // If the show ends with the last path end, the search continues until both dragons surely stand.
         let stands = self.sides.iter().map(|side| side.end).fold(0.0, f64::max);
         let end = if latest.is_infinite() && end >= stands - ENDING * (1.0 + stands) { end.max(stands) } else { end };
         self.upper = hint.and_then(|(time, benches)| self.upper_at(time.min(end), benches));
@@ -220,8 +220,8 @@ impl PairSearch<'_, '_> {
         value.is_finite().then_some(UpperBetween { value, time, benches })
     }
 
-    /// Lowers the upper bound to that of two boards at a time, if it is lower. A number beyond the listed boards is
-    /// that of the boards on a line; the nearest of them is found.
+    /// Lowers the upper bound to the bound of two boards at a time, if the new bound is lower. A number beyond the
+    /// listed boards stands for the boards on a line; the nearest of them is found.
     pub(super) fn lower(&mut self, time: f64, boards: [usize; 2]) -> bool {
         let Some(upper) = self.upper else { return false };
         let Some(benches) = self.nearest_benches(time, boards) else { return false };

@@ -1,4 +1,4 @@
-//! One of two dragons as a function of the show's time: where its handles and boards are from one time to another.
+//! One of two dragons as a function of the show's time: the places of its handles and boards from one time to another.
 //! Lemma 12 of `docs/proofs.md`.
 
 use crate::boards::MovingBoard;
@@ -27,7 +27,7 @@ pub(super) struct Side<'a> {
     pub end: f64,
     /// True if it ends with a lock.
     pub locks: bool,
-    /// What the section of its events has shown.
+    /// The results of the section of its events.
     pub section: Option<&'a Section>,
 }
 
@@ -45,16 +45,16 @@ pub(super) struct Stretch {
 /// The reason why a stretch of time is not shown.
 pub(super) enum Refused {
     Link(usize),
-    /// A board of each.
+    /// A board of each dragon.
     Pair([usize; 2]),
 }
 
 /// The handles of a dragon that a stretch must have.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Extent {
-    /// All, or all but those on a line without a beginning, whose boards are one.
+    /// All handles, or all but those on a line without a beginning, whose boards are taken as one.
     Whole,
-    /// Those of the benches up to this one.
+    /// The handles of the benches up to this one.
     UpTo(usize),
 }
 
@@ -172,7 +172,8 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// Returns true if the motion is proved to go on up to a place of the head by the section of the dragon's events.
+    /// Returns true if the section of the dragon's events proves that the motion continues up to a place of the head.
+    /// Returns true without a section, too.
     pub fn has_come(&self, Span(_, to): Span) -> bool {
         self.section.is_none_or(|section| section.ends_with_path || self.chain.exact.in_order(to, section.end))
     }

@@ -67,7 +67,7 @@ impl Descent<'_, '_> {
     /// Shows that no two boards come as near as the threshold: all pairs, or the pairs with board 0 or 1.
     ///
     /// # Errors
-    /// A pair of which it cannot be shown.
+    /// A pair for which this cannot be shown.
     pub(super) fn boards_are_apart(
         &self,
         listed: &Listed,

@@ -10,7 +10,7 @@ use crate::path::Place;
 use crate::step::{Listed, Obstacle};
 use bench_dragon_motion::timeline::TimedObstacleClearance;
 
-/// What is known of the clearance of an obstacle.
+/// The bounds of the clearance of an obstacle so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Beside {
     pub upper: Option<UpperBeside>,
@@ -128,7 +128,7 @@ impl Descent<'_, '_> {
         }
     }
 
-    /// Returns what is shown of each obstacle.
+    /// Returns the enclosure of each obstacle's clearance; `None` if nothing is shown.
     pub(super) fn enclosed_beside(&self) -> Vec<Option<ObstacleEnclosure>> {
         let of = |(obstacle, beside): (usize, &Beside)| {
             let (UpperBeside { value: hi, travelled, bench, .. }, (lo, end)) = (beside.upper?, beside.shown?);

@@ -67,8 +67,8 @@ const LEAST_SHARE: f64 = 1e-14;
 const FIRST_SHARE: f64 = 1e-4;
 const GROWTH: f64 = 1.1;
 
-/// Share of its first depth below which another pair of boards is searched for that overlaps more deeply. It is squared
-/// after a search that finds the same pair.
+/// Share of a pair's first depth. At a smaller depth, another pair of boards is searched for that overlaps more deeply.
+/// The share is squared after a search that finds the same pair.
 const SHALLOW: f64 = 0.5;
 
 /// Encloses the least pitch with which the head of a team comes in to `radius` metres from the centre, within a

@@ -89,8 +89,8 @@ pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progre
 }
 
 /// Returns the place within `low..=high` where a function becomes positive, to the last bits: the least place known to
-/// have a positive value. It assumes that the function is at most 0 at `low` and positive at `high`. Illinois method
-/// (Dowell and Jarratt, 1971).
+/// have a positive value. The function must be at most 0 at `low` and positive at `high`. Illinois method (Dowell and
+/// Jarratt, 1971).
 fn sign_change(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let (mut below, mut above) = (function(low), function(high));
     let mut last_side = 0;

@@ -29,7 +29,7 @@ pub struct LeastTurn {
     pub length: Option<f64>,
     /// The least radius that is tested, metres.
     pub from: f64,
-    /// The radius of the first arc over that of the second.
+    /// The radius of the first arc over the radius of the second.
     pub arc_ratio: f64,
     /// The event with the radius `value_lo`; `None` if nothing is shown.
     pub limit: Option<TurnLimit>,

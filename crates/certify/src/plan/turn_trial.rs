@@ -232,7 +232,7 @@ impl Family<'_> {
         (least.value <= 0.0).then_some(Witness::Overlap { pair, head, radius, rate: 0.0 })
     }
 
-    /// Returns the same event with another radius, with several pivots, each found when it is asked for.
+    /// Returns the same event with another radius, with several pivots, each found on request.
     pub fn follow(&self, radius: f64, witness: &Witness) -> Box<dyn Iterator<Item = Witness> + '_> {
         let past = self.past(radius, witness.place());
         match *witness {
