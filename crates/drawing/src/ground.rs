@@ -51,8 +51,8 @@ pub fn group(ground: &Ground, camera: &Camera, palette: &Palette) -> Group {
     Group::new().set("id", "ground").add(rims).add(keep_outs).add(shapes.set("id", "obstacles"))
 }
 
-/// Returns the outline of a keep-out: those of the sides of a shape one over the other. The keep-out covers their inner
-/// parts.
+/// Returns the outline of a keep-out: the outlines of the sides of a shape, one over the other. The keep-out covers
+/// their inner parts.
 fn rim(shape: &Shape, keep_out: f64) -> Vec<Path> {
     let radius = metres(keep_out);
     let around = |[from, to]: [Point; 2]| {

@@ -1,5 +1,5 @@
-//! The names of benches in a picture. A line leads from each to its own board, so that no name can be read as that of
-//! another board.
+//! The names of benches in a picture. A line leads from each to its own board, so that no name can be read as the name
+//! of another board.
 //!
 //! The rule is that of the page (`crates/outputs/src/view/label_layout.js`) without its exception for a name beside its
 //! board. Lengths are sheet units, y downward.
@@ -168,7 +168,7 @@ impl BoardMap {
 }
 
 /// Returns the names with their lines, the most important first in `names`. `boards` are all boards of the picture,
-/// `marks` the places of events, `hole_inset` is that of the team, metres.
+/// `marks` the places of events, `hole_inset` is the team's, metres.
 pub fn labels(
     names: &[Name],
     boards: &[(usize, Board)],
@@ -222,7 +222,7 @@ pub fn labels(
                 lines.push(line);
                 group.add(label(name, &words, &line, palette))
             }
-            // A number on the board itself cannot be read as that of another board.
+            // A number on the board itself cannot be read as the number of another board.
             None => group.add(badge(name, board.centre, palette)),
         };
     }

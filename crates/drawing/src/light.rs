@@ -18,7 +18,7 @@ pub struct Light {
     pub side: String,
     /// The light on the ground: near the board, then outwards.
     pub pool: [String; 4],
-    /// The light on the paving as red, green and blue of white; `None` for that of the paving itself.
+    /// The light on the paving as red, green and blue of white; `None` for the light of the paving itself.
     pub tint: Option<[u8; 3]>,
 }
 

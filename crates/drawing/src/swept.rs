@@ -22,7 +22,7 @@ pub const TOLERANCE: f64 = 1e-3;
 /// much.
 const STRAIGHT: f64 = 0.1 * TOLERANCE;
 
-/// Metres of the grid to which corners are rounded: on a grid, the union has no corner but those of its rings.
+/// Metres of the grid to which corners are rounded: on a grid, the union has no corner but the corners of its rings.
 const GRID: f64 = 1e-6;
 
 /// Polygons that are united first: few, since the positions of a board overlap many others and every edge crosses
@@ -90,7 +90,7 @@ fn signed_area(ring: &[[f64; 2]]) -> f64 {
     ring.iter().zip(next).map(|([x, y], [u, v])| 0.5 * ((x - x0) * (v - y0) - (u - x0) * (y - y0))).sum()
 }
 
-/// Returns true if a ring is narrower than the tolerance: the outline does not tell it from a line.
+/// Returns true if a ring is narrower than the tolerance: the outline does not distinguish the ring from a line.
 fn is_line(ring: &Ring) -> bool {
     let next = ring.iter().cycle().skip(1);
     let around: f64 = ring.iter().zip(next).map(|([x, y], [u, v])| (x - u).hypot(y - v)).sum();

@@ -127,8 +127,8 @@ const EXACT_LINK_ERROR: f64 = 1e-9;
 impl ClearanceMonitor {
     /// Creates a monitor for chains of `team` that follow `path` as exactly as `table` promises.
     ///
-    /// From the table it makes a table of bounds, of at most 128 MB and in at most about five seconds. If these limits
-    /// do not suffice, the monitor works without it.
+    /// The monitor makes a table of bounds from `table`, of at most 128 MB and in at most about five seconds. If these
+    /// limits do not suffice, the monitor works without a table of bounds.
     pub fn new(path: &Path, team: Team, table: &FollowerTable) -> Self {
         let table_of_bounds = BoundTable::new(path, &team, table).map(Box::new);
         Self { table: table_of_bounds, ..Self::without_table(team, 2.0 * table.accuracy()) }

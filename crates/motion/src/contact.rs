@@ -2,9 +2,9 @@
 //! steps that are proved to contain no nearer pair. A step is halved if the proof fails.
 //!
 //! In: a path, a team, the places where handles turn round ([`Singularities`](super::singularities::Singularities)),
-//! two places of the head. Out: an [`Event`] or a [`LeastClearance`], and how far the search came. The timeline,
-//! `check` and `plan pitch` call it. The search of `stepped_search` serves boards of one team, boards of two dragons
-//! ([`between`]), and boards and obstacles (`ground`).
+//! two places of the head. Out: an [`Event`] or a [`LeastClearance`], and the place up to which the search came. The
+//! timeline, `check` and `plan pitch` call it. The search of `stepped_search` serves boards of one team, boards of two
+//! dragons ([`between`]), and boards and obstacles (`ground`).
 //!
 //! **How far handles move.** Handle 1 turns round only if the head is at a head turn. Handle k + 1 turns round only if
 //! handle k turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the
@@ -67,7 +67,7 @@ use super::ground::Ground;
 use configuration::Configuration;
 pub use ground::{ObstacleClearance, Touch};
 
-/// The result of a search, and how far it came.
+/// The result of a search, and the place up to which the search came.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found<T> {
     /// The result.

@@ -34,8 +34,8 @@ pub struct Dragon {
 }
 
 impl Dragon {
-    /// Returns the time of its own motion at a time of the show, and true if it moves then. It stands at its start
-    /// before its delay has passed, and at its path's end from then on.
+    /// Returns the time of the dragon's own motion at a time of the show, and true if the dragon moves then. The dragon
+    /// stands at its start before its delay has passed, and at its path's end after its motion.
     pub fn own_time(&self, show_time: f64) -> (f64, bool) {
         let own = show_time - self.delay;
         let end = self.motion.time_at(self.motion.path().length());
@@ -58,7 +58,7 @@ impl Dragon {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ensemble {
     dragons: Vec<Dragon>,
-    /// The number of each dragon's first handle, and that of all handles.
+    /// The index of each dragon's first handle, and the number of all handles.
     first_handles: Vec<usize>,
 }
 
@@ -195,7 +195,7 @@ impl Ensemble {
         Timeline::new(events, timeline.searched_until().map(|until| until + delay))
     }
 
-    /// Returns the first contact of boards of two dragons up to a time, and how far the search came.
+    /// Returns the first contact of boards of two dragons up to a time, and the time up to which the search came.
     fn contact_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Result<(Option<TimedEvent>, f64), NoFollower> {
         let found = self.singularities();
         let moving = self.moving(&found)?;
@@ -207,7 +207,7 @@ impl Ensemble {
                 until = until.min(contact.searched_until);
             }
             if let Some(meeting) = contact.value {
-                // Of contacts at one time, as at the start, the deepest.
+                // The first contact, or the deepest of contacts at one time, as at the start.
                 let is_first = first.is_none_or(|(other, _)| {
                     meeting.time < other.time || (meeting.time == other.time && meeting.value < other.value)
                 });
@@ -385,9 +385,9 @@ impl Ensemble {
 /// The least clearances of a show of several dragons.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastClearances {
-    /// That of two boards of one dragon; `None` if there are no two, or the search failed.
+    /// The least clearance of two boards of one dragon; `None` if there are no two, or the search failed.
     pub own: Option<TimedClearance>,
-    /// That of boards of two dragons; likewise.
+    /// The least clearance of boards of two dragons; `None` likewise.
     pub between: Option<TimedClearance>,
 }
 

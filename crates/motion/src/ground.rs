@@ -14,7 +14,7 @@ pub const BOUNDARY: &str = "boundary";
 /// A shape from which every board stays away, or the boundary inside which it stays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
-    /// The name; that of the boundary is [`BOUNDARY`].
+    /// The name; the boundary's name is [`BOUNDARY`].
     pub name: String,
     /// The shape.
     pub shape: Shape,

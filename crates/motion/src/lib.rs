@@ -64,8 +64,8 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Returns the greatest difference, metres, between the clearance of a frame and the clearance of exact motion. It
-    /// is twice the displacement of a board's points for handles with the error that the solver promises.
+    /// Returns the greatest difference, metres, between the clearance of a frame and the clearance of exact motion. The
+    /// difference is twice the displacement of a board's points for handles with the error that the solver promises.
     pub fn clearance_error(&self, team: &Team) -> f64 {
         let factor = |link| Board::displacement_factor(link, team.hole_inset, team.width);
         let factor = factor(team.link(0)).max(factor(team.link(1)));
@@ -348,8 +348,8 @@ impl Motion {
         }
     }
 
-    /// Makes a table for the clearance of frames from another solver. It is the most exact table, or a coarse table if
-    /// the exact table would be too large.
+    /// Makes a table for the clearance of frames from another solver. The table is the most exact one, or a coarse one
+    /// if that would be too large.
     fn table_for_clearance(&self) -> Option<FollowerTable> {
         let exact = || FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted);
         let coarse = || {
@@ -401,7 +401,7 @@ impl Motion {
         self.timed(events, searched_until)
     }
 
-    /// Returns the first touch of each obstacle up to a place of the head, and how far the search came.
+    /// Returns the first touch of each obstacle up to a place of the head, and the place up to which the search came.
     fn touches(&self, found: &Singularities, until: f64, progress: &mut dyn FnMut(f64)) -> (Vec<Event>, f64) {
         let ground = self.ground.in_own_frame(&self.placement);
         let mut budget = Budget::new(CONTACT_BUDGET, progress);

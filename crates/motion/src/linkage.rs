@@ -110,7 +110,7 @@ mod tests {
             let found = path.arc_length(rear, front);
             prop_assert!(((path.point(rear) - path.point(front)).norm() - link).abs() < 1e-13 * (1.0 + link));
             let pose = link_pose(&path, front, rear, link);
-            // Where the path turns back just short of the link, sampling finds too few places.
+            // Sampling finds too few places where the path turns back just short of the link.
             let sampled = first_by_sampling(&path, at, link, 1.5 * found + link);
             let grazing = pose.rear_cosine.abs() < 0.05;
             prop_assert!(sampled.is_some_and(|sampled| found <= sampled + 1e-6 && (grazing || sampled <= found + 1e-6)),

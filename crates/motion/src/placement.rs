@@ -1,8 +1,8 @@
 //! [`Placement`]: where a path stands on the stage.
 //!
 //! A motion is solved, searched and proved in its path's own coordinates, so that it has the same digits and times
-//! anywhere on the stage. Whatever leaves it is placed: chains by [`Motion::solver`](crate::Motion::solver) or by the
-//! show, events and outlines by [`Motion`](crate::Motion).
+//! anywhere on the stage. The results of the motion are placed: chains by [`Motion::solver`](crate::Motion::solver) or
+//! by the show, events and outlines by [`Motion`](crate::Motion).
 
 use std::f64::consts::{PI, TAU};
 
@@ -69,8 +69,9 @@ impl Placement {
     /// The placement of a path that stands at its own coordinates.
     pub const IDENTITY: Self = Self { turn: None, origin: Vector::new(0.0, 0.0) };
 
-    /// Creates the placement that puts the origin of the path's coordinates at `origin`, metres. It turns the path by
-    /// `rotation_turns` turns counter-clockwise about that point, after a reflection of y if `mirror` is true.
+    /// Creates the placement that puts the origin of the path's coordinates at `origin`, metres. The placement turns
+    /// the path by `rotation_turns` turns counter-clockwise about that point, after a reflection of y if `mirror` is
+    /// true.
     pub fn new(origin: Vector, rotation_turns: f64, mirror: bool) -> Self {
         // Whole turns are nothing, and quarters are exact.
         let part = rotation_turns - rotation_turns.round();
@@ -87,7 +88,8 @@ impl Placement {
     }
 
     /// Returns the placement that maps the spiral about the origin to a spiral of an outline. The beginning, the
-    /// heading and the side of the curvature say where the outline's spiral lies. Returns `None` for other curves.
+    /// heading and the side of the curvature determine the place of the outline's spiral. Returns `None` for other
+    /// curves.
     pub fn of_spiral(outline: &SegmentOutline) -> Option<Self> {
         let (spiral, first, curvature) = outline.kind.spiral()?;
         if curvature.is_nan() {

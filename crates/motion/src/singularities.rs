@@ -232,7 +232,8 @@ impl SingularitySearch<'_> {
         first.map_or(travelled, |digits| place(digits + SAFE_DIGITS))
     }
 
-    /// Returns the rear handle of a link; if rounding leaves none in the last digits, that of the last place before.
+    /// Returns the rear handle of a link; if rounding leaves none in the last digits, the handle at the last place
+    /// before.
     fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
         let digit = f64::EPSILON * (travelled + self.team.link(link));
         let earlier = (0..40).map(|power| travelled - digit * 2f64.powi(power));

@@ -42,7 +42,7 @@ pub struct TimedObstacleClearance {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
     events: Vec<TimedEvent>,
-    /// The path ends of dragons that stand while others go on, in order of time.
+    /// The path ends of dragons that stand while others continue, in order of time.
     standing: Vec<TimedEvent>,
     searched_until: Option<f64>,
 }
@@ -60,14 +60,15 @@ impl Timeline {
         Self { events, standing: Vec::new(), searched_until }
     }
 
-    /// Returns the timeline with the path ends of dragons that stand while others go on. They change no state.
+    /// Returns the timeline with the path ends of dragons that stand while others continue. These path ends change no
+    /// state.
     pub fn with_standing(mut self, mut standing: Vec<TimedEvent>) -> Self {
         standing.sort_by(|a, b| a.time.total_cmp(&b.time));
         self.standing = standing;
         self
     }
 
-    /// Returns all events in order of time: also the path ends of dragons that stand while others go on.
+    /// Returns all events in order of time: also the path ends of dragons that stand while others continue.
     pub fn all(&self) -> Vec<TimedEvent> {
         let mut all = self.events.clone();
         for end in &self.standing {

@@ -1,4 +1,5 @@
-//! The show as the contract of `control` describes it: periods counted one by one, commands executed as the table says.
+//! The show as the contract of `control` describes it: periods counted one by one, commands executed as the table
+//! states.
 //!
 //! Independent of the show clock, which computes each period from the beginning of its stretch. Used by the tests of
 //! that clock and by the simulated nights.

@@ -20,7 +20,8 @@ use bench_dragon_show::solve_at_or_just_before;
 
 /// The publishing rates, hertz.
 pub const RATES: [f64; 9] = [1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 240.0, 1000.0];
-/// Length of the window of display samples, seconds. It ends at the last whole second before the end of the show.
+/// Length of the window of display samples, seconds. The window ends at the last whole second before the end of the
+/// show.
 pub const WINDOW: f64 = 2.0;
 /// Number of further display samples, spread evenly over the show.
 pub const SPREAD_SAMPLES: usize = 20;
@@ -94,7 +95,7 @@ pub struct Display {
 /// The error of a reader of a stream, and the cost of the stream.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DisplayMeasurement {
-    /// Always `display`: distinguishes this line from the lines of the solvers.
+    /// Always `display`, which distinguishes this line from the lines of the solvers.
     pub r#type: &'static str,
     /// The reader.
     pub reader: Reader,
@@ -192,7 +193,7 @@ struct DisplaySample {
     chain: Chain,
 }
 
-/// Returns the safe solver's chains. They always have velocities, which correct for the rounding of the clock.
+/// Returns the safe solver's chains. The chains always have velocities, which correct for the rounding of the clock.
 fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<DisplaySample>, String> {
     let exact = scene.motion.with_method(Method::Newton).map_err(|error| error.to_string())?;
     let mut solver = exact.solver(Velocities::Computed).solver;

@@ -180,8 +180,8 @@ struct ContactErrors {
     paper: f64,
 }
 
-/// Returns the gap of the two boards in the reference at the contact's time, divided by its closing speed. `None`
-/// without a contact or with one at the very start.
+/// Returns the errors of the contact's time. The exact motion's error is the gap of the two boards in the reference at
+/// that time, divided by the closing speed. Returns `None` without a contact, or if the contact is at the very start.
 fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactErrors>, String> {
     let Some(contact) = timeline.find(EventKind::Contact) else { return Ok(None) };
     let (Some(a), Some(b)) = (contact.event.bench_a, contact.event.bench_b) else { return Ok(None) };

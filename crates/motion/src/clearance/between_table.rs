@@ -1,5 +1,5 @@
-//! The boards of two dragons that can be the nearest, for every time of a show. They are computed before the show, so
-//! that a frame tests only these.
+//! The boards of two dragons that can be the nearest, for every time of a show. These boards are listed before the
+//! show, so that a frame tests only the listed boards.
 //!
 //! The time is divided into equal cells. Throughout a cell every handle is near a quadratic polynomial of the cell's
 //! time. The polynomials give a lower and an upper bound of the distance of every two boards (see [`super::moving`]).
@@ -313,8 +313,8 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Returns a dragon's handles on the stage throughout a cell, head first, and what they assume. `travelled` has the
-/// metres of the head at a share of the cell.
+/// Returns a dragon's handles on the stage throughout a cell, head first, and the assumptions of their polynomials.
+/// `travelled` has the metres of the head at a share of the cell.
 fn handles(dragon: &TabledDragon<'_>, travelled: &dyn Fn(f64) -> f64) -> Option<(State, Vec<Quadratic>)> {
     let TabledDragon { team, path, placement, table, .. } = dragon;
     let alpha = |share: f64| table.second_handle(travelled(share)).map(|(alpha, _)| alpha);

@@ -1,13 +1,13 @@
-//! Lower bounds of the distance of boards to those behind them, for every place on the path. They are computed before
-//! the show, so that a frame tests only the few pairs that can be the nearest.
+//! Lower bounds of the distance of boards to the boards behind them, for every place on the path. The bounds are
+//! computed before the show, so that a frame tests only the few pairs that can be the nearest.
 //!
 //! If the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
 //! [`crate::solve::table::rows`]. So the distances of a body bench to those behind it depend on the alpha of its front
 //! handle alone. Every row of T is divided into [`CELLS`] equal cells. While one handle is in a cell, the next is in
-//! the same cell of the next row. Each (row, cell) has a list of the benches that can be near. It has a proven lower
-//! bound of the signed distance to each (see [`super::moving`]), in ascending order; the last entry stands for all
-//! others. Far behind, where boards hardly move against each other while all advance by a link, one list is valid for
-//! all cells of a row.
+//! the same cell of the next row. Each (row, cell) has a list of the benches that can be near. The list has a proven
+//! lower bound of the signed distance to each bench (see [`super::moving`]), in ascending order. The last entry stands
+//! for all others. Far behind, where boards hardly move against each other while all advance by a link, one list is
+//! valid for all cells of a row.
 //!
 //! The rows are grouped into blocks. The least bound of each block is also kept cell by cell. So the least bounds of a
 //! whole chain are adjacent in memory. A frame reads only the blocks whose least bound is within its limit.
@@ -147,7 +147,7 @@ impl BoundTable {
         }
         let mut is_fine = vec![false; blocks];
         fine.iter().for_each(|block| is_fine[*block] = true);
-        // The rear handles, too. One row more has that of the last board.
+        // The rear handles, too: one row more has the rear handle of the last board.
         let is_near = |row: usize| is_fine[row / BLOCK] || is_fine[row.saturating_sub(1) / BLOCK];
         let end = end_of_near(follower.rows(), is_near, team.link(1), builder.longest_distance()) + 1;
         for cell in 0..CELLS {

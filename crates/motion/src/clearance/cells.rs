@@ -1,5 +1,5 @@
-//! Places of the handles and the head while the second handle is in a cell of the table. They are quadratic polynomials
-//! of the cell's time with error bounds. Used only to make the table.
+//! Places of the handles and the head while the second handle is in a cell of the table. The places are quadratic
+//! polynomials of the cell's time with error bounds. Used only to make the table.
 
 use super::bounds::CELLS;
 use super::moving::Quadratic;
@@ -148,7 +148,7 @@ fn largest_difference(a: [f64; 6], (middle, half): (f64, f64), b: [f64; 3], (tim
 }
 
 /// Returns the head for each cell, with alpha of the second handle at the beginning of the cell. The index is the
-/// number of the cell over all rows. Of several places the first is returned. The places need not be exact.
+/// number of the cell over all rows. The first of several places is returned. The places need not be exact.
 pub(super) fn head_grid_points(path: &Path, follower: &FollowerTable, link: f64) -> Option<Vec<Option<HeadGridPoint>>> {
     let cells = |travelled: f64| {
         let (alpha, rate) = follower.second_handle(travelled)?;

@@ -11,12 +11,12 @@
 //! with the middles c, half the length L_b and width W_b of b, and h_a(w) = L_a |p| + W_a |q|, which is constant. The
 //! signed distance is the greatest such gap over all w, by the separating axis theorem where the boards overlap. So
 //! each gap is a lower bound. The gap is the least of four functions, one for each corner of b. Each function is a sum
-//! of products of two known quadratics. Of every product the powers up to t^2 are kept. The others are bounded by their
-//! coefficients. Let A and B have errors e and f, and let B be a unit vector. Then A . B has an error of at most e +
-//! |A| f. The rest is the least value of a quadratic between -1 and 1. Motion of b along a does not weaken the bound,
-//! at any speed.
+//! of products of two known quadratics. The powers up to t^2 of every product are kept. The other powers are bounded by
+//! their coefficients. Let A and B have errors e and f, and let B be a unit vector. Then A . B has an error of at most
+//! e + |A| f. The rest is the least value of a quadratic between -1 and 1. Motion of b along a does not weaken the
+//! bound, at any speed.
 //!
-//! From above the distance is bounded by that of any two points, one fixed to each board.
+//! The distance of any two points, one fixed to each board, bounds the distance of the boards from above.
 
 use super::corner_reach;
 use crate::model::board::Board;

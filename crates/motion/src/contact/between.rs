@@ -101,7 +101,8 @@ pub fn guess_least_clearance(
     }
 }
 
-/// Finds the least clearance of two dragons between two times, if it is below that of `best` by more than rounding.
+/// Finds the least clearance of two dragons between two times, if it is below the clearance of `best` by more than
+/// rounding.
 ///
 /// # Errors
 /// [`NoFollower`] if a configuration inside the motion cannot be solved.
@@ -200,8 +201,8 @@ impl<'s, 'a, 'b> BetweenSearch<'s, 'a, 'b> {
         !least
     }
 
-    /// Returns both dragons at a time, as far back as `benches`, or in full; what stands is taken from `before`.
-    /// `None` if rounding prevents a solution at the motion's end.
+    /// Returns both dragons at a time, as far back as `benches`, or in full; a dragon that stands is taken from
+    /// `before`. `None` if rounding prevents a solution at the motion's end.
     fn snapshot(
         &mut self,
         time: f64,
@@ -399,7 +400,7 @@ fn limit_below(least: Meeting) -> f64 {
     least.value - 8.0 * f64::EPSILON * (least.place.coords.norm() + 1.0)
 }
 
-/// Returns how many of the foremost benches of each dragon the pairs have.
+/// Returns the number of each dragon's foremost benches, up to the last bench of the pairs.
 fn benches_of(pairs: &[Pair]) -> [usize; 2] {
     [0, 1].map(|k| pairs.iter().map(|pair| pair[k] + 1).max().unwrap_or(0))
 }

@@ -1,4 +1,4 @@
-//! The pairs of boards that a step of the search must test, and how far back the chain must be solved for them.
+//! The pairs of boards that a step of the search must test, and the part of the chain that must be solved for them.
 
 use crate::model::path::Param;
 
@@ -8,9 +8,9 @@ use super::search::ChainSearch;
 use super::stepped_search::{Halt, may_reach};
 
 impl ChainSearch<'_, '_, '_> {
-    /// Returns true if pairs without boards 0 and 1 matter. They matter if handle 2 is behind the start of handle 1, or
-    /// may come there within `excursion` metres of these configurations. Even then they do not matter if handle 2 stays
-    /// behind the quiet place.
+    /// Returns true if pairs without boards 0 and 1 matter. These pairs matter if handle 2 is behind the start of
+    /// handle 1, or may come there within `excursion` metres of these configurations. Even then they do not matter if
+    /// handle 2 stays behind the quiet place.
     pub(super) fn all_pairs(&self, ends: &[&Configuration], excursion: f64) -> bool {
         let visited = |at: Param| !self.is_behind(at, self.second_handle, -excursion);
         let quiet = |at: Param| self.quiet.is_some_and(|quiet| self.is_behind(at, quiet, excursion));

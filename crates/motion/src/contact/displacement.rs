@@ -86,8 +86,8 @@ impl Displacements {
         Ok(())
     }
 
-    /// Returns the places at which the follower of `handle` turned round. They are behind each turning place of the
-    /// handle, and behind each place it passed over at which a follower turns.
+    /// Returns the places at which the follower of `handle` turned round. These places are behind each turning place of
+    /// the handle, and behind each place it passed over at which a follower turns.
     fn followers_of_turns(
         &mut self,
         chain: &ConservativeAdvancement,
@@ -233,7 +233,7 @@ fn turned((before, after): (&Configuration, &Configuration), handle: usize) -> f
     after.places[handle].at.minus(before.places[handle].at)
 }
 
-/// The way in which the displacements of a board's two handles bound those of its points.
+/// The way in which the displacements of a board's two handles bound the displacements of its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Weights {
     /// Upper bound for one point of the board: sufficient to exclude a clearance above zero.

@@ -79,7 +79,7 @@ struct GroundSearch<'s, 'a, 'b> {
     rounding_from: f64,
 }
 
-/// The results of a search and how far it came, metres of travel.
+/// The results of a search, and the metres of travel up to which the search came.
 type Results<T> = Result<(Vec<Option<T>>, f64), NoFollower>;
 
 /// See [`ConservativeAdvancement::first_touches`].
@@ -390,7 +390,7 @@ impl<'s, 'b: 's> SteppedSearch<'s, 'b> for GroundSearch<'s, '_, 'b> {
     }
 }
 
-/// Returns how many of the foremost benches the meetings have.
+/// Returns the number of the foremost benches, up to the last bench of the meetings.
 fn benches_of(meetings: &[Meeting]) -> usize {
     meetings.iter().map(|&(bench, _)| bench + 1).max().unwrap_or(0)
 }
@@ -408,7 +408,7 @@ fn convex_bound(first: (f64, Point, Point), last: (f64, Point, Point), way: Vect
     } else if rises <= 0.0 {
         last.0
     } else {
-        // Where the two tangents meet.
+        // The share at which the two tangents meet.
         let share = (last.0 - rises - first.0) / (falls - rises);
         first.0 + falls * share.clamp(0.0, 1.0)
     }

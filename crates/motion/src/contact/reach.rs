@@ -1,5 +1,5 @@
-//! Limits of the search. The first limit is how far back along the path a board can come near the foremost boards. The
-//! second limit is the place behind which no boards come near each other.
+//! Limits of the search. The first limit is the rearmost place of the path from which a board can come near the
+//! foremost boards. The second limit is the place behind which no boards come near each other.
 
 use crate::model::Point;
 use crate::model::curve::{Curve, ReachedDisc};
@@ -8,7 +8,7 @@ use crate::model::path::{Param, Path};
 use crate::model::team::Team;
 
 /// A circle about some boards, and the circle about the origin that holds them. The origin is the centre of every
-/// spiral but those of routes.
+/// spiral but the spirals of routes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reach {
     pub centre: Point,

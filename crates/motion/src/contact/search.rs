@@ -1,4 +1,4 @@
-//! The search of one chain: the pairs that matter in each step, and what is found.
+//! The search of one chain: the pairs that matter in each step, and the results.
 
 use crate::event::{Budget, Event};
 use crate::linkage::NoFollower;
@@ -236,7 +236,7 @@ impl<'s, 'b: 's> SteppedSearch<'s, 'b> for ChainSearch<'s, '_, 'b> {
     }
 }
 
-/// Returns how many of the foremost benches the pairs have.
+/// Returns the number of the foremost benches, up to the last bench of the pairs.
 fn benches_of(pairs: &[Pair]) -> usize {
     pairs.iter().map(|&(_, b)| b + 1).max().unwrap_or(0)
 }

@@ -96,7 +96,7 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
         to: f64,
     ) -> Result<(Self::Bodies, Vec<Self::Pair>), Halt>;
 
-    /// Returns the bodies of `pairs` at a coordinate within the step from `before`. Bodies that stand may be those of
+    /// Returns the bodies of `pairs` at a coordinate within the step from `before`. Bodies that stand may be taken from
     /// `before`. Returns `None` if rounding prevents a solution at the motion's end.
     fn solve_within(
         &mut self,
@@ -115,8 +115,8 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
     /// Returns the clearance of a pair, metres.
     fn clearance(&self, at: &Self::Bodies, pair: Self::Pair) -> f64;
 
-    /// Records the deepest pair if it touches, or the nearest pair if it is below the least clearance so far; with
-    /// obstacles, that of each. Returns true if nothing is left to search.
+    /// Records the deepest pair if it touches, or the nearest pair if it is below the least clearance so far. With
+    /// obstacles, the pair of each obstacle is recorded. Returns true if nothing is left to search.
     fn record(&mut self, at: &Self::Bodies, pairs: &[Self::Pair]) -> Result<bool, Halt>;
 
     /// Searches from one coordinate to another. Returns the coordinate up to which the result is proved.

@@ -1,7 +1,8 @@
 //! [`Curve`]: the contract of every curve that a path is made of. Units and formulas of a curve are in its own file.
 //!
-//! Every curve has a coordinate: metres on a line, radians on an arc, the polar angle on a spiral. It is kept as two
-//! doubles, so that a place far along loses no digits. Its coordinate may grow or fall in the direction of travel.
+//! Every curve has a coordinate: metres on a line, radians on an arc, the polar angle on a spiral. The coordinate is
+//! kept as two doubles, so that a place far along loses no digits. The coordinate may grow or fall in the direction of
+//! travel.
 //!
 //! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`. It also needs a variant of
 //! [`Segment`](super::segment::Segment) with its outline, and one of `description` that constructs it. No other code of
@@ -178,9 +179,9 @@ pub trait Curve {
     /// the metres of travel. `None` if there is no such place, or none is found.
     fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64>;
 
-    /// Returns half the greatest second derivative, by the coordinate, of the squared distance to a point F.
+    /// Returns an upper bound of half the second derivative, by the coordinate, of the squared distance to a point F.
     ///
-    /// It holds where that distance is at most `distance` metres and the place at most
+    /// The bound holds where that distance is at most `distance` metres and the place within
     /// [`longest_step`](Self::longest_step) behind `at`: |p'|^2 + (p - F) . p'' <= |p'|^2 + distance |p''|.
     fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64;
 

@@ -22,7 +22,7 @@ pub enum PathDescription {
         pitch: f64,
         /// Metres from the centre at which the turn begins.
         turn_radius: f64,
-        /// The radius of the first arc over that of the second.
+        /// The radius of the first arc over the radius of the second.
         arc_ratio: f64,
         /// Metres of travel before the turn.
         lead_in: f64,

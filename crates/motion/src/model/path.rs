@@ -114,9 +114,9 @@ impl Path {
         }
     }
 
-    /// Creates the path inward along the spiral r = a theta (a = `pitch` / 2 pi) up to `turn_radius`. The path goes on
-    /// through an S of two arcs to the opposite point. From there it leads outward along the same spiral turned by half
-    /// a turn. Travel starts `lead_in` metres before the turn and ends `lead_out` metres after it.
+    /// Creates the path inward along the spiral r = a theta (a = `pitch` / 2 pi) up to `turn_radius`. The path
+    /// continues through an S of two arcs to the opposite point. From there it leads outward along the same spiral
+    /// turned by half a turn. Travel starts `lead_in` metres before the turn and ends `lead_out` metres after it.
     ///
     /// With R = `turn_radius` the chords of both arcs lie on the diameter through the two ends. They make the same
     /// angle atan(R/a) with the tangents there. So both arcs turn by twice that angle. Their radii sum to sqrt(R^2 +
@@ -366,8 +366,8 @@ impl Route {
         self.piece(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
     }
 
-    /// Adds an Archimedean spiral of `pitch` metres per turn. It begins `radius` metres from its centre, which is on
-    /// one side, and leads `turns` turns around it.
+    /// Adds an Archimedean spiral of `pitch` metres per turn. The spiral begins `radius` metres from its centre, which
+    /// is on one side, and leads `turns` turns around it.
     ///
     /// The tangent has the polar angle theta + atan(theta), but for a constant.
     pub fn spiral(
@@ -400,8 +400,8 @@ impl Route {
         Vector::new(cosine, sine)
     }
 
-    /// Adds the `length` metres of a curve from one place to another. It begins at the route's end in the route's
-    /// direction there, and turns by `turned` turns to the left.
+    /// Adds the `length` metres of a curve from one place to another. The piece begins at the route's end in the
+    /// route's direction there, and turns by `turned` turns to the left.
     pub fn piece(mut self, segment: Segment, first: Coordinate, last: Coordinate, length: f64, turned: f64) -> Self {
         let before = self.path.length();
         self.path.push(segment, first, last, length);

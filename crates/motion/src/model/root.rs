@@ -34,7 +34,7 @@ pub fn increasing_root(function: impl Fn(f64) -> (f64, f64), low: f64, high: f64
 }
 
 /// Returns the place within `low..=high` where `holds` changes from false to true, to the last bit: the least number
-/// known to hold. It assumes that `holds(low)` is false and `holds(high)` is true.
+/// known to hold. `holds(low)` must be false, and `holds(high)` true.
 pub fn bisect_predicate(mut holds: impl FnMut(f64) -> bool, low: f64, high: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     // 1,100 halvings exhaust the doubles between any two finite numbers.

@@ -1,5 +1,5 @@
-//! Shapes that stand on the stage, and the signed distance of a board to each. The ground calls it; it is independent
-//! of team, path and keep-out.
+//! Shapes that stand on the stage, and the signed distance of a board to each. The ground calls this module, which is
+//! independent of team, path and keep-out.
 //!
 //! The signed distance is positive apart, in metres: the Euclidean distance. It is negative where the board and the
 //! shape overlap: minus the least translation that frees the board (`escape`). The shape of a boundary is the plane
@@ -36,13 +36,14 @@ pub enum ShapeKind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
     kind: ShapeKind,
-    /// The corners; of a circle, its centre.
+    /// The corners, or the centre of a circle.
     points: Vec<Point>,
     /// Metres; 0 unless the shape is a circle.
     radius: f64,
-    /// Of a convex shape: 1 if its corners stand counter-clockwise, -1 if clockwise, 0 of a circle or a segment.
+    /// The sense of a convex shape: 1 if its corners stand counter-clockwise, -1 if clockwise, 0 for a circle or a
+    /// segment.
     convex: Option<f64>,
-    /// Of a polygon or a boundary: 1 if the free side of each of its sides is on the right, -1 if on the left.
+    /// The free side of each side of a polygon or a boundary: 1 if on the right, -1 if on the left.
     outside: f64,
     /// A circle about the outline.
     bounding_centre: Point,
@@ -294,7 +295,7 @@ impl Rectangle {
         hypot(beyond.x.max(0.0), beyond.y.max(0.0))
     }
 
-    /// Returns the signed separation of the box about a segment, metres: never more than that of the segment.
+    /// Returns the signed separation of the box about a segment, metres: never more than the separation of the segment.
     fn separation_of_box(&self, from: Vector, to: Vector) -> f64 {
         let gap = |one: f64, other: f64, half: f64| one.min(other).max(-one.max(other)) - half;
         gap(from.x, to.x, self.half.x).max(gap(from.y, to.y, self.half.y))
@@ -321,7 +322,7 @@ impl Rectangle {
     }
 
     /// Returns the least distance between a corner and the segment, or between an end and the rectangle, and these
-    /// points, that of the rectangle first.
+    /// points, the rectangle's first.
     fn nearest(&self, from: Vector, to: Vector) -> (f64, Vector, Vector) {
         let ends = [from, to].map(|end| {
             let on_board = end.zip_map(&self.half, |coordinate, half| coordinate.clamp(-half, half));

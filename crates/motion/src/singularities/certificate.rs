@@ -206,8 +206,8 @@ impl Link<'_> {
     }
 
     /// Returns an upper bound of |q_u| = |K n . (P(s) - P(u)) - 1|, the change of q per metre of the rear handle
-    /// between two places. They are `apart` metres from each other, with distances up to `reach`. On one segment it
-    /// follows from the values at the corners and their rates of change, |K (K q + n . T(s))| at most.
+    /// between two places. The places are `apart` metres from each other, with distances up to `reach`. On one segment
+    /// the bound follows from the values at the corners and their rates of change, |K (K q + n . T(s))| at most.
     fn largest_second_derivative(&self, ends: [&Distances; 2], apart: f64, step: f64, reach: f64) -> f64 {
         let [far, near] = ends;
         let curvature = far.curvature.max(near.curvature);

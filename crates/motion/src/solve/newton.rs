@@ -1,6 +1,6 @@
 //! The safe solver: exact motion along the arc, each follower found by a bracketed Newton iteration.
 //!
-//! It is right wherever there is a solution, and every faster solver falls back to it.
+//! The safe solver is right wherever there is a solution, and every faster solver falls back to it.
 
 use super::{Chain, ChainMut, Solver, Velocities};
 use crate::linkage::{NoFollower, follower, link_pose};

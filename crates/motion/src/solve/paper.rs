@@ -61,7 +61,7 @@ impl Paper {
     }
 }
 
-/// The head's polar angle by Euler steps. It stores the last angle, so that a running show computes only the steps
+/// The head's polar angle by Euler steps. The last angle is stored, so that a running show computes only the steps
 /// since. The angle after n steps does not depend on earlier calls.
 #[derive(Debug, Clone)]
 struct EulerHead {

@@ -2,8 +2,9 @@
 //!
 //! In: a path by the numbers of the scene, a team and a time. Out: every handle as sums of two doubles. Points are
 //! Cartesian, and the condition on a follower is the plain distance of two points; no formula is rearranged to save
-//! digits. It shares only names with the path, the linkage and the solvers in doubles. It takes some milliseconds per
-//! frame. `trade` and tests call it; a scene asks it for the turns of a spiral whose length is given.
+//! digits. The method shares only names with the path, the linkage and the solvers in doubles. The method takes some
+//! milliseconds per frame. `trade` and tests call it; a scene computes with it the turns of a spiral whose length is
+//! given.
 
 mod curve;
 mod path;
@@ -121,7 +122,7 @@ impl Reference {
     fn follower(&mut self, segment: usize, front: &RealParam, link: f64) -> Result<(usize, RealParam), NoFollower> {
         let (mut segment, guess) = self.guess(segment, front, link)?;
         let mut place = self.settled(segment, front, guess.clone(), link)?;
-        // Near a junction the place may be on a segment next to that of the guess.
+        // Near a junction the place may be on a segment next to the segment of the guess.
         for _ in 0..self.path.segments() {
             let Some((neighbour, junction)) = self.neighbour(segment, &place) else { break };
             segment = neighbour;

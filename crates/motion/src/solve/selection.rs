@@ -57,7 +57,8 @@ const SPEED_PER_LINK: f64 = 10.0;
 const SPEED_SHARE_OF_FORMAT: f64 = 0.8;
 const SPEED_SHARE_MEASURED: f64 = 0.9;
 
-/// Returns the metres by which links may be off, besides rounding, at a requested accuracy: twice that of a handle.
+/// Returns the metres by which links may be off, besides rounding, at a requested accuracy: twice the metres of a
+/// handle.
 pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
     if accuracy > EXACT_LINKS { 2.0 * accuracy.min(COARSEST * team.shortest_link()) } else { 0.0 }
 }
@@ -73,7 +74,7 @@ pub struct Selection {
     /// Greatest measured error that is accepted, metres: the share of the requested accuracy, or the rounding of
     /// doubles if that is more.
     pub allowed: f64,
-    /// Greatest measured error of a velocity, as a part of what is accepted; 0 without velocities.
+    /// Greatest measured error of a velocity, as a part of the accepted error; 0 without velocities.
     pub speed_error: f64,
     /// The number of test points.
     pub test_points: usize,
@@ -223,7 +224,7 @@ impl ErrorMeasurement {
         worst
     }
 
-    /// Returns the error of a handle's velocity, as a part of what is allowed where positions are within `accuracy`
+    /// Returns the error of a handle's velocity, as a part of the error allowed where positions are within `accuracy`
     /// metres.
     fn speed_error(&self, chain: &Chain, safe: &Chain, handle: usize, accuracy: f64) -> f64 {
         let off = hypot(chain.vx[handle] - safe.vx[handle], chain.vy[handle] - safe.vy[handle]);

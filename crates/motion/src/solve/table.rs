@@ -124,8 +124,8 @@ pub struct FollowerTable {
 pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {
-    /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve. It is as
-    /// exact as doubles allow and uses the fastest instructions of this processor.
+    /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve. The
+    /// solver is as exact as doubles allow and uses the fastest instructions of this processor.
     ///
     /// Returns `None` for a single bench, and for a team so long that the table would exceed its limit. Returns `None`
     /// also if the table is not exact even at the start.
@@ -211,7 +211,7 @@ impl FollowerTable {
         }
     }
 
-    /// Returns [`bytes_per_handle`](Self::bytes_per_handle) as a part of that of the most exact table.
+    /// Returns [`bytes_per_handle`](Self::bytes_per_handle) as a part of the bytes of the most exact table.
     pub fn relative_cost(&self) -> f64 {
         self.bytes_per_handle() / self.exact_bytes_per_handle
     }

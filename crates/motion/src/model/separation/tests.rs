@@ -13,8 +13,8 @@ fn board(x: f64, y: f64, heading: f64, half_length: f64, half_width: f64) -> Boa
     Board { centre: Point::new(x, y), axis: Vector::new(heading.cos(), heading.sin()), half_length, half_width }
 }
 
-/// Returns the distance by parry, 0 if the boards overlap. It is computed near the origin and in units of `size`,
-/// because parry's thresholds are absolute.
+/// Returns the distance by parry, 0 if the boards overlap. The distance is computed near the origin and in units of
+/// `size`, because parry's thresholds are absolute.
 fn parry_distance(a: &Board, b: &Board, size: f64) -> f64 {
     let shape = |board: &Board| Cuboid::new([board.half_length / size, board.half_width / size].into());
     let pose = |board: &Board, at: Vector| Pose::new([at.x, at.y].into(), board.axis.y.atan2(board.axis.x));

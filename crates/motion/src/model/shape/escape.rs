@@ -95,7 +95,7 @@ impl Segment {
     }
 }
 
-/// The segments of which the outline of the places to avoid consists, those nearer to the origin than a free place.
+/// The segments of the outline of the places to avoid: only segments nearer to the origin than a free place.
 struct Outline {
     segments: ArrayVec<Segment, MOST_SEGMENTS>,
     /// For each segment the squared distance from the origin to its nearest place that is not known to be covered, and
@@ -243,7 +243,7 @@ impl Shape {
         }
     }
 
-    /// Returns the least escape from a convex shape: it is across one of the sides of the shape or of the board
+    /// Returns the least escape from a convex shape. The escape is across one of the sides of the shape or of the board
     /// (separating axis theorem).
     fn convex_escape(&self, board: &Board, sense: f64) -> f64 {
         let half = Rectangle::of(board).half;
@@ -301,7 +301,7 @@ impl Shape {
         outline.nearest_free(&mut avoided).unwrap_or(free)
     }
 
-    /// Adds the outline of the places to avoid, and what else of the outlines of the hexagons may be part of it.
+    /// Adds the segments of the hexagons' outlines that can be part of the outline of the places to avoid.
     fn add_outline(&self, outline: &mut Outline, half: Vector, corners: &[Vector]) {
         let count = corners.len();
         if self.kind == ShapeKind::Line {

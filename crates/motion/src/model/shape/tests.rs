@@ -95,7 +95,7 @@ proptest! {
             prop_assert!((signed - by_parry(&shape, &board)).abs() < 1e-12, "{} {}", signed, by_parry(&shape, &board));
             let (on_board, on_shape) = shape.nearest_points(&board);
             prop_assert!(((on_board - on_shape).norm() - signed).abs() < 1e-12);
-            // Both points are where they are said to be.
+            // The first point is in the board.
             prop_assert!(in_frame(&board, on_board).abs().zip_map(&Rectangle::of(&board).half, |c, h| c - h).max() < 1e-12);
         }
         prop_assert!(shape.coarse_bound(&board) <= signed + 1e-12);
@@ -151,8 +151,8 @@ proptest! {
 }
 
 /// Returns the length of the least translation that frees a board, by trial of all candidates. The outlines of the
-/// places at which the board meets a side give the candidates. They are the nearest point of each outline, and its
-/// meetings with every other outline.
+/// places at which the board meets a side give the candidates. The candidates are the nearest point of each outline,
+/// and its meetings with every other outline.
 fn freed_by_trial(shape: &Shape, board: &Board) -> f64 {
     let half = Rectangle::of(board).half;
     let mut outlines = Vec::new();

@@ -153,14 +153,14 @@ pub(super) struct RoughPlace<'a> {
     curve: &'a Curve,
     at: f64,
     slope: Vector,
-    /// Of the arc, with the sign of its curvature; of the spiral, per radian.
+    /// The radius of an arc, with the sign of its curvature, or the radius per radian of a spiral.
     radius: f64,
     /// 1 if the polar angle of a spiral grows counter-clockwise, else -1.
     sense: f64,
 }
 
 impl RoughPlace<'_> {
-    /// Returns how far back along the coordinate from `back` at most `metres` of path lead.
+    /// Returns a step back along the coordinate from `back` that leads over at most `metres` of path.
     pub fn safe_step(&self, back: f64, metres: f64) -> f64 {
         match self.curve {
             Curve::Line { .. } => metres,

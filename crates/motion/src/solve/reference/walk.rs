@@ -24,7 +24,7 @@ pub(super) struct Walk<'a> {
     place: RoughPlace<'a>,
     /// The units of the curve's coordinate behind the place.
     behind: f64,
-    /// From the front handle to the place.
+    /// The vector from the front handle to the place.
     offset: Vector,
     /// True if the handle is on this curve, the path's first, and the distance can shrink only after a fold.
     folds: bool,
@@ -42,8 +42,8 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Returns how far back the first place is that is `link` metres from the front handle, in units of the coordinate.
-    /// Returns `None` if the segment has no such place.
+    /// Returns the distance back to the first place that is `link` metres from the front handle, in units of the
+    /// coordinate. Returns `None` if the segment has no such place.
     ///
     /// # Errors
     /// [`NoFollower`] if a handle on the inward spiral comes nearer again first.

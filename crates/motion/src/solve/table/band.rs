@@ -1,8 +1,9 @@
-//! How T is made: band after band from the team's rear to the front of the path.
+//! The making of T, band after band from the team's rear to the front of the path.
 //!
-//! A [`NodeChain`] holds the places of one phase in all rows of a band, each found from the place behind it. Five of
-//! them make a piece: their slopes give its polynomials, their places prove them; where the proof fails, the piece is
-//! halved. The next band starts from the frontmost row of this one. Only [`super::FollowerTable::new`] calls it.
+//! A [`NodeChain`] holds the places of one phase in all rows of a band, each found from the place behind it. Five node
+//! chains make a piece: their slopes give its polynomials, and their places prove the polynomials. If the proof fails,
+//! the piece is halved. The next band starts from the frontmost row of the band before. Only
+//! [`super::FollowerTable::new`] calls it.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
@@ -88,7 +89,7 @@ impl Made {
 /// Five node chains, evenly spaced over a piece.
 type Quintet = [NodeChain; 5];
 
-/// The largest errors of a piece over its rows, as parts of what is allowed.
+/// The largest errors of a piece over its rows, as parts of the allowed errors.
 struct Errors {
     worst: f64,
     /// Alpha from which on the piece is exact.
@@ -224,8 +225,8 @@ impl BandBuilder<'_> {
         errors
     }
 
-    /// Returns the error of one row of a piece `2 half` long, as a part of the allowed error. It is the largest of the
-    /// errors of place, heading and speed.
+    /// Returns the error of one row of a piece `2 half` long, as a part of the allowed error. This error is the largest
+    /// of the errors of place, heading and speed.
     fn error(&self, half: f64, nodes: [&Node; 5], index: usize, chain: &NodeChain) -> f64 {
         let mut polynomials = polynomials(half, nodes);
         // The size of the slope's next power, if it falls as the last one did.

@@ -288,7 +288,7 @@ impl<'a> HeadBuilder<'a> {
         }
     }
 
-    /// Returns the polynomials from one travel to another, and their error as a part of what is allowed.
+    /// Returns the polynomials from one travel to another, and their error as a part of the allowed error.
     fn piece(&self, from: Exact, travelled: f64, end: f64) -> Option<(Piece, f64)> {
         let half = 0.5 * (end - travelled);
         let middle = travelled + half;

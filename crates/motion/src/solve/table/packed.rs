@@ -186,7 +186,7 @@ struct Builder<'a> {
 type Polynomials = [[f64; 6]; 3];
 
 impl Builder<'_> {
-    /// Adds `part` of a piece of the band, halved until the loss is within what is allowed.
+    /// Adds `part` of a piece of the band, halved until the loss is within the allowed loss.
     fn refine(&mut self, index: usize, piece: Piece, part: Piece, halvings: usize) -> Option<()> {
         let first = self.first.max((self.valid_from - part.end).ceil().max(0.0) as usize);
         let end = self.band.first_row + self.band.rows;
@@ -208,7 +208,7 @@ impl Builder<'_> {
     }
 
     /// Shortens the polynomials of a row. Returns an upper bound of the change by this and by rounding, as a part of
-    /// what is allowed.
+    /// the allowed change.
     fn loss(&self, polynomials: &mut Polynomials) -> f64 {
         let Lengths { coordinate, heading } = self.format.lengths;
         let [x, y, angle] = polynomials;

@@ -7,9 +7,10 @@
 //!
 //! The whole part of alpha is a *row*, counted from the front of the table backward; its fraction is a *phase*. The
 //! rows are grouped into bands, and the phases of each band are cut into pieces. Every piece holds polynomials of beta,
-//! -1 to 1 over the piece, for every row of the band. They give the handle's coordinates and the direction of the link
-//! that the handle leads. Where a handle or its follower crosses a junction of the path, T has a kink in its second
-//! derivative. Since T takes whole links to followers, all kinks of one junction have one phase, and pieces end there.
+//! -1 to 1 over the piece, for every row of the band. The polynomials give the handle's coordinates and the direction
+//! of the link that the handle leads. Where a handle or its follower crosses a junction of the path, T has a kink in
+//! its second derivative. Since T takes whole links to followers, all kinks of one junction have one phase, and pieces
+//! end there.
 //!
 //! Made by [`super::band`]. Read by the frame and by the clearance.
 
@@ -97,7 +98,7 @@ impl Piece {
 /// Neighbouring rows whose phases are cut in the same way.
 #[derive(Debug, Clone)]
 pub(crate) struct Band {
-    /// The band's first row and how many it has: multiples of [`LANES`].
+    /// The band's first row and the number of its rows: multiples of [`LANES`].
     pub first_row: usize,
     pub rows: usize,
     /// Numbers of coefficients of its polynomials.
@@ -193,7 +194,7 @@ pub(super) fn piece_at(pieces: &[Piece], piece_of_share: &[u32], phase: f64) -> 
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     pub tolerance: Tolerance,
-    /// From the front of the table backward.
+    /// The bands, from the front of the table backward.
     pub bands: Vec<Band>,
     /// The phases of the kinks, in order.
     pub(super) kinks: Vec<f64>,
@@ -218,7 +219,7 @@ impl Alpha {
         Self { row: self.row.wrapping_add_signed(whole as isize), phase: phase - whole }
     }
 
-    /// Returns how much further back this alpha is than another.
+    /// Returns the distance by which this alpha is further back than another.
     pub(super) fn minus(self, other: Self) -> f64 {
         (self.row as f64 - other.row as f64) + (self.phase - other.phase)
     }
@@ -275,8 +276,8 @@ impl Rows {
     /// Returns alpha of a place near `guess` (Newton's method), and the derivative of T there. Used only while the
     /// table is made.
     ///
-    /// Where two pieces meet, T jumps by up to the error of each. A place in that gap is on neither piece, and the
-    /// iteration bounces between both to the end. Both are within the table's error of the place.
+    /// At the meeting of two pieces, T jumps by up to the error of each. A place in that gap is on neither piece, and
+    /// the iteration bounces between both to the end. Both are within the table's error of the place.
     pub(super) fn locate(&self, track: &Track, place: Param, guess: Alpha) -> Option<(Alpha, Vector)> {
         let mut alpha = guess;
         let mut bounce = None;
