@@ -2,8 +2,8 @@
 
     cargo build --release && .venv/bin/python benches/ros2_growth.py [--subscribers 1000] [--fast-dds PEER]
 
-At 60 Hz. Four subscribers at a time, for three seconds each; every second one is killed. They are processes of Cyclone
-DDS (`pip install cyclonedds==11.0.1`), and with --fast-dds in turn of Fast DDS. PEER is the program of
+At 60 Hz. Four subscribers at a time, for three seconds each; every second one is killed. The subscribers are processes
+of Cyclone DDS (`pip install cyclonedds==11.0.1`), and with --fast-dds in turn of Fast DDS. PEER is the program of
 `g++ -std=c++17 -O1 -o PEER tests/fastdds/peer.cpp -lfastrtps -lfastcdr`.
 """
 

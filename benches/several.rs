@@ -9,7 +9,7 @@ use std::time::Instant;
 use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 
-/// Start of the shows, simulated seconds; they play at 60 Hz from there.
+/// Start of the shows, simulated seconds; the shows play at 60 Hz from there.
 const START: f64 = 100.0;
 /// Frames of a show before the turn of the next show.
 const BATCH: u64 = 4;

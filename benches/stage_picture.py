@@ -182,13 +182,14 @@ def looks():
     list(compared({"page": "", "#show": "#show", "#seat": "#seat"}, {"width": 1280, "height": 720}, 3))
 
 
-# The last commit whose #show has no lanterns, and what its page lacks: the names, and a stage with one dragon's sizes.
+# The last commit whose #show has no lanterns, and the parts that its page lacks: the names, and a stage with one
+# dragon's sizes.
 BEFORE = "b45e230~1"
 VIEW = "crates/outputs/src/view"
 OLD_STAGE = ("handle(message) {", 'handle(message) {\n    if (message.type === "stage") message = { ...message, ...message.dragons[0], name: "" };')
 
 
-# Both draw as many pictures a second: what a page costs besides its pictures is then the same share of each.
+# Both draw as many pictures a second: the cost of a page besides its pictures is then the same share of each.
 EQUAL = "{ const next = requestAnimationFrame; window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 80); }"
 
 

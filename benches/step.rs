@@ -27,7 +27,7 @@ use bench_dragon::show::scene::{Scene, SceneText};
 use bench_dragon::show::{Playback, Show};
 
 const SIZES: [usize; 4] = [223, 5_000, 100_000, 1_000_000];
-/// Start of the show, simulated seconds; it plays at 60 Hz from there.
+/// Start of the show, simulated seconds; the show plays at 60 Hz from there.
 const START: f64 = 200.0;
 /// Frames of a part before the turn of the next part. There are few, so that all parts see the same machine. But there
 /// are enough that a part finds its own memory in the caches as the loop would.
@@ -227,8 +227,8 @@ fn measure_queues() {
     }
 }
 
-/// Measures steps at 10 kHz without a log and with one, in turn. The log's thread reads what the step has written, so
-/// the next step must come as late as it does in a run.
+/// Measures steps at 10 kHz without a log and with one, in turn. The log's thread reads the data that the step has
+/// written, so the next step must come as late as it does in a run.
 fn measure_log() {
     let scene = scene(223);
     let playback = Playback { start: START, rate: 10_000.0, ..Playback::of(&scene) };

@@ -3,9 +3,9 @@
 
     python3 benches/peers/fsolve.py [frames]
 
-Prints the milliseconds of a frame with 224 handles, positions and speeds; needs numpy and scipy. It follows the exact
-motion of the head (theta from the arc length, by fsolve too) and rigidity for the speeds. Its answer is therefore that
-of the live program, found in the usual way. The check against the live program's own numbers:
+Prints the milliseconds of a frame with 224 handles, positions and speeds; needs numpy and scipy. The program follows
+the exact motion of the head (theta from the arc length, by fsolve too) and rigidity for the speeds. Its answer is
+therefore the answer of the live program, found in the usual way. The check against the live program's own numbers:
 
     bench-dragon solve --at 300
 """

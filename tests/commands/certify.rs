@@ -82,11 +82,11 @@ fn the_program_proves_the_contact_of_two_dragons() {
     assert!(code == Some(0) && said.contains("Of gold, contact:\n           Proved."), "{said}");
     let (_, said, code) = program(&["view", "--port", "0", "--certificate", file]);
     assert!(code == Some(2) && said.contains("certificate of several dragons"), "{said}");
-    // Until they touch, at 0; alone each is on a line, with two holes between benches 1 and 3.
+    // Until the dragons touch, at 0; each alone is on a line, with two holes between benches 1 and 3.
     let (said, errors, code) = program(&["--scene", scene, "check", "--prove", "--certify", file]);
     assert_eq!((errors.as_str(), code), ("", Some(0)), "{said}");
     assert!(said.contains("The least clearance of the show is"), "{said}");
-    // That of the show is that between dragons, and is said once.
+    // The least clearance of the show is the least clearance between dragons, and is printed once.
     assert!(!said.contains("The least clearance between dragons"), "{said}");
     assert!(said.contains("The least clearance of gold and jade: Proved: it is"), "{said}");
     let (lines, errors, code) = program(&["--scene", scene, "check", "--prove", "--json"]);

@@ -46,8 +46,8 @@ fn scene_file(name: &str) -> String {
     format!("{}/config/{name}.toml", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Returns the corners of every board: front left, rear left, rear right, front right. They follow from the two handles
-/// that `solve` prints and the lengths in the scene's file.
+/// Returns the corners of every board: front left, rear left, rear right, front right. The corners follow from the two
+/// handles that `solve` prints and the lengths in the scene's file.
 fn boards(scene: &str, time: &str) -> Vec<[[f64; 2]; 4]> {
     let file: toml::Table = std::fs::read_to_string(scene).unwrap().parse().unwrap();
     let length = |key: &str| file["team"][key].as_float().unwrap();

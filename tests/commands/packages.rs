@@ -8,7 +8,7 @@ use std::process::Command;
 use crate::harness::{Process, can_run, program, python, root, text};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-/// Where `packaging/build` has the program write its man pages and completions.
+/// The folder to which `packaging/build` has the program write its man pages and completions.
 const MANUAL: &str = "target/packaging/manual/";
 
 fn read(file: &str) -> String {

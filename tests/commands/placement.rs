@@ -1,4 +1,5 @@
-//! `[placement]`: `solve`, `events --json` and `draw` against those of the scene without it, transformed by numpy.
+//! `[placement]`: `solve`, `events --json` and `draw` against the results of the scene without it, transformed by
+//! numpy.
 
 use crate::harness::{can_run, python, python_modules, text};
 

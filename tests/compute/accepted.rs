@@ -22,7 +22,8 @@ use fastrand::Rng;
 use crate::harness;
 use crate::oracle::scenes;
 
-/// Most steps of a search: scenes that need more are given up, and the certificate says up to when it proves.
+/// Most steps of a search: scenes that need more are given up, and the certificate states the time up to which it
+/// proves.
 const MOST_STEPS: u64 = 2000;
 
 /// Returns a number between two, of three decimals: junctions then come to lie at simple coordinates.
@@ -130,9 +131,9 @@ fn scene(index: usize, random: &mut Rng) -> String {
 /// Most lines of a certificate that are left out, one at a time.
 const MOST_LEFT_OUT: usize = 30;
 
-/// Of this many scenes one is tried for its clearance and its greatest speed too, which cost three times as much.
+/// One scene of this many is tried for its clearance and its greatest speed too, which cost three times as much.
 const STRIDE: usize = 2;
-/// The same in the long run. It is prime to the number of families.
+/// The same number in the long run. This number is prime to the number of families.
 const LONG_STRIDE: usize = 9;
 
 /// Writes a certificate and has it checked. Returns the status of each result; `None` for a scene that is refused.
@@ -178,7 +179,7 @@ fn clearance_certified(text: &str) -> Option<Until> {
     Some(claim.until)
 }
 
-/// Returns what the checker proves of a show's least clearance, and what the search encloses.
+/// Returns a show's least clearance as the checker proves it, and as the search encloses it.
 fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosure>)> {
     let scene = Scene::parse(text, "tight", "tight").ok()?;
     let timeline = scene.motion.timeline(&mut |_| ());
@@ -269,7 +270,7 @@ fn certificates_of_the_least_pitch_are_accepted() {
     }
 }
 
-/// Returns the numbers of the scenes that are asked for.
+/// Returns the numbers of the requested scenes.
 fn numbers() -> Option<Range<usize>> {
     let asked = std::env::var("BENCH_DRAGON_SCENES").ok()?;
     let (from, to) = asked.split_once('-').unwrap_or_else(|| panic!("BENCH_DRAGON_SCENES is {asked}"));
@@ -454,7 +455,7 @@ fn changed_certificates_of_other_questions_are_refused() {
     }
 }
 
-/// A handle's speed beyond the path's end is none of the scene: the last segment goes on as its curve does.
+/// A handle's speed beyond the path's end is no speed of the scene: the last segment continues along its curve.
 #[test]
 fn a_speed_beyond_the_end_of_the_path_is_refused() {
     let text = "[team]\nbenches = 3\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\

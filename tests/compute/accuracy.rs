@@ -1,7 +1,7 @@
 //! The requested accuracy selects the solver. On every scene of `config/` and on random paths, each requested accuracy
-//! gets a solver that keeps it. It is tested at times that the selection did not use, against the safe solver and the
-//! reference of 38 digits. A coarser accuracy reads fewer bytes per frame; events do not depend on the accuracy; the
-//! live clearance remains that of all pairs.
+//! gets a solver that keeps it. The solver is tested at times that the selection did not use, against the safe solver
+//! and the reference of 38 digits. A coarser accuracy reads fewer bytes per frame; events do not depend on the
+//! accuracy; the live clearance remains the clearance of all pairs.
 
 use crate::harness;
 
@@ -38,8 +38,8 @@ fn select(motion: &Motion, accuracy: f64, velocities: Velocities) -> Option<Sele
     selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, accuracy)
 }
 
-/// Returns times up to `end` that the selection has not used. They are `count` multiples of the golden ratio, every
-/// third in the last fiftieth, and some times near the junctions.
+/// Returns times up to `end` that the selection has not used. The times are `count` multiples of the golden ratio,
+/// every third in the last fiftieth, and some times near the junctions.
 fn other_times(motion: &Motion, end: f64, count: usize) -> Vec<f64> {
     let share = |k: usize| (k as f64 * 0.618_033_988_749_895 + 0.137).fract();
     let mut times: Vec<f64> =
@@ -217,7 +217,7 @@ fn events_do_not_depend_on_the_accuracy() {
     }
 }
 
-/// The live clearance of a coarse chain is that of all its pairs, to the last bit.
+/// The live clearance of a coarse chain is the clearance of all its pairs, to the last bit.
 #[test]
 fn the_live_clearance_is_that_of_the_frame() {
     for name in ["paper", "turnaround", "procession", "school"] {

@@ -1,6 +1,6 @@
 //! The proved enclosures of the least clearance of obstacles. They are compared with the brute force of
-//! `tests/compute/oracle`, with distances by parry2d, and with the ordinary search. The checker accepts them, and
-//! refuses changed certificates.
+//! `tests/compute/oracle`, with distances by parry2d, and with the ordinary search. The checker accepts the
+//! certificates, and refuses changed certificates.
 //!
 //! `BENCH_DRAGON_LONG=1` makes 3,000 scenes in place of 120, `BENCH_DRAGON_CASES=few` 30.
 
@@ -26,7 +26,7 @@ const MOST_STEPS: u64 = 4000;
 /// Greatest error of the brute force, metres.
 const ROUNDING: f64 = 1e-10;
 
-/// What the search encloses of a scene, what the ordinary search found, and the certificate.
+/// The enclosures of a scene, the results of the ordinary search, and the certificate.
 struct Enclosed {
     scene: Scene,
     found: Vec<TimedObstacleClearance>,
@@ -86,7 +86,7 @@ fn clearance(scene: &Scene, team: &chain::Team, pose: &chain::Pose, bench: usize
 }
 
 /// Compares the enclosures of a scene with a brute force at `samples` places, and has the certificate checked. Returns
-/// the number of obstacles that can be decided, and that of those enclosed over the whole show.
+/// the number of obstacles that can be decided, and the number of obstacles enclosed over the whole show.
 fn compared(text: &str, samples: u32) -> (usize, usize) {
     let Enclosed { scene, found, enclosures, end, lines } = enclosed(text);
     let proved = check(&lines).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
@@ -114,7 +114,7 @@ fn compared(text: &str, samples: u32) -> (usize, usize) {
             continue;
         };
         whole += usize::from(until.is_none());
-        // Where the proof stops before the end, a place beyond may be nearer.
+        // If the proof stops before the end, a place beyond may be nearer.
         assert!(hi - lo <= 1e-9 && (lo <= hi || until.is_some()), "{lo} {hi}\n{text}");
         if let Some(until) = until {
             println!("{} up to {until} of {end} m: {lo} {hi} at {travelled}, {ordinary}\n{text}", obstacle.name);

@@ -24,7 +24,7 @@ const STEPS_IN_VAIN: u64 = 1000;
 fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<CertifiedEvent>, Timeline) {
     let timeline = scene.motion.timeline(&mut |_| ());
     let mut outcomes = certify(&scene.motion, &timeline, "", most_steps, &mut |_| Ok(()), &mut |_| ()).unwrap();
-    // Those of obstacles are compared in `staged`.
+    // The outcomes of obstacles are compared in `staged`.
     outcomes.retain(|outcome| outcome.event != EventKind::Obstacle);
     assert_eq!(outcomes.iter().map(|outcome| outcome.event).collect::<Vec<_>>(), KINDS);
     (outcomes, timeline)
@@ -143,7 +143,7 @@ fn enclosures_are_a_nanosecond_wide() {
     }
 }
 
-/// Where doubles resolve no nanosecond, the certificate says why.
+/// The certificate states the reason if doubles resolve no nanosecond.
 #[test]
 fn a_wide_enclosure_has_a_reason() {
     let (outcomes, _) = outcomes(&paper_with("head_speed", "1e-9"), STEPS);
@@ -158,7 +158,7 @@ fn a_wide_enclosure_has_a_reason() {
 fn every_scene_of_the_repository_agrees() {
     let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
     // The search gives up, and reports that, for:
-    // - handles at distances that no double can tell from the link's,
+    // - handles at distances that no double distinguishes from the link's,
     // - paths of 1e10 metres,
     // - boards that stay a fraction of a millimetre apart for a kilometre,
     // - a contact so near a lock that the rear handle cannot be enclosed between them.

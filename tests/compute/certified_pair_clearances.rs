@@ -229,7 +229,7 @@ fn changed_certificates_of_clearances_are_refused() {
     assert!(with(&|claim| claim["until"] = "contact".into()).is_err());
     let late = |claim: &mut serde_json::Value| (claim["until"], claim["time_until"]) = ("time".into(), 1e4.into());
     assert!(with(&late).is_err());
-    // Every stretch says how far boards are apart.
+    // Every stretch has a number `apart`.
     let both = all.iter().rposition(|line| line.contains("\"type\":\"both\"")).unwrap();
     let mut without: serde_json::Value = serde_json::from_str(all[both]).unwrap();
     without.as_object_mut().unwrap().remove("apart");

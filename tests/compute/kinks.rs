@@ -18,7 +18,7 @@ use proptest::test_runner::{Config, TestRunner};
 /// Requested accuracies, metres. The second and the third are those at which tables once smoothed most.
 const ACCURACIES: [f64; 11] = [1e-9, 3e-9, 1.21e-8, 3e-8, 1e-7, 3e-7, 1e-6, 1e-5, 3e-5, 1e-4, 1e-3];
 
-/// Where a handle is, metres of travel, and its speed over the head's.
+/// The place of a handle, metres of travel, and its speed over the head's.
 type Travel = (f64, f64);
 
 /// Returns all handles when the head has travelled `travelled` metres; `None` past a lock.

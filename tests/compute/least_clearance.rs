@@ -51,7 +51,7 @@ fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclos
     assert!(lo <= hi && hi - lo <= 1e-9, "{enclosure:?}");
     let (team, path) = scenes::read(text);
     let chain = chain::Chain::new(&path, &team);
-    // Parry computes no depths: it only tells that boards overlap.
+    // Parry computes no depths, but only reports that boards overlap.
     let there = distance(&team, &chain.pose(travelled), [bench_a, bench_b]);
     assert!(there <= hi.max(0.0) + ROUNDING, "{there} {enclosure:?}");
     if until.is_none_or(|until| travelled <= until) {

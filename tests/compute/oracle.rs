@@ -1,5 +1,6 @@
 //! An independent check of a scene's events: its own paths, followers, boards and searches, and random scenes on which
-//! the program must agree with it. It shares no code with the library; only [`program_events`] calls the library.
+//! the program must agree with it. The check shares no code with the library; only [`program_events`] calls the
+//! library.
 //!
 //! `BENCH_DRAGON_ORACLE_SEED` and `BENCH_DRAGON_ORACLE_SCENES` select other scenes and their number.
 //! `BENCH_DRAGON_LONG` runs 10,000 scenes; `BENCH_DRAGON_ORACLE_FILE` checks the scene in a file.

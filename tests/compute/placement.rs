@@ -1,5 +1,5 @@
 //! A motion has the same times and digits anywhere on the stage. It is solved and proved in its path's own coordinates,
-//! and placed where it leaves them.
+//! and its results are placed.
 
 use bench_dragon::certify::{CertificateLine, MOST_STEPS, certify};
 use bench_dragon::messages::state::EventKind;

@@ -89,7 +89,7 @@ pub fn all_boards(ensemble: &Ensemble, time: f64) -> Option<Vec<(usize, Corners)
     Some(boards)
 }
 
-/// Of all pairs without a common handle the least gap, and the pair.
+/// Returns the least gap of all pairs without a common handle, and the pair.
 fn least_gap(boards: &[(usize, Corners)]) -> (f64, (usize, usize)) {
     let mut least = (f64::INFINITY, (0, 0));
     for (k, (a, one)) in boards.iter().enumerate() {
@@ -226,7 +226,7 @@ fn a_dragon_that_waits_and_one_that_stands_are_touched() {
     let jade = dragon("jade", 2, "{ origin = [30.0, 0.0] }", 1.0, 100.0, &line(10.0));
     let waiting = 30.0 - 0.55 - 2.86 - 1.65;
     assert!((contact(&(gold.clone() + &jade)).unwrap().time - waiting).abs() < 1e-12);
-    // It goes 10 m and stands at its path's end.
+    // Jade goes 10 m and stands at its path's end.
     let jade = dragon("jade", 2, "{ origin = [30.0, 0.0] }", 2.0, 0.0, &line(10.0));
     let text = gold + &jade;
     let timeline = timeline(&text);

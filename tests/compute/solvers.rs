@@ -93,8 +93,8 @@ impl Subject {
         std::iter::once(newton).chain(tables).collect()
     }
 
-    /// Asserts the properties of a chain alone. It is finite, its links are as long as promised, and its headings fit
-    /// the positions. Its velocities are along the path, and equal at both ends of a link along the link.
+    /// Asserts the properties of a chain alone. The chain is finite, its links are as long as promised, and its
+    /// headings fit the positions. Its velocities are along the path, and equal at both ends of a link along the link.
     fn assert_sound(&self, chain: &Chain, time: f64, who: &str) {
         let team = self.motion.team();
         let at = || format!("{who} at {time} s: {:?} {team:?}", self.motion.description());

@@ -170,7 +170,7 @@ fn changed_certificates_of_a_scene_with_obstacles_are_refused() {
         ("keep_out = 0.5", "keep_out = 0.6"),
         ("[stage]", "[placement]\\norigin = [0.5, 0.0]\\n[stage]"),
         ("[stage]", "[placement]\\nmirror = true\\n[stage]"),
-        // Claims that go on beyond the touch, a bench that is clear of it, and another obstacle.
+        // Claims that continue beyond the touch, a bench that is clear of it, and another obstacle.
         ("\"free\":[1,2]", "\"free\":[0,1,2]"),
         ("\"free\":[0,1,2]", "\"free\":[0,1]"),
         ("\"type\":\"reached\",\"obstacle\":0,\"bench\":0", "\"type\":\"reached\",\"obstacle\":1,\"bench\":0"),

@@ -40,7 +40,7 @@ const ON_ROUTE: f64 = 100.0;
 const STEPS: u64 = 20;
 const STAMPS: Stamps = Stamps { run_id: 1, sequence: 1, stamp_ns: 0, deadline_ns: 0 };
 
-/// Callgrind counts only this function and its callees: it gets the name of this function.
+/// Callgrind counts only this function and its callees, by the name of this function.
 #[inline(never)]
 fn counted(call: &mut dyn FnMut(u64), number: u64) {
     call(number);
@@ -48,7 +48,7 @@ fn counted(call: &mut dyn FnMut(u64), number: u64) {
     black_box(number);
 }
 
-/// When this function ends, callgrind writes its counts and starts again from zero.
+/// Callgrind writes its counts and starts again from zero when this function ends.
 #[inline(never)]
 fn part_is_over(name: &str, calls: u64) {
     println!("{PART}{calls} {name}");

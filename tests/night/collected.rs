@@ -39,7 +39,7 @@ pub struct Collected {
     /// The bounds of the longest durations taken so far.
     worst_lateness_ns: (u64, u64),
     worst_step_ns: (u64, u64),
-    /// Of the latest status: the frames until then, and the time at which it was made.
+    /// The frames until the latest status, and the time at which this status was made.
     status: (u64, u64),
     began_ns: u64,
 }

@@ -37,7 +37,7 @@ pub struct Oracle {
     /// Epoch of the frame before.
     epoch: u32,
     shows_played: u64,
-    /// Of the present frame: its latest and earliest start, and the time at which it was sent.
+    /// The latest and earliest start of the present frame, and the time at which the frame was sent.
     began_ns: (u64, u64),
     sent_ns: u64,
     sample: Option<(FrameHeader, Vec<Announced>)>,

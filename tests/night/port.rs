@@ -1,6 +1,6 @@
 //! A replacement for the shared memory: queues that drop the oldest frame for a slow subscriber, as iceoryx2's do with
-//! safe overflow. It has a history of one alert, maintenance that connects new subscribers, and a memory that can be
-//! full.
+//! safe overflow. The replacement has a history of one alert, maintenance that connects new subscribers, and a memory
+//! that can be full.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;

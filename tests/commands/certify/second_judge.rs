@@ -1,6 +1,6 @@
 //! Certificates of every question, checked again by a second program in another language:
-//! `tests/python/second_judge.py`, with the ball arithmetic of Arb. It finds the handles itself and checks the claims,
-//! not the proof. `BENCH_DRAGON_LONG=1`: 500 scenes.
+//! `tests/python/second_judge.py`, with the ball arithmetic of Arb. The second program finds the handles itself and
+//! checks the claims, not the proof. `BENCH_DRAGON_LONG=1`: 500 scenes.
 
 mod several;
 
@@ -310,13 +310,13 @@ fn a_second_judge_agrees_and_refuses_what_was_changed() {
             });
         }
     });
-    // The same ones, whichever thread was first.
+    // The same scenes, whichever thread was first.
     let mut found = found.into_inner().unwrap();
     found.sort();
     found.truncate(all);
     let mut files: Vec<PathBuf> = found.into_iter().flat_map(|(_, files)| files).collect();
     let agreed = files.len();
-    // What the judge must refuse.
+    // Changed certificates, which the judge must refuse.
     let mut changed = changes(&lines_of(&folder.join("school.events")));
     changed.extend(other_changes(&files));
     for (number, (_, lines)) in changed.iter().enumerate() {

@@ -53,7 +53,7 @@ fn a_dragon_has_the_colour_of_the_page() {
     }
 }
 
-/// The boards of the plan are those of `solve`; the others are those of the plan.
+/// The boards of the plan are the boards of `solve`; the lantern look has the boards of the plan.
 #[test]
 fn the_lantern_look_has_the_boards_of_all() {
     let scene = scene_file("coil");
@@ -139,7 +139,7 @@ fn an_animation_has_the_boards_of_all_and_names_the_contact() {
     for path in ["path-gold", "path-jade"] {
         assert!(with_id(&svg, path).is_some(), "{path}");
     }
-    // The last moment is that of a picture at the contact: the centre of every board.
+    // The last moment is the moment of a picture at the contact: the centre of every board is the same.
     let still = answer(&["--scene", &scene, "draw", "--at", "contact"]);
     let still = Document::parse(&still).unwrap();
     for bench in numbers() {

@@ -296,8 +296,8 @@ impl Path {
         self.push(curve, 0.0, angle);
     }
 
-    /// The centre is where the pole of the tangent's normal says. The tangent leans by atan(1 / theta) against the
-    /// circle about the centre, towards the centre or away from it.
+    /// The centre is `radius` metres from the last point, along the tangent's normal turned by the lean. The tangent
+    /// leans by atan(1 / theta) against the circle about the centre, towards the centre or away from it.
     fn push_spiral(&mut self, radius_per_radian: f64, radius: f64, outward: f64, angle: f64, left: bool) {
         let (point, tangent) = self.last_point_and_tangent();
         let side = if left { 1.0 } else { -1.0 };
@@ -306,7 +306,7 @@ impl Path {
         let lean = outward * side * (1.0 / first).atan();
         let spoke = nalgebra::Rotation2::new(lean) * (-side * left_of(tangent));
         let centre = point - radius * spoke;
-        // Going on, the polar angle about the centre grows to the left; theta grows outward.
+        // Along the spiral, the polar angle about the centre grows to the left; theta grows outward.
         let turn = side * outward;
         let phase = (-outward * spoke).y.atan2((-outward * spoke).x) - turn * first;
         let curve = Curve::Spiral { radius_per_radian, outward, centre, phase, turn };
