@@ -49,7 +49,7 @@ pub enum ChaseState {
     Locking,
     /// The show follows.
     Locked,
-    /// The source is silent; the show goes on at its rate.
+    /// The source is silent; the show continues at the source's rate.
     Freewheeling,
     /// The source stands; the show is paused there.
     Standing,

@@ -12,7 +12,7 @@ pub const RATES: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 pub const MOST_PERIODS: u64 = 1 << f64::MANTISSA_DIGITS;
 
 /// The value of a request for the state. The response then has, as its `time_scale`, the rate at which the show plays
-/// or will play on. A show that is paused or held has another rate in force, 0.
+/// or will continue. A show that is paused or held has another rate in force, 0.
 pub const PLAYING_RATE: f64 = 1.0;
 
 /// A command. Its number on the wire is its place in [`Command::TABLE`].
@@ -56,7 +56,7 @@ pub enum CommandValue {
 /// The reason for which a show that is not held refuses a command or its value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// It never does.
+    /// The command is never refused.
     Never,
     /// The value is outside [`RATES`].
     RateOutOfRange,

@@ -141,9 +141,9 @@ pub struct FrameHeader {
 ///
 /// `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, or a nearer board and
 /// obstacle, at every level. The fields that begin with `event` are the event that the alert is about. While the level
-/// is clear or approaching, this is the next contact, obstacle, stall or lock, else the event that has happened. An
-/// obstacle stands where a second bench would, by its number: the number of handles plus its place in the scene, the
-/// boundary last.
+/// is clear or approaching, this is the next contact, obstacle, stall or lock, else the event that has happened. For an
+/// obstacle, the field of the second bench has the number of the obstacle. This is the number of handles plus the
+/// obstacle's place in the scene, the boundary last.
 ///
 /// Over iceoryx2 the payload of `<name>/alerts`.
 ///

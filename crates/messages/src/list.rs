@@ -9,7 +9,7 @@ use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Up to `MOST` elements. It dereferences to the slice of the elements in use.
+/// A list of up to `MOST` elements. The list dereferences to the slice of the elements in use.
 ///
 /// # Examples
 ///

@@ -1,13 +1,13 @@
 //! The names of benches and obstacles for people: benches count from 1 within their dragon.
 //!
-//! Before there is a stage message a scene's [`Roster`] has the names; a subscriber has those of the [`Stage`].
+//! Before there is a stage message a scene's [`Roster`] has the names; a subscriber has the names of the [`Stage`].
 
 use crate::layouts::{NO_BENCH, Stage};
 
 /// The dragons and obstacles of a show, as far as their names need them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Roster {
-    /// The benches of each dragon and its name, which is empty if it is the only one.
+    /// The benches of each dragon and its name, which is empty if the dragon is the only one.
     dragons: Vec<(String, u32)>,
     obstacles: Vec<String>,
 }

@@ -159,7 +159,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// Every level, in the order of their numbers on the wire, which are those of the states: 5 is no level.
+    /// Every level, in the order of their numbers on the wire, which are the numbers of the states: 5 is no level.
     pub const ALL: [Self; 6] = [Self::Clear, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::Obstacle];
 
     /// Returns the level that an event raises; `None` for the end of the path, which raises none.
@@ -201,7 +201,7 @@ pub enum PlaybackState {
     Paused,
     /// Simulated time stands still until the hold is released.
     Held,
-    /// The show has frozen at its end.
+    /// The show has ended.
     Ended,
 }
 

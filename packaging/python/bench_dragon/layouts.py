@@ -51,7 +51,7 @@ LEVELS = (
     "obstacle",
 )
 
-# What an alert may be about, by the number of the state that the event leads to.
+# The events of alerts, by the number of the state that each event leads to.
 EVENTS = {
     # No event.
     0: None,
@@ -75,7 +75,7 @@ PLAYBACK = (
     "paused",
     # Simulated time stands still until the hold is released.
     "held",
-    # The show has frozen at its end.
+    # The show has ended.
     "ended",
 )
 
@@ -258,9 +258,9 @@ class CollisionAlert(Message):
 
     `bench_a`, `bench_b`, `clearance`, `x` and `y` are the nearest two boards of the frame, or a nearer board and
     obstacle, at every level. The fields that begin with `event` are the event that the alert is about. While the level
-    is clear or approaching, this is the next contact, obstacle, stall or lock, else the event that has happened. An
-    obstacle stands where a second bench would, by its number: the number of handles plus its place in the scene, the
-    boundary last.
+    is clear or approaching, this is the next contact, obstacle, stall or lock, else the event that has happened. For an
+    obstacle, the field of the second bench has the number of the obstacle. This is the number of handles plus the
+    obstacle's place in the scene, the boundary last.
 
     Over iceoryx2 the payload of `<name>/alerts`.
     """
@@ -492,7 +492,7 @@ class ChaseStatus(Message):
 class Cue(Message):
     """A cue that the show has reached. Payload of `<name>/cues`.
 
-    Each is sent once, with the frame at or after it; a seek over cues sends none.
+    Each cue is sent once, with the frame at or after its time; a seek over cues sends none.
     """
 
     LAYOUT = 1
@@ -555,7 +555,7 @@ class ControlResponse(Message):
     tick: int
     # Simulated seconds of that period.
     sim_time: float
-    # Simulated seconds per second, as in force; 0 while paused or held, unless the request asks for another rate.
+    # Simulated seconds per second, as in force; 0 while paused or held, unless the request is for another rate.
     time_scale: float
     # 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
     code: int
@@ -593,16 +593,16 @@ class StageSegment(Message):
     heading: float
     # Metres along it.
     length: float
-    # Of an arc, 1/m, positive if it turns left; of a line 0. NaN for a spiral whose centre is the stage's origin and
-    # whose turns begin on the x axis. Of a spiral that the scene places elsewhere, the curvature at its beginning:
-    # beginning, heading and the side of the curvature say where it lies.
+    # The curvature of an arc, 1/m, positive if the arc turns left; 0 for a line. NaN for a spiral whose centre is the
+    # stage's origin and whose turns begin on the x axis. For a spiral that the scene places elsewhere, the curvature at
+    # its beginning: beginning, heading and the side of the curvature give its place.
     curvature: float
-    # Of a spiral, the polar angle at which it begins, radians; else NaN. For an outward spiral this is the angle before
-    # it is turned, for a placed spiral the angle before it is placed.
+    # The polar angle at the beginning of a spiral, radians; else NaN. For an outward spiral this is the angle before
+    # the spiral is turned, for a placed spiral the angle before the spiral is placed.
     theta_first: float
-    # Of a spiral, the polar angle at which it ends, radians; else NaN.
+    # The polar angle at the end of a spiral, radians; else NaN.
     theta_last: float
-    # Of a spiral, metres per turn; else NaN.
+    # Metres per turn of a spiral; else NaN.
     pitch: float
     # The kind of curve: one of `SEGMENTS`.
     kind: int
@@ -661,11 +661,11 @@ class StageDragon(Message):
     pitch: float
     # The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
     start_turn: float
-    # The number of its first handle. Bench i joins handles i and i + 1, so it is the head's number too.
+    # The number of its first handle. Bench i joins handles i and i + 1, so this is the head's number too.
     first_handle: int
     # The number of its benches; one less than the number of its handles.
     benches: int
-    # The index of the first segment of its path in the list of segments. They are in the order of travel.
+    # The index of the first segment of its path in the list of segments. The segments are in the order of travel.
     first_segment: int
     # The number of segments of its path.
     segments: int
@@ -763,8 +763,9 @@ class Stage(Message):
     the obstacle j, from 0.
 
     Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments
-    of the path, layout 3 gave them their name. Layout 4 added the time line: the freeze time, the events and the cues.
-    Layout 5 added the hash of the scene's text. Layout 6 added the dragons, the obstacles and a path of any length.
+    of the path, layout 3 gave them their name. Layout 4 added the time line: the end of the show, the events and the
+    cues. Layout 5 added the hash of the scene's text. Layout 6 added the dragons, the obstacles and a path of any
+    length.
     """
 
     LAYOUT = 6
@@ -772,7 +773,7 @@ class Stage(Message):
     run_id: int
     # CLOCK_REALTIME in nanoseconds when this was written.
     stamp_ns: int
-    # Simulated seconds at which the show freezes: a seek reaches no later time.
+    # Simulated seconds at which the show ends: a seek reaches no later time.
     freeze_time: float
     # The number of cues in the show; the first 32 of them are listed.
     cues: int
@@ -785,8 +786,8 @@ class Stage(Message):
     dragons: Sequence[StageDragon]
     # The obstacles in the order of the scene; the boundary, if there is one, stands last.
     obstacles: Sequence[StageObstacle]
-    # The events in order of time: the first of each kind of each dragon and of each obstacle. Those after the freeze
-    # time are not reached. A scene without `[alerts]` has its last one only.
+    # The events in order of time: the first of each kind of each dragon and of each obstacle. Events after the end of
+    # the show are not reached. A scene without `[alerts]` has its last event only.
     events: Sequence[StageEvent]
     # The cues in order of time.
     cue_list: Sequence[StageCue]

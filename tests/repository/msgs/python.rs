@@ -124,7 +124,7 @@ fn states(source: &Source, name: &str, item: &Enumeration) -> String {
 }
 
 fn events(source: &Source, item: &Enumeration) -> String {
-    let mut text = "# What an alert may be about, by the number of the state that the event leads to.\n".to_owned();
+    let mut text = "# The events of alerts, by the number of the state that each event leads to.\n".to_owned();
     text += "EVENTS = {\n    # No event.\n    0: None,\n";
     for kind in &item.variants {
         text += &comment(&plain(source, None, &kind.docs), "    ");

@@ -8,7 +8,7 @@ use super::SceneName;
 
 /// A cue that the show has reached. Payload of `<name>/cues`.
 ///
-/// Each is sent once, with the frame at or after it; a seek over cues sends none.
+/// Each cue is sent once, with the frame at or after its time; a seek over cues sends none.
 ///
 /// # Examples
 ///
@@ -92,7 +92,7 @@ pub struct ControlResponse {
     pub tick: u64,
     /// Simulated seconds of that period.
     pub sim_time: f64,
-    /// Simulated seconds per second, as in force; 0 while paused or held, unless the request asks for another rate.
+    /// Simulated seconds per second, as in force; 0 while paused or held, unless the request is for another rate.
     pub time_scale: f64,
     /// 0 done, 1 already so, 2 refused in this state, 3 value out of range, 4 not understood, 5 too many waiting.
     pub code: u32,

@@ -32,16 +32,16 @@ pub struct StageSegment {
     pub heading: f64,
     /// Metres along it.
     pub length: f64,
-    /// Of an arc, 1/m, positive if it turns left; of a line 0. NaN for a spiral whose centre is the stage's origin and
-    /// whose turns begin on the x axis. Of a spiral that the scene places elsewhere, the curvature at its beginning:
-    /// beginning, heading and the side of the curvature say where it lies.
+    /// The curvature of an arc, 1/m, positive if the arc turns left; 0 for a line. NaN for a spiral whose centre is the
+    /// stage's origin and whose turns begin on the x axis. For a spiral that the scene places elsewhere, the curvature
+    /// at its beginning: beginning, heading and the side of the curvature give its place.
     pub curvature: f64,
-    /// Of a spiral, the polar angle at which it begins, radians; else NaN. For an outward spiral this is the angle
-    /// before it is turned, for a placed spiral the angle before it is placed.
+    /// The polar angle at the beginning of a spiral, radians; else NaN. For an outward spiral this is the angle before
+    /// the spiral is turned, for a placed spiral the angle before the spiral is placed.
     pub theta_first: f64,
-    /// Of a spiral, the polar angle at which it ends, radians; else NaN.
+    /// The polar angle at the end of a spiral, radians; else NaN.
     pub theta_last: f64,
-    /// Of a spiral, metres per turn; else NaN.
+    /// Metres per turn of a spiral; else NaN.
     pub pitch: f64,
     /// The kind of curve: one of [`SEGMENT_*`](SEGMENT_LINE).
     pub kind: u32,
@@ -50,8 +50,8 @@ pub struct StageSegment {
 }
 
 impl StageSegment {
-    /// Returns the name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a later
-    /// layout's.
+    /// Returns the name of its kind: `line`, `arc`, `inward_spiral`, `outward_spiral`, or `unknown` for a kind of a
+    /// later layout.
     pub fn kind_name(&self) -> &'static str {
         match self.kind {
             SEGMENT_LINE => "line",
@@ -62,7 +62,7 @@ impl StageSegment {
         }
     }
 
-    /// Returns the radians by which it turns; of a spiral, those about its centre.
+    /// Returns the radians by which the segment turns; for a spiral, the radians about its centre.
     pub fn turn(&self) -> f64 {
         match self.kind {
             SEGMENT_ARC => (self.curvature * self.length).abs(),
@@ -104,8 +104,8 @@ impl StageSegment {
     }
 
     /// Returns a pose of a spiral that is placed elsewhere, from its pose on the spiral about the origin. Beginning and
-    /// heading say where the spiral lies. Without a mirror an inward spiral bends to the right, an outward one to the
-    /// left.
+    /// heading give the place of the spiral. Without a mirror an inward spiral bends to the right, an outward one to
+    /// the left.
     fn placed(&self, (x, y, heading): (f64, f64, f64)) -> (f64, f64, f64) {
         let (first_x, first_y, first_heading) = self.about_origin(self.theta_first);
         // This rounding keeps the bits of the poses that earlier versions published.
@@ -191,11 +191,11 @@ pub struct StageDragon {
     pub pitch: f64,
     /// The turn on which the head starts (theta = 2 pi start_turn); NaN if it does not start on a spiral.
     pub start_turn: f64,
-    /// The number of its first handle. Bench i joins handles i and i + 1, so it is the head's number too.
+    /// The number of its first handle. Bench i joins handles i and i + 1, so this is the head's number too.
     pub first_handle: u32,
     /// The number of its benches; one less than the number of its handles.
     pub benches: u32,
-    /// The index of the first segment of its path in the list of segments. They are in the order of travel.
+    /// The index of the first segment of its path in the list of segments. The segments are in the order of travel.
     pub first_segment: u32,
     /// The number of segments of its path.
     pub segments: u32,
@@ -223,7 +223,8 @@ pub struct StageObstacle {
 }
 
 impl StageObstacle {
-    /// Returns the name of its kind: `circle`, `polygon`, `line`, `boundary`, or `unknown` for a later layout's.
+    /// Returns the name of its kind: `circle`, `polygon`, `line`, `boundary`, or `unknown` for a kind of a later
+    /// layout.
     pub fn kind_name(&self) -> &'static str {
         match self.kind {
             OBSTACLE_CIRCLE => "circle",
@@ -274,8 +275,9 @@ pub struct StageCue {
 /// the obstacle j, from 0.
 ///
 /// Over iceoryx2 the user header of `<name>/stage`, whose payload is the list of segments. Layout 2 added the segments
-/// of the path, layout 3 gave them their name. Layout 4 added the time line: the freeze time, the events and the cues.
-/// Layout 5 added the hash of the scene's text. Layout 6 added the dragons, the obstacles and a path of any length.
+/// of the path, layout 3 gave them their name. Layout 4 added the time line: the end of the show, the events and the
+/// cues. Layout 5 added the hash of the scene's text. Layout 6 added the dragons, the obstacles and a path of any
+/// length.
 ///
 /// # Examples
 ///
@@ -303,7 +305,7 @@ pub struct Stage {
     pub run_id: u64,
     /// CLOCK_REALTIME in nanoseconds when this was written.
     pub stamp_ns: u64,
-    /// Simulated seconds at which the show freezes: a seek reaches no later time.
+    /// Simulated seconds at which the show ends: a seek reaches no later time.
     pub freeze_time: f64,
     /// The number of cues in the show; the first 32 of them are listed.
     pub cues: u32,
@@ -316,8 +318,8 @@ pub struct Stage {
     pub dragons: List<StageDragon, MOST_DRAGONS>,
     /// The obstacles in the order of the scene; the boundary, if there is one, stands last.
     pub obstacles: List<StageObstacle, MOST_OBSTACLES>,
-    /// The events in order of time: the first of each kind of each dragon and of each obstacle. Those after the freeze
-    /// time are not reached. A scene without `[alerts]` has its last one only.
+    /// The events in order of time: the first of each kind of each dragon and of each obstacle. Events after the end of
+    /// the show are not reached. A scene without `[alerts]` has its last event only.
     pub events: List<StageEvent, MOST_EVENTS>,
     /// The cues in order of time.
     pub cue_list: List<StageCue, MOST_CUES>,
@@ -330,7 +332,7 @@ impl Stage {
         is_known.then(|| hexadecimal(&self.scene_hash))
     }
 
-    /// Returns the first dragon; one without benches if none is listed.
+    /// Returns the first dragon; a dragon without benches if none is listed.
     pub fn first_dragon(&self) -> &StageDragon {
         const NONE: &StageDragon = &StageDragon {
             head_length: 0.0,
