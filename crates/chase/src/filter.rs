@@ -2,15 +2,14 @@
 //!
 //! A loop of second order: each reading corrects position and rate by a part of its error. The parts are those of a
 //! Kalman filter of constant rate (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
-//! Navigation, 6.2). They begin large and fall to a
-//! constant, which for timecode is a loop of about 0.1 rad/s.
+//! Navigation, 6.2). The parts begin large and fall to a constant, which for timecode is a loop of about 0.1 rad/s.
 
 /// The standard deviations of a source. Units of the position are free: seconds of timecode, metres of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Of a reading: its jitter.
+    /// The deviation of a reading: its jitter.
     pub jitter: f64,
-    /// Of the rate at the beginning, per second.
+    /// The deviation of the rate at the beginning, per second.
     pub spread: f64,
     /// Growth of the variance of the rate, per second.
     pub drift: f64,

@@ -24,7 +24,7 @@ use crate::track::{Following, Track};
 
 /// The interval of the status.
 const STATUS_INTERVAL: Duration = Duration::from_millis(200);
-/// How long the last command of a chase that ends is waited for.
+/// The time limit of the answer to the last command of a chase that ends.
 const LAST_COMMAND: Duration = Duration::from_millis(500);
 
 /// The source of a chase.
@@ -38,7 +38,7 @@ pub enum Leader {
 /// Timecode as the leader.
 pub struct TimecodeLeader {
     schedule: Schedule,
-    /// The rate that the user has given; `None` is that of the source.
+    /// The rate that the user has given; `None` for the rate of the source.
     given_rate: Option<FrameRate>,
     freewheel: f64,
     synchronizer: Synchronizer,
@@ -107,7 +107,7 @@ pub struct TrackerLeader {
 /// A message to the user.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Notice {
-    /// The chase or its source does something else than before.
+    /// The state of the chase has changed.
     Changed(ChaseStatus),
     /// The show has another scene than the chase: no place on the path can be known.
     OtherScene,
@@ -120,7 +120,7 @@ pub struct Chase<'a> {
     leader: Leader,
     inputs: Receiver<Input>,
     steering: Steering,
-    /// A command is known by the moment at which it was sent.
+    /// The moment at which a command was sent identifies the command.
     commands: CommandClient<u64>,
     answers: Receiver<(u64, ActionResult)>,
     port: ChaseStatusSender,
@@ -176,7 +176,7 @@ impl<'a> Chase<'a> {
         })
     }
 
-    /// Ends the chase: the show goes on at the rate of its source, without a correction. Returns the last status.
+    /// Ends the chase: the show continues at the rate of its source, without a correction. Returns the last status.
     pub fn finish(mut self) -> ChaseStatus {
         if self.status.state == ChaseState::Locked as u32 && self.status.rate > 0.0 {
             while self.answers.try_recv().is_ok() {}

@@ -2,7 +2,7 @@
 //! Pure.
 //!
 //! A frame is 80 bits, least significant first, in biphase mark code. The signal changes at the beginning of each bit,
-//! and once more in the middle of a 1. The last 16 bits are a pattern that also tells the direction.
+//! and once more in the middle of a 1. The last 16 bits are a pattern that also shows the direction.
 
 pub mod wave;
 
@@ -15,7 +15,7 @@ const SYNC: u128 = 0xbffc;
 const SYNC_BACKWARD: u128 = 0x3ffd;
 /// Bits per second of a rate between the slowest and the fastest, from which the measured length of a bit begins.
 const MIDDLE_BIT_RATE: f64 = 2160.0;
-/// The part of a bit that divides the intervals of a 1 from that of a 0.
+/// The part of a bit that divides the intervals of a 1 from the interval of a 0.
 const THRESHOLD: f64 = 0.75;
 /// The part of the amplitude that a change must pass, so that noise about zero is no change.
 const HYSTERESIS: f64 = 0.3;

@@ -1,7 +1,7 @@
 //! MIDI timecode (MIDI 1.0, "MIDI Time Code", quarter frames and full frames). In: the bytes of a MIDI device. Out:
 //! labels. Pure.
 //!
-//! Eight quarter frames carry a label in two frames of time. The label is that of the moment of piece 0: when piece 7
+//! Eight quarter frames carry a label in two frames of time. The label belongs to the moment of piece 0: when piece 7
 //! has come, 7/4 frames have passed. While timecode runs backward the pieces come from 7 to 0.
 
 use crate::timecode::{FrameRate, Label};
@@ -87,7 +87,7 @@ impl Decoder {
                     self.quarter_frame(byte >> 4, byte & 0xf)
                 }
                 Expects::Exclusive => {
-                    // One byte more tells that the message is longer than a full frame.
+                    // One byte more shows that the message is longer than a full frame.
                     if self.message.len() <= FULL_FRAME_BYTES {
                         self.message.push(byte);
                     }
@@ -174,7 +174,7 @@ mod tests {
             let then: Vec<u8> = bytes.into_iter().chain(QUARTERS).collect();
             assert_eq!(events(then).len(), 1);
         }
-        // It begins in the middle.
+        // The bytes begin in the middle.
         assert_eq!(events(QUARTERS[6..].iter().copied().chain(QUARTERS)).len(), 1);
     }
 

@@ -76,7 +76,7 @@ fn chunks(mut bytes: &[u8]) -> impl Iterator<Item = Result<(u16, &[u8]), Malform
             return None;
         }
         let chunk = bytes.split_first_chunk().and_then(|(&[a, b, c, d], rest)| {
-            // The highest bit says that the content is chunks.
+            // The highest bit is set if the content is chunks.
             let length = usize::from(u16::from_le_bytes([c, d]) & 0x7fff);
             Some((u16::from_le_bytes([a, b]), rest.get(..length)?, rest.get(length..)?))
         });

@@ -37,7 +37,8 @@ impl Schedule {
         self.speed * since
     }
 
-    /// Returns the goal of a show while its timecode does this. `was_locked` is true once the source has been locked.
+    /// Returns the goal of a show while its timecode has this motion. `was_locked` is true once the source has been
+    /// locked.
     pub fn goal(&self, motion: Motion, rate: FrameRate, was_locked: bool) -> Goal {
         match motion {
             Motion::Silent => Goal::None,

@@ -254,7 +254,7 @@ fn sound(stream: &mut impl Read, format: Format, is_live: bool, inputs: &Sender<
                 Some(ltc::Event::Backward) => Input::Backward(now_ns),
                 Some(ltc::Event::Frame { label, rate, end }) => {
                     let at_ns = now_ns.saturating_sub(((last as f64 - end) * sample_ns) as u64);
-                    // The label is that of the frame that has ended.
+                    // The label belongs to the frame that has ended.
                     Input::Frame { label, rate, age: 1.0, at_ns, sender: None }
                 }
             };

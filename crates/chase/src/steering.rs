@@ -1,8 +1,8 @@
 //! From the time that a show should have to commands: rate, seek, pause, resume. Pure: frames and answers in, at most
 //! one command at a time out.
 //!
-//! The frames tell which simulated time the show had at which moment. An error is taken up by the rate; a larger one is
-//! a seek. A hold, and a pause or a seek of another client, is obeyed until the show plays again.
+//! Each frame contains the simulated time of the show at a moment. The rate takes up an error; a larger error is a
+//! seek. During a hold, and after a pause or a seek of another client, the chase waits until the show plays again.
 
 use bench_dragon_messages::FrameHeader;
 use bench_dragon_messages::control::{Code, Command, RATES};
@@ -99,7 +99,7 @@ struct Show {
     epoch: u32,
     /// The latest command without an answer: the show may still execute this command.
     unanswered: Option<Command>,
-    /// True until a show that was paused when it was found has been told to go on.
+    /// True for a show that was paused when it was found, until the show plays or refuses [`Command::Go`].
     is_new: bool,
     /// True if another client has made the show play while it should stand.
     is_released: bool,
@@ -189,8 +189,8 @@ impl Steering {
         show.is_new &= !show.plays;
     }
 
-    /// Handles the answer to the command of the moment `sent_ns`: its code and the tick at which it took hold; `None` if
-    /// no answer comes. Late answers, and those of a publisher that has ended, are ignored.
+    /// Handles the answer to the command of the moment `sent_ns`: its code and the tick at which it took hold; `None`
+    /// if no answer comes. Late answers, and answers of a publisher that has ended, are ignored.
     pub fn answered(&mut self, sent_ns: u64, answer: Option<(Code, u64)>) {
         let Some(show) = &mut self.show else { return };
         let pending = show.pending.take_if(|pending| pending.sent_ns == sent_ns);
@@ -351,8 +351,8 @@ mod tests {
         assert_eq!(steering.waiting(), None);
     }
 
-    /// A show that another client makes play is left alone while the source stands, one that the chase has started late
-    /// is paused again.
+    /// A show that another client makes play is left alone while the source stands. A show that the chase has started
+    /// late is paused again.
     #[test]
     fn a_start_whose_answer_is_lost_is_no_start_of_another_client() {
         for is_own in [false, true] {

@@ -1,5 +1,5 @@
-//! Lock, jump, drift, freewheel: what a source of timecode does, from its readings alone. Pure; called with simulated
-//! time by tests.
+//! Lock, jump, drift, freewheel: the motion of a source of timecode, from its readings alone. Pure; called with
+//! simulated time by tests.
 //!
 //! A reading is a position and the moment of its arrival. Arrival can only be late, by jitter or by a stall of the
 //! network; after a stall the waiting packets come at once. Positions that run evenly at another place are a jump.
@@ -16,7 +16,8 @@ const EVEN: f64 = 0.025;
 const MOST_STEP: f64 = 1.5;
 /// Duration for which evenly late readings count as a stall, seconds.
 const LATE: f64 = 0.5;
-/// How long a repeated label is a sender's repetition, seconds, and how often it comes.
+/// The time up to which a repeated label is a sender's repetition, seconds, and the least repetitions of a standing
+/// source.
 const STANDING: f64 = 0.15;
 const STANDING_READINGS: u32 = 3;
 /// The errors below which a loop keeps its rate when its source jumps, seconds.
@@ -35,7 +36,7 @@ pub struct Reading {
     pub day: f64,
 }
 
-/// What a source does at a moment.
+/// The motion of a source at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion {
     /// No reading has come.
@@ -49,7 +50,7 @@ pub enum Motion {
         /// Seconds per second.
         rate: f64,
     },
-    /// Readings have stopped; the position goes on.
+    /// Readings have stopped; the position continues.
     Freewheeling {
         /// Position, seconds.
         position: f64,
@@ -67,7 +68,7 @@ pub enum Motion {
 /// The options of a synchronizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// How long a source without readings goes on, seconds.
+    /// The time for which a source without readings continues, seconds.
     pub freewheel: f64,
     /// Readings in order that lock: 3 for frames, 2 for readings that take several frames.
     pub readings_to_lock: usize,
@@ -80,7 +81,7 @@ pub struct Synchronizer {
     state: State,
     /// The latest readings that run evenly and do not fit the loop.
     run: VecDeque<Reading>,
-    /// The latest reading, its first arrival and how often it has been repeated.
+    /// The latest reading, with its first arrival, and the number of its repetitions.
     latest: Option<(Reading, u32)>,
     latest_ns: u64,
     /// Readings in a row that ran backward.
@@ -173,7 +174,7 @@ impl Synchronizer {
         self.extend_run(reading);
     }
 
-    /// Adds a reading to the run of those that do not fit, or begins another run with it.
+    /// Adds a reading that does not fit to the run of such readings, or begins another run with it.
     fn extend_run(&mut self, reading: Reading) {
         let follows = self.run.back().is_some_and(|last| {
             let position = wrapped(reading.position - last.position, reading.day);
@@ -212,7 +213,7 @@ impl Synchronizer {
         self.state = State::Running { estimate, fitting_ns: last.at_ns, reached };
     }
 
-    /// Returns what the source does now.
+    /// Returns the motion of the source now.
     pub fn motion(&mut self, now_ns: u64) -> Motion {
         let quiet = self.quiet_for(now_ns);
         match self.state {

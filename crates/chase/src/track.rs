@@ -13,8 +13,8 @@ use crate::steering::{Goal, Limits};
 const WINDOW: f64 = 3.0;
 /// The distance of the points that are compared first, metres.
 const STEP: f64 = 0.25;
-/// Steps along the tangent from the nearest of those points. Each leaves the part of the error that is the distance
-/// from the path divided by the radius of its curve.
+/// Steps along the tangent from the nearest of those points. Each step leaves the part of the error that is the
+/// distance from the path divided by the radius of its curve.
 const REFINEMENTS: usize = 8;
 /// The greatest distance from the path, metres.
 pub const MOST_DISTANCE: f64 = 1.0;
@@ -36,7 +36,7 @@ pub struct Projection {
     pub distance: f64,
 }
 
-/// What a tracked performer does.
+/// The state of a tracked performer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Following {
     /// No position has come.
@@ -45,7 +45,7 @@ pub enum Following {
     Locking,
     /// The performer is followed.
     Locked,
-    /// No position comes; the performer goes on at the latest speed.
+    /// No position comes; the performer continues at the latest speed.
     Freewheeling,
     /// No position comes, or only positions off the path.
     Lost,
@@ -65,7 +65,7 @@ pub struct Track {
 
 impl Track {
     /// Creates the track of a motion, whose head follows its path exactly and begins after `delay` simulated seconds of
-    /// the show. `freewheel` is how long a performer that is not seen is followed, seconds.
+    /// the show. `freewheel` is the time for which a performer that is not seen is followed, seconds.
     pub fn new(motion: Motion, delay: f64, freewheel: f64) -> Self {
         Self { motion, delay, freewheel, estimate: None, readings: 0, fitting_ns: None, distance: f64::NAN }
     }
@@ -97,8 +97,8 @@ impl Track {
         Projection { travelled, distance: offset(travelled).norm() }
     }
 
-    /// Handles a position of the tracker on the stage, metres. `show_time` is the simulated time of the show, near
-    /// whose head a performer is looked for first.
+    /// Handles a position of the tracker on the stage, metres. `show_time` is the simulated time of the show: the first
+    /// search for a performer is near the head at that time.
     pub fn read(&mut self, point: Point, at_ns: u64, show_time: f64) {
         let head_speed = self.motion.head_speed();
         let near = self
@@ -121,7 +121,7 @@ impl Track {
         }
     }
 
-    /// Returns what the performer does now.
+    /// Returns the state of the performer now.
     pub fn following(&mut self, now_ns: u64) -> Following {
         let quiet = self.fitting_ns.map(|at_ns| seconds_between(at_ns, now_ns));
         match quiet {

@@ -1,7 +1,8 @@
-//! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: what is in the queues.
+//! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: the contents of the
+//! queues.
 //!
-//! It keeps no counts: the [`feed`](super::feed), which calls it, decides when to open, to read and to disconnect. A
-//! service can have more than one publisher: `selected` has the one whose messages are read.
+//! This layer keeps no counts: the [`feed`](super::feed), which calls this layer, decides when to open, to read and to
+//! disconnect. A service can have more than one publisher: `selected` has the one whose messages are read.
 
 mod selected;
 mod slices;
@@ -78,17 +79,17 @@ pub struct Subscription {
     node: Node<ipc::Service>,
     name: String,
     wake: Wake,
-    /// Publishers that do not send, and since when that is known: the ends of tunnels to other machines. Open services
-    /// would keep the tunnel open.
+    /// Publishers that do not send, the ends of tunnels to other machines, and the moment at which this was found. Open
+    /// services would keep the tunnel open.
     stale_publishers: RefCell<(Instant, Vec<Origin>)>,
 }
 
 /// The way in which a subscriber notices a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wake {
-    /// The publisher wakes it, which costs the publisher some microseconds for every frame.
+    /// The publisher wakes the subscriber, which costs the publisher some microseconds for every frame.
     OnFrame,
-    /// It polls, which costs the publisher nothing.
+    /// The subscriber polls, which costs the publisher nothing.
     Never,
 }
 
@@ -115,7 +116,7 @@ impl Subscription {
             self.node.service_builder(&name).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>().open();
         let poses_service = match opened {
             Ok(service) => service,
-            // It does not exist yet, or is being created or removed.
+            // The service does not exist yet, or is being created or removed.
             Err(Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction) => return Ok(None),
             Err(Open::IncompatibleTypes | Open::VersionMismatch) => {
                 let own = [layouts::name::<HandlePose>(), layouts::name::<FrameHeader>()];
@@ -326,8 +327,8 @@ impl Connection {
     }
 
     /// Returns true if the service names the clock of this process, so that moments of CLOCK_MONOTONIC in its frames
-    /// can be compared with moments here. The name is that of the creator: a tunnel may use a service that a show of
-    /// this machine has left.
+    /// can be compared with moments here. The creator of the service has set the name: a tunnel may use a service that
+    /// a show of this machine has left.
     pub fn names_clock(&self) -> bool {
         let clock = monotonic_clock_name();
         self.poses_service.attributes().iter().any(|it| it.key() == CLOCK && it.value() == clock.as_str())
@@ -341,8 +342,8 @@ impl Connection {
         }
     }
 
-    /// Passes the frames that have come to `each`, oldest first, and returns their number. They are at most as many as
-    /// the queue holds: otherwise a publisher that is faster than `each` would keep the caller here.
+    /// Passes the frames that have come to `each`, oldest first, and returns their number. The frames are at most as
+    /// many as the queue holds: otherwise a publisher that is faster than `each` would keep the caller here.
     pub fn frames(&mut self, mut each: impl FnMut(&FrameHeader, &[HandlePose])) -> usize {
         let (mut count, mut received) = (0, 0);
         while received < self.poses.buffer_size()
@@ -481,7 +482,7 @@ impl Connection {
         }
     }
 
-    /// Returns true if a message is handed over: its node is that of the frames, or the next run begins with it.
+    /// Returns true if a message is handed over: its node is the node of the frames, or the next run begins with it.
     fn admits(&self, origin: Origin, run_id: u64) -> bool {
         let Selection::Following { selected, .. } = &self.selection else { return false };
         selected.origin.node == origin.node

@@ -133,7 +133,7 @@ impl Controller {
                 return Ok(response);
             }
             if let Err(error) = vigil.check(self) {
-                // It may have answered just before its end.
+                // The publisher may have answered just before its end.
                 return pending.poll()?.ok_or(error);
             }
             if Instant::now() >= deadline(&vigil) {

@@ -20,12 +20,14 @@ use sequence::SequenceTracker;
 
 /// The interval of connection attempts while there is no publisher.
 const CONNECT_INTERVAL: Duration = Duration::from_millis(20);
-/// The interval at which missing services are opened. Until anything has come, it is that of connection attempts.
+/// The interval at which missing services are opened. Until anything has come, the interval of connection attempts is
+/// used.
 const OPEN_INTERVAL: Duration = Duration::from_millis(100);
-/// How long a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come once a
-/// second.
+/// The time for which a publisher may send nothing while no show runs here: statuses and, over a tunnel, stages come
+/// once a second.
 const QUIET: Duration = Duration::from_millis(1500);
-/// How long an alert waits for the stage of its run, which names its benches: over a tunnel, stages come once a second.
+/// The time for which an alert waits for the stage of its run, which names the benches: over a tunnel, stages come once
+/// a second.
 const STAGE_PATIENCE: Duration = Duration::from_millis(1500);
 
 /// The frames since the last poll that are handed over.
@@ -49,7 +51,7 @@ pub struct FeedOptions {
 /// A message of a publisher, or a change of the publisher.
 #[derive(Debug, Clone, Copy)]
 pub enum FeedEvent<'a> {
-    /// Another run than that of the latest frame has begun. Its first frame follows.
+    /// Another run than the run of the latest frame has begun. Its first frame follows.
     Started {
         /// The run.
         run_id: u64,
@@ -88,8 +90,8 @@ pub enum FeedEvent<'a> {
     Chase(&'a ChaseStatus),
     /// The publisher is alive and has stopped sending. The next frame ends that.
     Silent,
-    /// The publisher has ended or died, and all its messages have been handed over. Or it is the silent end of a
-    /// tunnel, and a show has begun on this machine.
+    /// The publisher has ended or died, and all its messages have been handed over. Or the publisher is the silent end
+    /// of a tunnel, and a show has begun on this machine.
     Gone,
 }
 
@@ -185,8 +187,8 @@ impl Feed {
     }
 
     /// Waits for messages, at most `timeout`, and passes all of them to `handle`, but at most as many frames as the
-    /// queue holds. May return sooner and without messages. It also connects and tests the publisher, so call it in a
-    /// loop, at least a few times a second.
+    /// queue holds. May return sooner and without messages. Also connects and tests the publisher, so call this
+    /// function in a loop, at least a few times a second.
     ///
     /// # Errors
     /// [`OpenError`] if the services exist and cannot be used. The feed has closed them then, and the next call
@@ -236,8 +238,9 @@ impl Feed {
         Ok(())
     }
 
-    /// Returns true if the publisher's clock is that of this process, so that latencies can be computed; `None` while
-    /// there is no publisher. For another publisher the value is right after the poll that brings its first frame.
+    /// Returns true if the publisher's clock is the clock of this process, so that latencies can be computed; `None`
+    /// while there is no publisher. For another publisher the value is right after the poll that brings its first
+    /// frame.
     pub fn shares_clock(&self) -> Option<bool> {
         self.connected.as_ref().map(|connected| connected.shares_clock)
     }

@@ -139,8 +139,8 @@ fn interpolate(from: &Snapshot, to: &Snapshot, length: f64, u: f64, handles: &mu
     }
 }
 
-/// Sets every heading to that of the bench behind the handle; at the `tails` and at the last handle, to that of the
-/// bench before.
+/// Sets every heading to the direction of the bench behind the handle. At the `tails` and at the last handle, the
+/// heading is the direction of the bench before.
 fn set_headings(handles: &mut [HandlePose], tails: &[usize]) {
     for bench in 1..handles.len() {
         let (front, rear) = (handles[bench - 1], handles[bench]);
@@ -154,8 +154,8 @@ fn set_headings(handles: &mut [HandlePose], tails: &[usize]) {
     }
 }
 
-/// One coordinate and its rate, of a cubic, a quadratic or a straight line. This is the polynomial of least degree
-/// through both positions and those velocities that `ends` trusts.
+/// One coordinate and its rate, of a cubic, a quadratic or a straight line. The curve is the polynomial of least degree
+/// through both positions and the velocities that `ends` trusts.
 fn coordinate(at: [f64; 2], rate: [f64; 2], ends: (bool, bool), length: f64, u: f64) -> (f64, f64) {
     let step = at[1] - at[0];
     let [first, last] = rate.map(|rate| rate * length);
@@ -202,7 +202,7 @@ mod tests {
         Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene }
     }
 
-    /// A reader that has taken the first frames of a show, which freezes at the contact.
+    /// A reader that has taken the first frames of a show, which ends at the contact.
     fn reader(playback: Playback, frames: u64) -> HermiteReader {
         let scene = scene();
         reader_of(&mut Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap(), playback, frames)
@@ -220,8 +220,8 @@ mod tests {
         reader
     }
 
-    /// The greatest distance of a handle from where the safe solver has it, and the greatest difference of a heading.
-    /// The moments are spread over `seconds`, and only the first is a frame's.
+    /// The greatest distance of a handle from its place by the safe solver, and the greatest difference of a heading.
+    /// The moments are spread over `seconds`, and only the first is the moment of a frame.
     fn worst(start: f64, rate: f64, seconds: f64) -> (f64, f64) {
         let scene = scene();
         let reader = reader(Playback { start, rate, ..Playback::of(&scene) }, (seconds * rate) as u64 + 2);
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn the_last_interval_before_the_end_trusts_no_velocity_that_standing_still_made_zero() {
-        // The show freezes at the contact, between two frames; the velocities of that frame are zero.
+        // The show ends at the contact, between two frames; the velocities of the later frame are zero.
         let (position, _) = worst(412.0, 10.0, 0.6);
         println!("{position:.1e} m");
         assert!(position < 1e-4, "{position:e} m");
@@ -284,7 +284,7 @@ mod tests {
             let rate = |t: f64| b + t * (2.0 * c + t * 3.0 * d);
             let (x, v) = coordinate([value(0.0), value(h)], [rate(0.0), rate(h)], (true, true), h, u);
             prop_assert!((x - value(u * h)).abs() < 1e-13 * 100.0 && (v - rate(u * h)).abs() < 1e-11);
-            // Of a parabola, with either end's velocity.
+            // A parabola, with either end's velocity.
             let value = |t: f64| a + t * (b + t * c);
             let rate = |t: f64| b + 2.0 * c * t;
             for ends in [(true, false), (false, true)] {
@@ -308,7 +308,8 @@ mod tests {
             let error = |(pose, truth): (&HandlePose, &f64)| (pose.heading - truth).sin().abs();
             handles.iter().zip(&chain.heading).map(error).fold(0.0, f64::max)
         };
-        // Without the stage, and with that of another run, the last handle of gold is turned toward the head of jade.
+        // Without the stage, and with the stage of another run, the last handle of gold is turned toward the head of
+        // jade.
         assert!(worst(&reader) > 0.1);
         reader.set_stage(&stage(2, 0, [0; 32], OnStage::from(&scene), &show).stage);
         assert!(worst(&reader) > 0.1);

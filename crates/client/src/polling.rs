@@ -14,7 +14,8 @@ use crate::shared_memory::OpenError;
 /// The interval of polls: the greatest delay of a handler after the publisher.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-/// The reason why services cannot be used at present. It may end: a program of another version or a subscriber ends.
+/// The reason why services cannot be used at present. The reason may disappear: a program of another version or a
+/// subscriber ends.
 #[derive(Debug, Default)]
 pub struct Obstacle(Option<String>);
 
@@ -35,8 +36,8 @@ impl Obstacle {
 pub trait Handler {
     /// Handles an event of a publisher, given by its place in the list of names, from 0.
     fn handle(&mut self, publisher: usize, event: FeedEvent<'_>);
-    /// Handles the clock of a running publisher: `shares_clock` is true if it is that of this process. Called before
-    /// the first frame and after each poll. Handlers that compare no moments can ignore it.
+    /// Handles the clock of a running publisher: `shares_clock` is true if this is also the clock of this process.
+    /// Called before the first frame and after each poll. Handlers that compare no moments can ignore it.
     fn clock(&mut self, _publisher: usize, _shares_clock: bool) {}
     /// Handles that the feed [is ready](Feed::is_ready). Called after each poll of a feed that is.
     fn ready(&mut self, _publisher: usize) {}

@@ -134,7 +134,7 @@ struct Pending<Tag> {
     action: Action,
     /// The action's command, or the request for the state on which the command depends.
     command: Command,
-    /// True if it was sent before, to a publisher that had gone.
+    /// True if the command was sent before, to a publisher that had gone.
     repeated: bool,
     /// True if a hold has come since: nothing more is sent for this action.
     overtaken: bool,

@@ -25,9 +25,9 @@ pub struct Liveness {
 /// The result of a test of the publisher.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// It is alive and has stopped sending.
+    /// The publisher is alive and has stopped sending.
     Silent,
-    /// It is no longer there.
+    /// The publisher is no longer there.
     Gone,
 }
 
@@ -75,8 +75,8 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// The changes of a publisher, with the milliseconds at which they are noticed. It is polled every 4 ms, sends
-    /// frames at the times in `frames` and dies at `death`.
+    /// The changes of a publisher, with the milliseconds at which they are noticed. The publisher is polled every 4 ms,
+    /// sends frames at the times in `frames` and dies at `death`.
     fn changes(rate: Option<f64>, frames: &[u64], death: u64, until: u64) -> Vec<(u64, Change)> {
         let start = Instant::now();
         let mut liveness = Liveness::connected_at(start);

@@ -81,9 +81,9 @@ pub enum OpenError {
     OtherLayout {
         /// The service.
         service: String,
-        /// Names of its layouts.
+        /// Names of the service's layouts.
         theirs: String,
-        /// Names of this program's.
+        /// Names of this program's layouts.
         own: String,
     },
     /// A service of this name exists with other attributes.

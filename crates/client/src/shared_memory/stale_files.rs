@@ -56,7 +56,7 @@ pub fn remove_unfinished_files() {
         let id = folder.file_name().unwrap_or_default().to_string_lossy();
         match nodes.get(id.as_ref()) {
             Some(Life::Dead) => remove_all(with_mode(folder, UNFINISHED)),
-            // Its process was killed before the node was listed: no other program removes it.
+            // The process was killed before its node was listed: no other program removes the node.
             None if is_old(folder) && !entries(folder).iter().any(|file| is_being_written(file)) => {
                 let monitor = format!("{}{id}.", config.global.prefix);
                 let its_own =
@@ -83,8 +83,8 @@ pub fn spawn_reaper() {
     });
 }
 
-/// Removes files that have been unfinished for long; `seen` has the time since when, independent of the file system's
-/// clock.
+/// Removes files that have been unfinished for long; `seen` has the moment of the first sight of each, independent of
+/// the file system's clock.
 fn remove_what_stays_unfinished(seen: &mut BTreeMap<PathBuf, Instant>) {
     let config = Config::global_config();
     let prefix = config.global.prefix.to_string();
@@ -127,7 +127,7 @@ fn is_being_written(file: &Path) -> bool {
 }
 
 fn remove_all(files: Vec<PathBuf>) {
-    // Another process may have removed it first.
+    // Another process may have removed the file first.
     files.iter().for_each(|file| drop(fs::remove_file(file)));
 }
 
