@@ -302,7 +302,7 @@ impl QueuedFrame {
         Ok(())
     }
 
-    /// Makes the messages those of this run, in the period `tick`.
+    /// Gives the messages the stamps of this run, in the period `tick`.
     fn stamp(&mut self, tick: u64, stamps: Stamps, behind: u64) {
         let Stamps { run_id, sequence, stamp_ns, deadline_ns } = stamps;
         let header = &mut self.header;

@@ -20,7 +20,7 @@ pub struct ShowTime {
     pub sim_time: f64,
     /// Simulated seconds per second of wall time in force: 0 while paused or held, unchanged after the end of the show.
     pub time_scale: f64,
-    /// The playback state: it tells whether simulated time advances.
+    /// The playback state: simulated time advances or stands still.
     pub playback: PlaybackState,
     /// Jumps of simulated time so far: loops, seeks, restarts.
     pub epoch: u32,

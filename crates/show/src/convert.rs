@@ -232,7 +232,7 @@ pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
 
 /// The dragons on a stage.
 pub enum OnStage<'a> {
-    /// The only one of a show.
+    /// The only dragon of a show.
     One(&'a Motion),
     /// Several.
     Several(&'a Ensemble),
@@ -419,7 +419,7 @@ mod tests {
             let decimation = Decimation::new([handles], every);
             assert_eq!(decimation.handles(), expected, "{decimation:?}");
         }
-        // Of two dragons, both ends of each.
+        // Both ends of each of two dragons.
         assert_eq!(Decimation::new([15, 4], 7).handles(), [0, 7, 14, 15, 18]);
     }
 

@@ -41,7 +41,7 @@ impl Dancer {
         motion.in_own_frame().solver(scene.velocities)
     }
 
-    /// Creates the dragon of `motion` with what the scene computes.
+    /// Creates the dragon of `motion`, with velocities and clearances if the scene requests them.
     pub(crate) fn new(scene: &Scene, motion: &Motion, choice: Choice) -> Self {
         let own = motion.in_own_frame();
         Self {

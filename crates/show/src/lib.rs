@@ -47,7 +47,7 @@ pub struct Frame {
     pub time_scale: f64,
     /// The latest event passed, or `Approaching`, or `Moving`.
     pub state: FrameState,
-    /// The playback state: it tells whether simulated time advances.
+    /// The playback state: simulated time advances or stands still.
     pub playback: PlaybackState,
     /// The pose of every handle.
     pub chain: Chain,
@@ -120,7 +120,7 @@ pub struct Outcome {
     pub sim_time: f64,
     /// Simulated seconds per second of wall time in force.
     pub time_scale: f64,
-    /// Simulated seconds per second while the show plays. A pause keeps it.
+    /// Simulated seconds per second while the show plays. A pause keeps this rate.
     pub playing_rate: f64,
     /// The playback state.
     pub playback: PlaybackState,
@@ -128,7 +128,7 @@ pub struct Outcome {
     pub cue: u32,
 }
 
-/// The dragons in play: the one of a show without names, or several.
+/// The dragons in play: the only dragon of a show without names, or several.
 enum Cast {
     One(Box<Dancer>),
     Several(Box<Several>),
@@ -349,8 +349,8 @@ impl Show {
         }
     }
 
-    /// Records a contact, or the touch of an obstacle, if boards overlap although none has happened: the searches
-    /// missed it.
+    /// Records a contact, or the touch of an obstacle, that the searches missed: boards overlap although no such event
+    /// has happened.
     fn record_unforeseen_touch(&mut self, closest: Option<PairClearance>) {
         let (Some(tolerance), Some(closest)) = (self.overlap_tolerance, closest) else { return };
         let time = self.frame.sim_time;

@@ -79,9 +79,9 @@ pub enum OnContact {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AtEnd {
-    /// It publishes the last frame until it is stopped.
+    /// `run` publishes the last frame until it is stopped.
     Hold,
-    /// It starts again.
+    /// `run` starts the show again.
     Loop,
 }
 
@@ -104,7 +104,7 @@ pub struct AlertRules {
 /// let twenty = SceneText::paper().text.replace("benches = 223", "benches = 20");
 /// let scene = Scene::parse(&twenty, "twenty.toml", "twenty")?;
 /// assert_eq!(scene.team().handles(), 21);
-/// // What cannot be used is named by file, line and field.
+/// // An error names file, line and field.
 /// let wrong = twenty.replace("pitch = 0.55", "pitch = 0");
 /// let error = Scene::parse(&wrong, "wrong.toml", "wrong").unwrap_err().to_string();
 /// assert!(error.starts_with("wrong.toml, line ") && error.contains("path.pitch is 0, expected"), "{error}");
@@ -114,12 +114,13 @@ pub struct AlertRules {
 pub struct Scene {
     /// The scene's name; by default the stem of its file.
     pub name: String,
-    /// The team on its path, with the accuracy. With several dragons that of the first alone: only code that looks at
-    /// `ensemble` first may use it.
+    /// The team on its path, with the accuracy. With several dragons, the motion of the first alone: only code that
+    /// looks at `ensemble` first may use this field.
     pub motion: Motion,
     /// The dragons of a scene with `[[dragons]]`; `None` for a scene with `[team]`.
     pub ensemble: Option<Ensemble>,
-    /// Where the path's coordinates stand on the stage, if the scene states it. The motion's own placement contains it.
+    /// The placement of the path's coordinates on the stage, if the scene states one. The motion's own placement
+    /// contains this one.
     pub placement: Option<Placement>,
     /// The reaction to a contact.
     pub on_contact: OnContact,
@@ -200,7 +201,7 @@ impl Scene {
         self.ensemble.as_ref().map_or(self.motion.team().benches, Ensemble::benches)
     }
 
-    /// Returns the number of handles of a frame: those of all dragons.
+    /// Returns the number of handles of a frame: the handles of all dragons.
     pub fn handles(&self) -> usize {
         self.ensemble.as_ref().map_or(self.motion.team().handles(), Ensemble::handles)
     }
@@ -260,10 +261,10 @@ impl Scene {
     }
 }
 
-/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is no TOML has none: its
-/// errors are those of a scene of one.
+/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is no TOML has none: its errors
+/// are the errors of a scene of one dragon.
 fn several(text: &str) -> Option<Spanned<serde::de::IgnoredAny>> {
-    // Most scenes have one, and are read once.
+    // Most scenes have one dragon, and are read once.
     text.contains("dragons").then(|| toml::from_str::<Probe>(text).ok()?.dragons).flatten()
 }
 

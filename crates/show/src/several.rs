@@ -18,7 +18,7 @@ struct Member {
     dragon: Dragon,
     dancer: Dancer,
     handles: Range<usize>,
-    /// The own time solved, and true if it moved then.
+    /// The own time solved, and true if the dragon moved then.
     solved: Option<(f64, bool)>,
     /// The nearest of its boards, by the numbers of the show.
     closest: Closest,
@@ -97,7 +97,7 @@ impl Several {
 }
 
 impl Member {
-    /// Solves the dragon in its place of the chain of all. One that stands is solved once.
+    /// Solves the dragon in its place of the chain of all. A dragon that stands is solved once.
     fn solve(
         &mut self,
         show_time: f64,

@@ -57,7 +57,7 @@ impl ConformanceCheck {
         if stands != (header.time_scale == 0.0) || header.time_scale < 0.0 || !header.time_scale.is_finite() {
             return Err("the time scale is not that of its playback");
         }
-        // Without requested velocities they are NaN.
+        // Velocities that are not requested are NaN.
         let moves = |handle: &HandlePose| handle.vx.abs() > 0.0 || handle.vy.abs() > 0.0;
         if playback != PlaybackState::Playing && handles.iter().any(moves) {
             return Err("a frame that stands still has velocities");

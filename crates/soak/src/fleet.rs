@@ -51,13 +51,13 @@ pub enum FleetError {
     NoFrames,
 }
 
-/// All processes of a soak test. Dropping it kills those that still run.
+/// All processes of a soak test. Dropping the fleet kills the processes that still run.
 pub struct Fleet {
     plan: Plan,
     publisher: Child,
     /// The exit status of the publisher, if it has ended.
     publisher_ended: Option<ExitStatus>,
-    /// True if it ended without a signal from the soak test.
+    /// True if the publisher ended without a signal from the soak test.
     publisher_ended_early: bool,
     summary: Option<RunSummary>,
     members: Vec<Member>,
@@ -92,7 +92,7 @@ impl Growth {
 }
 
 impl Fleet {
-    /// Starts the publisher and the subscribers, and waits until every steady one has received a frame, or until
+    /// Starts the publisher and the subscribers, and waits until every steady subscriber has received a frame, or until
     /// `proceed` returns false.
     ///
     /// # Errors
@@ -282,7 +282,7 @@ impl Fleet {
         self.publisher_growth.bytes()
     }
 
-    /// Returns the same of the process of ROS 2; `None` without one.
+    /// Returns the same growth for the process of ROS 2; `None` also without this process.
     pub fn ros2_growth(&self) -> Option<u64> {
         self.ros2_growth.bytes()
     }
@@ -337,7 +337,7 @@ impl Drop for Fleet {
         let conducting = self.conducting.iter_mut().flat_map(Conducting::children);
         let members = self.members.iter_mut().map(|member| &mut member.child);
         for child in members.chain(conducting).chain([&mut self.publisher]) {
-            // It may have ended already.
+            // The process may have ended already.
             let _ = child.kill();
             let _ = child.wait();
         }

@@ -34,13 +34,13 @@ impl Role {
 /// The state of a subscriber's present process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProcessState {
-    /// It runs.
+    /// The process runs.
     Running,
-    /// It was sent SIGTERM and has not ended yet.
+    /// The process was sent SIGTERM and has not ended yet.
     Ending,
-    /// It has ended after SIGTERM.
+    /// The process has ended after SIGTERM.
     Ended,
-    /// It has ended without a signal from the soak test.
+    /// The process has ended without a signal from the soak test.
     EndedByItself,
 }
 

@@ -27,9 +27,9 @@ pub struct Observation {
     pub worst_link_error: f64,
     /// Frames that do not follow from the frame before by the rules of playing, pausing and jumping.
     pub disobedient: u64,
-    /// The fault of the first of those.
+    /// The fault of the first such frame.
     pub disobedience: Option<String>,
-    /// Frames whose time was compared with that of the frames before.
+    /// Frames whose time was compared with the time of the frames before.
     pub times_checked: u64,
     /// `epoch` of the latest frame.
     pub epoch: u32,

@@ -36,11 +36,11 @@ pub struct Report {
     pub version: &'static str,
     /// The machine of the test.
     pub machine: Machine,
-    /// CLOCK_REALTIME in seconds when it began.
+    /// CLOCK_REALTIME in seconds when the test began.
     pub began_at: u64,
     /// Wall time from the first frame of all subscribers to the end, seconds.
     pub seconds: f64,
-    /// The summary that the publisher printed at its end; null if it did not end properly.
+    /// The summary that the publisher printed at its end; null if the publisher did not end properly.
     pub publisher: Option<RunSummary>,
     /// The observation of each subscriber.
     pub subscribers: Vec<SubscriberReport>,

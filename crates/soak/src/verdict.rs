@@ -146,7 +146,7 @@ impl SoakVerdict {
     }
 }
 
-/// Returns the number of frames that did not come, with those after the last received frame.
+/// Returns the number of frames that did not come, with the frames after the last received frame.
 fn missed(fleet: &Fleet, steady: &[&Member]) -> f64 {
     let Some(summary) = fleet.summary() else { return f64::NAN };
     let of = |member: &&Member| {
@@ -174,8 +174,8 @@ fn disagreements(fleet: &Fleet, steady: &[&Member]) -> f64 {
     steady.iter().filter(disagrees).count() as f64
 }
 
-/// Returns the difference between the jumps that steady subscribers counted and the expected jumps: those commanded and
-/// those by which the show began again. Unknown without the last status.
+/// Returns the difference between the jumps that steady subscribers counted and the expected jumps. The expected jumps
+/// are the commanded jumps, and the jumps by which the show began again. Unknown without the last status.
 fn wrong_jumps(steady: &[&Member], conducting: &Conducting) -> f64 {
     let Some(conducted) = conducting.conducted() else { return f64::NAN };
     let of = |member: &&Member| {

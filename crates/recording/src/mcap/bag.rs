@@ -10,11 +10,11 @@ use super::reader::ReadError;
 
 /// The file that lists the recordings, in their order.
 const METADATA: &str = "metadata.yaml";
-/// Its key of that list.
+/// The key of the list in this file.
 const LIST: &str = "relative_file_paths:";
 
 /// Returns the recordings of a directory in the order of `metadata.yaml`. A killed recorder leaves no `metadata.yaml`:
-/// then the order is that of the numbers at the end of the names.
+/// then the order follows the numbers at the end of the names.
 ///
 /// # Errors
 /// [`ReadError::Bag`]

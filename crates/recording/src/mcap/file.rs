@@ -125,7 +125,7 @@ impl McapFile {
         add_channels(&mut bare, name, topics)?;
         let bare = bare.into_inner().into_inner();
         let mut writer = options.create(disk.clone()).map_err(io_error)?;
-        // Both begin with the same header.
+        // The bytes in `bare` and the bytes in `disk` begin with the same header.
         let channel_bytes = bare.get(disk.position() as usize..).unwrap_or_default();
         disk.clone().write_all(channel_bytes)?;
         let metadata = BTreeMap::from([("serialized_metadata".to_owned(), ROSBAG2_METADATA.to_owned())]);

@@ -1,4 +1,4 @@
-//! The layouts of earlier versions, told by the fields of a recording's types: a recording names no version.
+//! The layouts of earlier versions, found by the fields of a recording's types: a recording names no version.
 //!
 //! In: the type of a topic, as a recording describes it. Out: the name of its layout. Called by the
 //! [`reader`](super::reader), for the sentence that refuses a recording.
@@ -24,8 +24,8 @@ const fn history(topic: Topic) -> &'static [(&'static str, &'static str)] {
     }
 }
 
-/// Returns the layouts of a topic's message: that of a recording with `fields`, `None` if no version had it, and this
-/// program's. Equal names are a layout of a later version.
+/// Returns two layouts of a topic's message. The first is the layout of a recording with `fields`, `None` if no earlier
+/// version had this layout. The second is the layout of this program.
 pub fn layouts(topic: Topic, fields: &[[String; 2]]) -> (Option<&'static str>, &'static str) {
     let known = history(topic);
     let found = known.iter().find(|(_, field)| fields.iter().any(|[_, name]| name == field));

@@ -13,7 +13,8 @@ use super::run::{Event, Run};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::settings::Topic;
 
-/// The topics recorded by default: those of a replay, and those that tools show without this program's message types.
+/// The topics recorded by default: the topics of a replay, and the topics that tools show without this program's
+/// message types.
 pub const DEFAULT_TOPICS: [Topic; 8] = [
     Topic::Handles,
     Topic::Poses,
@@ -231,7 +232,7 @@ impl Recorder {
         if let Some((_, is_new)) = self.first.take()
             && is_new
         {
-            // Another process may have removed it.
+            // Another process may have removed the file.
             let _ = std::fs::remove_file(&self.config.file);
         }
         self.finish_run()

@@ -2,7 +2,7 @@
 //!
 //! In: the bytes of the file. Out: a complete file with exactly the messages of the finished chunks, in order. Records
 //! are read one after another. Behind a damaged length the next record is the next chunk or attachment whose own
-//! lengths and check agree: it needs no readable summary. Called by the command `record --recover`.
+//! lengths and check agree: the repair needs no readable summary. Called by the command `record --recover`.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -25,7 +25,7 @@ const FOOTER_BYTES: usize = 20;
 const DATA_END_BYTES: usize = 4;
 /// Bytes of a record with the place of a part of the index.
 const SUMMARY_OFFSET_BYTES: usize = 17;
-/// Bytes of each message in the record that lists those of a chunk and a channel.
+/// Bytes of each message in the record that lists the messages of a chunk and a channel.
 const MESSAGE_INDEX_ENTRY_BYTES: usize = 16;
 /// Opcodes from here on are private to programs.
 const FIRST_PRIVATE: u8 = 0x80;
@@ -246,7 +246,7 @@ impl<Input: Read + Seek> Records<Input> {
                 let Some(length) = checked_length(head).filter(|length| *length <= left) else { continue };
                 self.seek(at + HEAD_BYTES as u64)?.fill(length)?;
                 if has_right_check(head[0], &self.body)? {
-                    // Where its two lengths differ, the next chunk may begin before the end.
+                    // If the two lengths of this record differ, the next chunk may begin before the record's end.
                     self.searched = if head[1..HEAD_BYTES] == length.to_le_bytes() { self.at } else { at + 1 };
                     return Ok(Some((at, head[0])));
                 }
@@ -259,8 +259,8 @@ impl<Input: Read + Seek> Records<Input> {
     }
 }
 
-/// Returns the length of a chunk or an attachment that may begin with these bytes. The lengths in a chunk determine the
-/// chunk's, which may be damaged.
+/// Returns the length of a chunk or an attachment that may begin with these bytes. The length of a chunk follows from
+/// the lengths in the chunk, since the length before it may be damaged.
 fn checked_length(head: &[u8]) -> Option<u64> {
     let number = |at: usize| head.get(at..)?.first_chunk().map(|bytes| u64::from_le_bytes(*bytes));
     let length = match *head.first()? {
@@ -292,8 +292,8 @@ fn has_right_check(opcode: u8, body: &[u8]) -> Result<bool, RecoverError> {
 /// Writes the kept records.
 struct Mender<Output: Write> {
     writer: Writer<NoSeek<Output>>,
-    /// By the file's numbers; the latest definition holds. Those before the first chunk have no check and are repeated
-    /// in it.
+    /// By the file's numbers; the latest definition holds. Definitions before the first chunk have no check and are
+    /// repeated in that chunk.
     schemas: BTreeMap<u16, Schema<'static>>,
     channels: BTreeMap<u16, Known>,
     /// True after the first chunk, even a damaged one: messages are then in chunks.

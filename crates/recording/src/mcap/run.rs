@@ -41,7 +41,7 @@ impl Event {
     fn stamp(&self) -> (u64, u64) {
         match self {
             Self::Stage(stage) => (stage.stage.stamp_ns, 0),
-            // It is no message.
+            // The text of a scene is no message.
             Self::Scene { .. } => (0, 0),
             Self::Alert(alert) => (alert.stamp_ns, alert.tick),
             Self::Cue(cue) => (cue.stamp_ns, cue.tick),

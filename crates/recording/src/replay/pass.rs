@@ -44,7 +44,7 @@ pub(super) struct Pass {
     /// The messages that belong to no returned frame.
     alerts: VecDeque<CollisionAlert>,
     cues: VecDeque<Cue>,
-    /// The latest of those that were read: tick, stamp and kind.
+    /// The latest alert and cue that were read: tick, stamp, and kind or number.
     latest_alert: Option<(u64, u64, [u32; 2])>,
     latest_cue: Option<(u64, u64, u32)>,
     /// As in [`Start`].

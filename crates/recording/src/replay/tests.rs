@@ -1,4 +1,4 @@
-//! The loop's end of a replay on a simulated clock: whatever is late, each frame goes out once, and gaps stay gaps.
+//! The loop's end of a replay on a simulated clock: each frame is sent once, whatever is late, and gaps stay gaps.
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -42,9 +42,9 @@ pub enum CueMoment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CueAction {
-    /// It announces the cue.
+    /// The show announces the cue.
     Mark,
-    /// It announces the cue and pauses until the command `go`.
+    /// The show announces the cue and pauses until the command `go`.
     Pause,
 }
 

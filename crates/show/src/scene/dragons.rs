@@ -21,7 +21,7 @@ pub const MOST_DRAGONS: usize = 16;
 /// The greatest number of bytes of a dragon's name.
 pub const MOST_DRAGON_NAME: usize = 32;
 
-/// Tells a scene of several dragons from a scene of one.
+/// Distinguishes a scene of several dragons from a scene of one.
 #[derive(Deserialize)]
 pub(super) struct Probe {
     pub dragons: Option<Spanned<IgnoredAny>>,

@@ -342,7 +342,7 @@ impl RawStep {
     }
 }
 
-/// How far a bent piece leads.
+/// The extent of a bent piece.
 enum Extent<'a> {
     Turns(&'a Spanned<f64>),
     Length(&'a Spanned<f64>),

@@ -1,8 +1,8 @@
 //! The check of responses against the table of commands: the codes and states that the responses so far allow.
 //!
-//! It knows no times, except those that follow from the scene: the [`record`](super::record) compares times with
-//! frames. A step or a cue may change the state between two responses. Every possible state is kept, and each response
-//! removes the states that would have answered otherwise.
+//! The check knows no times, except the times that follow from the scene: the [`record`](super::record) compares times
+//! with frames. A step or a cue may change the state between two responses. Every possible state is kept, and each
+//! response removes the states that would have answered otherwise.
 //!
 //! The tests' model of a show (`crates/testing/src/model.rs`) cannot check a soak: it needs the period of each command,
 //! which no client knows.
@@ -14,7 +14,7 @@ use bench_dragon_messages::{ControlResponse, Stage};
 /// The facts of a show that decide its answers: from its scene, not from the publisher under test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShowFacts {
-    /// Simulated seconds at which it ends.
+    /// Simulated seconds at which the show ends.
     pub end: f64,
     /// The times of its cues in their order, each with true if the show waits there.
     pub cues: Vec<(f64, bool)>,
@@ -163,7 +163,7 @@ impl AnswerCheck {
         self.possible.iter().all(|state| state.step != Step::Sent)
     }
 
-    /// Adds the states that the show may have reached without a response. `at_cue`: it may have paused at a cue.
+    /// Adds the states that the show may have reached without a response. `at_cue`: the show may have paused at a cue.
     fn advance(&mut self, at_cue: bool) {
         let mut place = 0;
         while let Some(&state) = self.possible.get(place) {
@@ -264,7 +264,7 @@ impl AnswerCheck {
         if passed { Ok(()) } else { Err("expected the number of cues until then".to_owned()) }
     }
 
-    /// Checks the response to the step that was sent. It may be older than responses to other commands.
+    /// Checks the response to the step that was sent. The response may be older than responses to other commands.
     ///
     /// # Errors
     /// As [`answered`](Self::answered).

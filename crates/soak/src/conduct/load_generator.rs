@@ -205,7 +205,7 @@ impl LoadGenerator<'_> {
         }
     }
 
-    /// Sends a step while another runs. The publisher refuses it, unless the other one is over meanwhile.
+    /// Sends a step while another runs. The publisher refuses the step, unless the other step is over meanwhile.
     fn second_step(&mut self, periods: u64) {
         let reply = send(&mut self.controller, Command::Step(periods));
         if reply.answer.as_ref().is_ok_and(|answer| answer.result() == Some(Code::Refused)) {

@@ -108,7 +108,7 @@ impl Record {
         let ShowFacts { end, cues } = self.facts.as_ref()?;
         let passed = cues.get(before.cue as usize..cues.len().min(frame.cue as usize)).unwrap_or_default();
         let waits = passed.iter().find(|cue| cue.1);
-        // Where a frame between was missed, the show may have waited in it.
+        // If a frame between was missed, the show may have waited in that frame.
         let is_next = before.run_id == frame.run_id && before.sequence + 1 == frame.sequence;
         let begins_again = before.playback_state() == Some(PlaybackState::Ended) && before.epoch + 1 == frame.epoch;
         if frame.playback_state() == Some(PlaybackState::Ended) && frame.sim_time != *end {
@@ -241,7 +241,7 @@ impl Record {
     }
 }
 
-/// Ticks that are kept of each kind: those of as many commands as are sent while their frames are kept.
+/// The ticks that are kept of each kind: enough for all commands that are sent while their frames are kept.
 const MOST_TICKS: usize = 10_000;
 
 fn keep(ticks: &mut VecDeque<u64>, tick: u64) {

@@ -76,7 +76,7 @@ proptest! {
             cues,
         };
         let mut counted = Model::new(show, Sum::new(RATE), 1.0, paused);
-        // One that is read at every tick, and one at the commands alone.
+        // One clock is read at every tick, the other clock at the commands alone.
         let (mut every, mut rarely) = (clock.clone(), clock);
         let mut tick = 0;
         for (gap, command) in list {
@@ -139,7 +139,7 @@ proptest! {
         }
     }
 
-    /// However long the show has run, its time is that of the present stretch: nothing adds up.
+    /// The time of a show, however long it has run, follows from the present stretch: nothing adds up.
     #[test]
     fn a_billion_ticks_and_a_thousand_commands_add_no_error(pauses in prop::collection::vec(1u64..2_000_000, 1000)) {
         let playback = Playback {
