@@ -6,7 +6,7 @@
         x = frame.handles["x"]                   # metres, a numpy array in the publisher's own memory
 
 `subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands. `HermiteReader`
-gives the handles between two frames. The layouts of all messages are those of the program of the same version.
+gives the handles between two frames. All messages have the layouts of the program of the same version.
 """
 
 from bench_dragon.control import CODES, COMMANDS, Controller, described

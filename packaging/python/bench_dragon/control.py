@@ -25,7 +25,7 @@ class Controller:
     """A client of `<name>/control`. Keep it as long as commands follow; `close` it, or use it in `with`."""
 
     def __init__(self, name: str = "bench_dragon") -> None:
-        """Connects to a publisher that runs. Raises ConnectionError if none does."""
+        """Connects to a publisher that runs. Raises ConnectionError if no publisher runs."""
         service = f"{name}/control"
         self._node = new_node()
         builder = self._node.service_builder(iox2.ServiceName.new(service))

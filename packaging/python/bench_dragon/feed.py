@@ -47,15 +47,15 @@ class Frame:
     # The facts of the whole frame, in this process's memory.
     header: FrameHeader
     # The handles, the head first: shape (header.handles,), fields x, y (metres), heading (radians), vx, vy (metres per
-    # simulated second). It is the publisher's memory, read-only and valid until the feed returns the next frame: use
-    # `handles.copy()` for later.
+    # simulated second). The array is the publisher's memory, read-only and valid until the feed returns the next frame:
+    # use `handles.copy()` for later.
     handles: Handles
     # Frames between the frame returned before and this one that this reader lost; 0 at the first frame of a run.
     missed: int
 
 
 class Feed:
-    """The services of one name. It waits for a publisher, and after its end for the next one.
+    """The services of one name. The feed waits for a publisher, and after its end for the next publisher.
 
     An iterator of `Frame`; alerts, cues, statuses, the stage and the scene are read between frames. Keep it inside a
     function or `close` it, or use it in `with`.
@@ -78,7 +78,7 @@ class Feed:
         self._sample: Any = None
         self._latest: tuple[int, int] | None = None
         self._tested = float("-inf")
-        # When a service was last looked for and not found.
+        # The time at which a service was last looked for and not found.
         self._sought: dict[str, float] = {}
         # A feed that is a global variable, as in a notebook, would leave files behind.
         _OPEN.add(self)
@@ -108,7 +108,7 @@ class Feed:
         return frame
 
     def alerts(self) -> Iterator[CollisionAlert]:
-        """Returns the alerts since the last call. The first call returns the present one."""
+        """Returns the alerts since the last call. The first call returns the present alert."""
         return self._messages("alerts", CollisionAlert)
 
     def cues(self) -> Iterator[Cue]:
@@ -181,7 +181,7 @@ class Feed:
                 service = self._node.service_builder(iox2.ServiceName.new(f"{self._name}/tick")).event().open()
                 self._tick = service.listener_builder().create()
             except (iox2.EventOpenError, iox2.ListenerCreateError):
-                pass  # It does not exist yet, or has as many listeners as it admits: poll.
+                pass  # The service does not exist yet, or has as many listeners as it admits: poll.
         if self._tick is None:
             time.sleep(min(timeout, 0.02))
         else:
@@ -199,7 +199,7 @@ class Feed:
         if service in self._ports:
             return self._ports[service]
         now = time.monotonic()
-        # A scene without alerts or cues has no such service: it is not looked for at every frame.
+        # A scene without alerts or cues has no such service: the service is not looked for at every frame.
         if now < self._sought.get(service, float("-inf")) + RETRY_INTERVAL:
             return None
         opened = open_messages(self._node, f"{self._name}/{service}", payload, header)

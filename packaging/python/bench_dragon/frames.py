@@ -36,7 +36,7 @@ def handles_of(sample: Any) -> Handles:
 def indices_of(poses32: Any, *handles: int) -> npt.NDArray[np.int64]:
     """Returns the index of the handle of each pose of the service `<name>/poses32`: shape (poses,).
 
-    `poses32` is the opened service, `handles` the number of handles of the team, of several dragons that of each in the
+    `poses32` is the opened service, `handles` the number of handles of the team, or of each of several dragons in the
     order of the stage.
     """
     attributes = {attribute.key.to_string(): attribute.value.to_string() for attribute in poses32.attributes.values}

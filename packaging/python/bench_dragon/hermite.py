@@ -25,7 +25,7 @@ PLAYING = 0
 
 
 class KeptFrame(NamedTuple):
-    """What is kept of a frame: fields of `FrameHeader`, and a copy of the handles."""
+    """The kept part of a frame: fields of `FrameHeader`, and a copy of the handles."""
 
     run_id: int
     epoch: int
@@ -84,7 +84,7 @@ class HermiteReader:
         length = b.sim_time - a.sim_time
         u = (moment - a.sim_time) / length
         handles = a.handles.copy()
-        # Velocities are zero while the show is paused, not because the handles rest: those are not used.
+        # Velocities are zero while the show is paused, not because the handles rest: such velocities are not used.
         moving = (a.playback == PLAYING, b.playback == PLAYING)
         for position, rate in (("x", "vx"), ("y", "vy")):
             ends = (a.handles[position], b.handles[position], a.handles[rate] * length, b.handles[rate] * length)

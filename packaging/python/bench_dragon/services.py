@@ -50,7 +50,7 @@ def layout_error(service: str, own: list[type[Message]]) -> LayoutError:
 
 
 def layouts_of(service: str) -> list[str]:
-    """Returns the type names that a service has, as far as iceoryx2's files say: that of the payload first."""
+    """Returns the type names of a service, as far as iceoryx2's files contain them: the payload's name first."""
     settings = iox2.config.global_config().global_cfg
     folder = pathlib.Path(settings.root_path.to_string()) / settings.service.directory.to_string()
     for file in folder.glob(f"{settings.prefix.to_string()}*"):
