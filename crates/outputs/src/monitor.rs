@@ -10,7 +10,7 @@ use bench_dragon_messages::chase::ChaseState;
 use bench_dragon_messages::state::FrameState;
 use bench_dragon_messages::{ChaseStatus, CollisionAlert, FrameHeader, HandlePose, LoopStatus, Stage};
 
-/// Time without a status after which a chase counts as dead. It sends five a second.
+/// Time without a status after which a chase counts as dead. A chase sends five statuses a second.
 const CHASE_SILENCE: Duration = Duration::from_secs(2);
 
 /// The presence of a publisher.

@@ -4,8 +4,8 @@
 //! Called by the `view` command. `reader` reads a publisher's shared memory on a separate thread, since ports cannot
 //! leave the thread that created them, and hands over the newest picture. `browser` sends the picture to one browser at
 //! its pace, over one WebSocket for each publisher; `wire` is its layout. `origin` decides which pages may connect,
-//! `authorization` which browsers may command; `certificates` has the proofs of scenes, `facts` what takes time to
-//! compute.
+//! `authorization` which browsers may command; `certificates` has the proofs of scenes, `facts` the facts that take
+//! time to compute.
 
 mod authorization;
 mod browser;
@@ -110,7 +110,7 @@ pub struct ViewOptions {
 pub struct Ready {
     /// The address of the server.
     pub address: SocketAddr,
-    /// The token for commands. It is needed if more than this machine's own page is admitted.
+    /// The token for commands. The token is needed if more than this machine's own page is admitted.
     pub token: Option<Token>,
 }
 

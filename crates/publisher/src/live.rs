@@ -1,7 +1,7 @@
 //! The live loop: wait for the deadline, get the frame, pass it to the publishers, count.
 //!
 //! In: a [`FrameSource`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never
-//! blocks. It knows no transport and no solver. [`run`](crate::run) calls [`run_loop`] on one thread and
+//! blocks. The loop knows no transport and no solver. [`run`](crate::run) calls [`run_loop`] on one thread and
 //! [`statistics`], which empties that queue, on another.
 
 pub mod control;

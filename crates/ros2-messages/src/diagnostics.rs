@@ -47,7 +47,7 @@ const OK: u8 = 0;
 const WARN: u8 = 1;
 const ERROR: u8 = 2;
 
-/// Nanoseconds without a status after which a chase has died: it sends five a second.
+/// Nanoseconds without a status after which a chase has died. A chase sends five statuses a second.
 const CHASE_SILENCE_NS: u64 = 2_000_000_000;
 
 /// The input of a second's diagnostics besides the status.
@@ -192,8 +192,8 @@ impl HasStamp for DiagnosticArray {
     }
 }
 
-/// Returns benches and obstacles in a list, or "none". Benches of one dragon are numbers from 0; those of several have
-/// their names, which count from 1 within their dragon.
+/// Returns benches and obstacles in a list, or "none". Benches of one dragon are numbers from 0; benches of several
+/// dragons have names, which count from 1 within their dragon.
 fn listed(numbers: impl Iterator<Item = u32>, stage: &Stage) -> String {
     let listed = |number: u32| {
         let is_named = stage.dragons.len() > 1 || obstacle_name(stage, number).is_some();

@@ -318,7 +318,8 @@ fn put(marker: &mut Marker, stamp: Time, place: Option<(f64, f64)>) {
     }
 }
 
-/// Returns the benches of an alert with their severities: those of the event, and before the event the nearest two.
+/// Returns the benches of an alert with their severities: the benches of the event and, before the event, also the
+/// nearest two.
 fn named(alert: &CollisionAlert, happened: bool) -> Vec<(u32, Severity)> {
     let mut named: Vec<_> = alert.event_benches().map(|bench| (bench, Severity::Error)).collect();
     if !happened {

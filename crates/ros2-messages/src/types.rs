@@ -1,7 +1,7 @@
 //! The type of every topic, with its names in DDS and in ROS 2 tools, and its definition as text.
 //!
 //! The ROS 2 transport needs the names; recordings contain the definitions. The definitions of the program's messages
-//! are the files of `msgs/msg`; those of the standard packages are the fields alone.
+//! are the files of `msgs/msg`; the definitions of standard packages are the fields alone.
 
 use std::collections::BTreeMap;
 
@@ -43,8 +43,8 @@ impl MessageType {
         format!("{}/msg/{}", self.package, self.name)
     }
 
-    /// Returns the definition and those of all its parts in the schema encoding `ros2msg`. Before each part are a line
-    /// of 80 equals signs and a line with its name.
+    /// Returns the definition, and the definitions of all its parts, in the schema encoding `ros2msg`. Before each part
+    /// are a line of 80 equals signs and a line with its name.
     pub fn schema(self) -> String {
         let own_name = format!("{}/{}", self.package, self.name);
         let mut names = vec![own_name.clone()];

@@ -3,10 +3,10 @@
 //! A writer of RustDDS 0.15.1 keeps all messages that one of its subscribers has not acknowledged, up to its limit. A
 //! best-effort subscriber acknowledges nothing. A killed reliable subscriber acknowledges nothing until its lease ends.
 //! Both count (`Writer::remove_all_acked_changes_but_keep_depth`). RustDDS has no limit of time. So this file sends the
-//! writer, in our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2). For a best-effort subscriber it
-//! acknowledges all messages. For a reliable subscriber it acknowledges the messages that are older than [`AGE`] and
-//! not among the last `depth`. A reliable subscriber gets a GAP for these messages. RustDDS ignores the ACKNACK if the
-//! subscriber has acknowledged more. Called by the volatile writers.
+//! writer, in our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2). For a best-effort subscriber the
+//! ACKNACK acknowledges all messages. For a reliable subscriber it acknowledges the messages that are older than
+//! [`AGE`] and not among the last `depth`. A reliable subscriber gets a GAP for these messages. RustDDS ignores the
+//! ACKNACK if the subscriber has acknowledged more. Called by the volatile writers.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::{Ipv4Addr, SocketAddr};
@@ -111,7 +111,7 @@ pub(super) fn send_to_own(participant: &DomainParticipant, datagram: &[u8]) {
     }
 }
 
-/// Returns the message of `reader` to `writer`: it has the first `last` messages and requests none.
+/// Returns the message of `reader` to `writer`: the reader has the first `last` messages and requests none.
 fn datagram(reader: [u8; 16], writer: [u8; 16], last: u64, number: u32) -> Vec<u8> {
     let (mut bytes, ends) = addressed(reader, writer);
     let first_missing = last + 1;

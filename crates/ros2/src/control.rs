@@ -38,8 +38,8 @@ const MOST_CALLS: usize = 16;
 const MOST_PENDING: usize = 512;
 /// The longest wait of an answer for its client's reply reader: while the client is there, and otherwise. RMW
 /// implementations stop after 0.1 s. On a loaded machine discovery takes longer, and a lost datagram of discovery is
-/// repeated after seconds. An answer that is sent before is lost. Other answers do not wait. It is also the longest
-/// wait of an answer that RustDDS refuses. The refusal for a killed client ends after its lease, 20 s with Fast DDS.
+/// repeated after seconds. An answer that is sent before is lost. Other answers do not wait. The same limits hold for
+/// an answer that RustDDS refuses. The refusal for a killed client ends after its lease, 20 s with Fast DDS.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(30);
 const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
 /// The intervals at which requests are polled, and answers while some are pending.
@@ -105,7 +105,7 @@ struct Pending {
     call: Call,
     client: Client,
     progress: Progress,
-    /// When a refused answer is tried again, and how long after the refusal.
+    /// The time of the next attempt with a refused answer, and the interval before that attempt.
     retry: Option<(Instant, Duration)>,
 }
 

@@ -2,9 +2,9 @@
 //!
 //! RustDDS offers a new subscriber all messages that it keeps, whatever durability and depth the subscriber has, and
 //! has no call to withhold them. So this file sends a GAP submessage (RTPS 2.5, section 9.4.5.6) to the subscriber:
-//! these messages are not for it. RustDDS retransmits 5 ms after the subscriber has asked. The subscriber accepts a GAP
-//! only when it knows the writer, so the datagram is repeated for some time. If all come too late, the subscriber gets
-//! old messages first. Called by the matches.
+//! these messages are not for it. RustDDS retransmits 5 ms after the subscriber's request. The subscriber accepts a GAP
+//! only when it knows the writer, so the datagram is repeated for some time. If all datagrams come too late, the
+//! subscriber gets old messages first. Called by the matches.
 
 use std::net::SocketAddr;
 use std::ops::RangeInclusive;
@@ -54,7 +54,7 @@ impl OldMessages {
     }
 }
 
-/// Sends `reader` once that the messages of `writer` up to `last` are not for it.
+/// Sends `reader` a GAP once: the messages of `writer` up to `last` are not for it.
 pub(super) fn send_gap(participant: &DomainParticipant, writer: GUID, reader: GUID, last: u64) {
     // A volatile writer is replaced long before it has written more messages.
     let last = u32::try_from(last).unwrap_or(u32::MAX);

@@ -4,8 +4,8 @@
 //! delivery to a volatile reader. RustDDS sends a heartbeat when it matches a reader, but the reader may not know the
 //! writer yet. The next heartbeat of RustDDS may name an answer that RustDDS has not sent. RustDDS counts a message
 //! from the call that writes it, and answers an ACKNACK before it sends. The client would then wait without end. So
-//! this file sends a HEARTBEAT submessage (RTPS 2.5, section 9.4.5.7) just before the answer is written: it names the
-//! answers of before. Called by the matches.
+//! this file sends a HEARTBEAT submessage (RTPS 2.5, section 9.4.5.7) just before the answer is written: this heartbeat
+//! names the earlier answers. Called by the matches.
 
 use rustdds::{DomainParticipant, GUID};
 
@@ -22,7 +22,7 @@ pub(super) fn send_heartbeat(participant: &DomainParticipant, writer: GUID, read
     }
 }
 
-/// Returns the message of `writer` to `reader`: there are its messages 1 to `written`, and an acknowledgement is not
+/// Returns the message of `writer` to `reader`: the writer has messages 1 to `written`, and an acknowledgement is not
 /// needed.
 fn datagram(writer: [u8; 16], reader: [u8; 16], written: u32) -> Vec<u8> {
     let (mut bytes, [writer, reader]) = addressed(writer, reader);

@@ -1,4 +1,4 @@
-//! The remote endpoints that RustDDS has matched with the program's own: those that a message reaches.
+//! The remote endpoints that RustDDS has matched with the program's own: the endpoints that a message reaches.
 //!
 //! RustDDS reports each match once, in the events of its participant, which only this file reads. Called by the topics,
 //! which hold a message until there is a subscriber, and by the services. A response is lost if it is written before
@@ -91,12 +91,12 @@ impl Matches {
         ends.old_messages.extend(old);
     }
 
-    /// Tells a remote reader that a local writer has written `written` messages until now.
+    /// Notifies a remote reader that a local writer has written `written` messages until now.
     pub(super) fn announce(&self, writer: GUID, reader: GUID, written: u32) {
         self.with(|ends| send_heartbeat(&ends.participant, writer, reader, written));
     }
 
-    /// Tells a remote reader that the first `last` messages of a local writer are not for it.
+    /// Notifies a remote reader that the first `last` messages of a local writer are not for it.
     pub(super) fn send_gap(&self, writer: GUID, reader: GUID, last: u64) {
         self.with(|ends| send_gap(&ends.participant, writer, reader, last));
     }

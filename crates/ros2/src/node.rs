@@ -227,7 +227,7 @@ impl Topics {
     }
 }
 
-/// The topics of a run that has ended. They leave the network when this value is dropped.
+/// The topics of a run that has ended. The topics leave the network when this value is dropped.
 pub(super) struct EndedTopics {
     _topics: Topics,
     /// The time until which subscribers may request the last messages.

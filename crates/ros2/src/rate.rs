@@ -59,8 +59,8 @@ impl RateDivider {
 mod tests {
     use super::*;
 
-    /// The ticks that are sent at `loop_rate`; every frame comes but those of `lost`. And the frames counted as
-    /// skipped.
+    /// The ticks that are sent at `loop_rate`, and the number of skipped frames. Every frame comes except the ticks of
+    /// `lost`.
     fn sent(rate: f64, loop_rate: f64, ticks: std::ops::Range<u64>, lost: std::ops::Range<u64>) -> (Vec<u64>, u64) {
         let mut divider = RateDivider::new(rate);
         let (mut sent, mut skipped, mut missed) = (Vec::new(), 0, 0);

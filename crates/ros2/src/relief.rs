@@ -2,7 +2,7 @@
 //!
 //! For each new subscriber a volatile writer of RustDDS 0.15.1 lists the number of every message that it has written,
 //! about 13 bytes each (`RtpsReaderProxy::set_pending_gap_up_to`). The list stays until the subscriber acknowledges,
-//! and a best-effort or killed subscriber never does. A second writer begins at 1. It writes nothing until the
+//! and a best-effort or killed subscriber never acknowledges. A second writer begins at 1. It writes nothing until the
 //! subscribers have discovered it. Then it writes alone, and the first writer stays for the retransmission of its last
 //! messages.
 
@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 /// The messages after which a writer is relieved: half an hour at 60 Hz, 1.3 MB for a new subscriber.
 const MESSAGES: u64 = 100_000;
 /// The time for subscribers to discover the second writer before it writes, and later to request messages of the first
-/// one again. Both take about a second. RustDDS tells of a match when it knows the subscriber, not when the subscriber
-/// knows the writer, and Cyclone DDS drops what comes before.
+/// one again. Both take about a second. RustDDS reports a match when it knows the subscriber, not when the subscriber
+/// knows the writer, and Cyclone DDS drops messages that come before.
 const OVERLAP: Duration = Duration::from_secs(10);
 
 /// The state of a relief.

@@ -2,14 +2,14 @@
 //!
 //! A Fast DDS client matches a service at once and sends its first request within a millisecond. RustDDS drops the
 //! request if its discovery thread has not matched the client's writer by then. RustDDS then sends an ACKNACK without
-//! requests, which Fast DDS answers after its heartbeat period of 3 s, and has no call for anything else. So this file
-//! sends datagrams after each match: a NACK_FRAG submessage (RTPS 2.5, section 9.4.5.14) for each of the first messages
-//! of the writer. Called by the matches.
+//! requests, which Fast DDS answers after its heartbeat period of 3 s. RustDDS has no call for anything else. So this
+//! file sends datagrams after each match: a NACK_FRAG submessage (RTPS 2.5, section 9.4.5.14) for each of the first
+//! messages of the writer. Called by the matches.
 //!
 //! This workaround is needed until RustDDS offers retransmission requests. Without it half of all first calls take 3 s,
-//! and a `hold` must not. It is harmless: a writer retransmits the messages that it has and that are not acknowledged.
-//! RustDDS drops a message that comes twice. The counter of NACK_FRAG is not that of the ACKNACKs of RustDDS. If the
-//! workaround fails, the request comes after the heartbeat period of Fast DDS.
+//! and a `hold` must not. The workaround is harmless: a writer retransmits the messages that it has and that are not
+//! acknowledged. RustDDS drops a message that comes twice. NACK_FRAG and the ACKNACKs of RustDDS have separate
+//! counters. If the workaround fails, the request comes after the heartbeat period of Fast DDS.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -33,7 +33,7 @@ const NACK_FRAG: u8 = 0x12;
 pub(super) const LITTLE_ENDIAN: u8 = 1;
 
 /// The times after a match at which the messages are requested. The first one usually suffices; a datagram can be lost,
-/// and discovery can tell the writer's address late.
+/// and discovery can report the writer's address late.
 const TIMES: [Duration; 4] =
     [Duration::ZERO, Duration::from_millis(50), Duration::from_millis(250), Duration::from_millis(1000)];
 
@@ -145,7 +145,7 @@ mod tests {
         let bytes = datagram(reader, writer, 0);
         assert_eq!(bytes[..expected.len()], expected);
         assert_eq!(bytes.len(), expected.len() + 3 * 36);
-        // A writer ignores a counter that does not grow. It is the last word of each submessage.
+        // A writer ignores a counter that does not grow. The counter is the last word of each submessage.
         let counters = |round| datagram(reader, writer, round)[36..].chunks(36).map(|of| of[32]).collect::<Vec<u8>>();
         assert_eq!([counters(0), counters(1)], [[1, 2, 3, 4], [5, 6, 7, 8]]);
     }

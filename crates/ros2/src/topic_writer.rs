@@ -6,8 +6,8 @@
 //! without subscribers is held here and not written, and a writer of events is replaced after its last subscriber has
 //! left. A GAP of our own ([`gaps`](super::gaps)) withholds older messages from a subscriber that joins others. RustDDS
 //! sends a GAP only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches
-//! both, and a transient-local one would report the second as incompatible. Messages to single readers are none either:
-//! RustDDS repairs them for every later subscriber.
+//! both, and a transient-local one would report the second as incompatible. Messages to single readers are no remedy
+//! either: RustDDS repairs them for every later subscriber.
 //!
 //! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages
 //! for all subscribers of the topic. So a refused message is held and written again, and a writer that refuses for
@@ -203,7 +203,7 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
         }
         latched.has_reader = !subscribers.is_empty();
         if !latched.has_reader {
-            // What RustDDS keeps is out of date for the next subscriber.
+            // The messages that RustDDS keeps are out of date for the next subscriber.
             if latched.written > 0 && !latched.is_constant {
                 latched.known.clear();
                 self.replace(node);
@@ -220,12 +220,13 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
             return;
         }
         let Some(latest) = latched.latest.clone() else { return };
-        // A volatile subscriber would take the held message for a new one: it is withheld as that of a new publisher.
+        // A volatile subscriber would take the held message for a new one. As a message of a new publisher, it is
+        // withheld from that subscriber.
         if !subscribers.values().all(|requests| requests.transient_local) {
             latched.known.clear();
             self.replace(node);
         }
-        // A subscriber that matches this publisher later requests the message when it does.
+        // A subscriber that matches this publisher later requests the message then.
         self.write(latest);
     }
 
@@ -319,8 +320,8 @@ impl WriterFactory<'_> {
     }
 }
 
-/// Returns the quality of service on the wire. A full queue refuses at once instead of blocking. It holds the messages
-/// that a dead subscriber leaves unacknowledged, as far as memory allows.
+/// Returns the quality of service on the wire. A full queue refuses at once instead of blocking. The queue holds the
+/// messages that a dead subscriber leaves unacknowledged, as far as memory allows.
 pub(super) fn policies(qos: Qos, bytes: usize) -> QosPolicies {
     let reliability = match qos.reliability {
         Reliability::Reliable => policy::Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO },

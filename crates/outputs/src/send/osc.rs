@@ -69,8 +69,8 @@ impl Addresses {
         self.message("obstacle", vec![text(obstacle_in(stage, alert).unwrap_or_default())])
     }
 
-    /// `/dragons ,ss`: the names of the dragons of the benches of an alert's event; empty for no bench and for an
-    /// obstacle.
+    /// `/dragons ,ss`: for each of the two benches of an alert's event, the name of its dragon. The name is empty for
+    /// no bench and for an obstacle.
     pub fn dragons(&self, stage: &Stage, alert: &CollisionAlert) -> OscMessage {
         let name = |number: u32| stage.owner(number).map_or("", |(dragon, _)| dragon.name.as_str());
         self.message("dragons", [alert.event_bench_a, alert.event_bench_b].map(|number| text(name(number))).to_vec())

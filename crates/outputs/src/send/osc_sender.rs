@@ -252,11 +252,11 @@ mod tests {
         sender.take(FeedEvent::Frame { header: &header, handles: &[], missed: 0 });
         let cue = |number, tick, stamp_ns| Cue { run_id: 1, number, tick, stamp_ns, ..Cue::default() };
         for (cue, sent) in [
-            // Before this listened; afterwards, on a clock that has been set back; afterwards.
+            // A cue of before the connection; a later cue, on a clock that has been set back; another later cue.
             (cue(1, 10, 99 * HOUR_NS), 0),
             (cue(2, 1100, 92 * HOUR_NS), 1),
             (cue(3, 1200, 101 * HOUR_NS), 2),
-            // While it connected.
+            // A cue during the connection.
             (cue(4, 990, 100 * HOUR_NS - CUE_GRACE_NS / 2), 3),
         ] {
             sender.take(FeedEvent::Cue(&cue));

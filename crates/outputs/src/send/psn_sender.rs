@@ -25,7 +25,7 @@ pub const USUAL_PORT: u16 = 56565;
 pub const USUAL_RATE: f64 = 60.0;
 /// The interval of names.
 const INFO_INTERVAL: Duration = Duration::from_secs(1);
-/// How long status 0 is sent at the full rate after frames have stopped, and its interval after that.
+/// The time for which status 0 is sent at the full rate after frames have stopped, and its interval after that time.
 const STOPPED_FULL_RATE: Duration = Duration::from_secs(10);
 /// See [`STOPPED_FULL_RATE`].
 const STOPPED_INTERVAL: Duration = Duration::from_secs(1);

@@ -1,8 +1,8 @@
 // The words after # in the page's address, for a screen without a keyboard: #show,transparent or #dark&follow=12.
 
 /**
- * Words without a value, words with numbers (as many as named) or a word after `=`, and those of them that may have
- * none.
+ * Words without a value; words whose value may be missing; the pattern of each value: as many numbers as the word
+ * takes, or a language.
  */
 const ALONE = ["show", "moon", "hands", "desk", "tell", "transparent", "nolabels", "keys", "dark", "light", "sound"];
 const OPTIONAL = ["follow", "seat"];

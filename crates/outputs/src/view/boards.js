@@ -69,8 +69,8 @@ export function nearest(dragons, ...pair) {
 }
 
 /**
- * Returns the greatest gap between two rectangles along the normals of their sides (separating axis theorem). It is
- * negative if they overlap: then its size is the shortest way to separate them.
+ * Returns the greatest gap between two rectangles along the normals of their sides (separating axis theorem). The gap
+ * is negative if they overlap: then its size is the shortest way to separate them.
  */
 function gap(a, b) {
   const dx = b.x - a.x, dy = b.y - a.y, cos = Math.abs(a.c * b.c + a.s * b.s), sin = Math.abs(a.c * b.s - a.s * b.c);
@@ -84,8 +84,8 @@ function gap(a, b) {
 
 /**
  * Calls `found` with each two boards that share no handle and whose gap is at most `most` metres, and with that gap.
- * Boards are compared with those of the same and the adjacent squares of a grid. They are numbered through all handles:
- * the last handle of a dragon has no bench, so boards of two dragons differ by more than one.
+ * Boards are compared with the boards of the same and the adjacent squares of a grid. Boards are numbered through all
+ * handles: the last handle of a dragon has no bench, so boards of two dragons differ by more than one.
  */
 function eachWithin(dragons, most, found) {
   const longest = Math.max(
@@ -216,7 +216,7 @@ export function nearestObstacle(dragons, obstacles) {
     for (let bench = 0; bench < countOf(dragon); bench++) {
       const board = rectangle(dragon.stage, dragon.places, bench), reach = Math.hypot(board.l, board.w);
       obstacles.forEach(({ sides, keep, middle, radius }, obstacle) => {
-        // The outline of a boundary is around the boards: its circle says nothing.
+        // The outline of a boundary is around the boards: its circle excludes no board.
         const beyond = Math.hypot(board.x - middle.x, board.y - middle.y) - radius - reach - keep;
         if (beyond >= least) return;
         for (const side of sides) {

@@ -6,7 +6,7 @@ import { STRIDE } from "./hermite.js";
 const MARGIN = 0.05;
 /** Boards of the longest kind that fit the shorter side of the picture while one bench is followed. */
 const BOARDS_FOLLOWED = 2.5;
-/** The share of the frame below which the frame is fitted again. It is also fitted when something leaves it. */
+/** The share of the frame below which the frame is fitted again. The frame is also fitted when something leaves it. */
 const LEAST_FILLED = 0.75;
 /** The time in which the camera moves most of the way to a new frame, ms. */
 const EASING = 700;

@@ -3,13 +3,13 @@
 
 import { say } from "./words.js";
 
-/** The time for which the page says what a key has done (ms). */
+/** The time for which the page shows the result of a key (ms). */
 const SHOWN = 2500;
 
 export class Cameras {
   /**
-   * `look` tells the cameras of one look from those of another. `note` is an element for a sentence. `isWanted` says of
-   * an event whether its key may act.
+   * `look` distinguishes the cameras of each look. `note` is an element for a sentence. `isWanted` returns true for an
+   * event whose key may act.
    */
   constructor(eye, look, note, isWanted) {
     Object.assign(this, { eye, note, isWanted, name: `bench-dragon cameras ${look}`, timer: null });

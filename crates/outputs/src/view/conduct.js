@@ -83,8 +83,8 @@ function canPause(streams) {
 const isThere = ({ playback, stage, trouble }) => Boolean(playback.newest && stage && trouble === null);
 
 /**
- * `keysConduct`: true if keys conduct; in the show look only on request. `keySwitch` says whether they do outside the
- * bar.
+ * `keysConduct`: true if keys conduct; in the show look only on request. `keySwitch` decides whether keys conduct
+ * outside the bar.
  */
 export function conduct(publishers, keysConduct, keySwitch) {
   const bar = document.getElementById("conduct"), main = bar.parentElement;
@@ -133,8 +133,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
     // A waiting seek is sent before later commands, but not before a hold.
     if (name === "hold") wanted = null;
     if (name !== "seek" && wanted !== null) sendWanted();
-    // Commands for all go to the connected streams; a hold and its release go to every stream: a refusal says where it
-    // did not arrive.
+    // Commands for all go to the connected streams. A hold and its release go to every stream: a refusal names a stream
+    // that was not reached.
     const id = ++numbered, to = name === "hold" || name === "release" ? streams : there().length ? there() : targets();
     refusals.delete(id - KEPT_REFUSALS);
     const unsent = to.filter((stream) => {
@@ -148,8 +148,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
     return id;
   }
   /**
-   * Says that a command on a connection that has broken gets no answer. A seek is not sent again: no user expects the
-   * jump later.
+   * Reports that a command on a broken connection gets no answer. A seek is not sent again: no user expects the jump
+   * later.
    */
   function showLost() {
     for (const one of unanswered) {
@@ -268,7 +268,7 @@ export function conduct(publishers, keysConduct, keySwitch) {
 
   const receive = (stream) => (message) => {
     if (message.type === "control") {
-      // The first message of a connection tells whether the token is asked for; the second whether it was right.
+      // The first message of a connection states whether the token is required; the second, whether it was right.
       if (!message.allowed && token && greeted.get(stream) !== stream.socket) stream.send({ token });
       greeted.set(stream, stream.socket);
       allowed.set(stream, message.allowed);

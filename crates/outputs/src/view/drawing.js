@@ -32,9 +32,9 @@ function onSpiral(a, angle) {
 }
 
 /**
- * How a segment's spiral stands on the stage. Its centre is `x`, `y`, and its x axis has the direction `c`, `s`. `side`
- * is -1 where the spiral is mirrored. These follow from the segment's beginning and the side to which it bends. A
- * spiral without a curvature is about the origin.
+ * The place and the direction of a segment's spiral on the stage. The spiral's centre is `x`, `y`, and its x axis has
+ * the direction `c`, `s`. `side` is -1 where the spiral is mirrored. These follow from the segment's beginning and the
+ * side to which it bends. A spiral without a curvature is about the origin.
  */
 export function spiralFrame({ kind, x, y, heading, curvature, theta_first, pitch }) {
   if (curvature === null) return { x: 0, y: 0, c: 1, s: 0, side: 1 };
@@ -98,7 +98,7 @@ export function obstaclesOf({ obstacles }) {
 /** The dashes around a keep-out, pixels. */
 const KEEP_OUT_DASHES = [7, 5];
 
-/** The outline of a keep-out: those of its sides one over the other, of which the band covers the inner parts. */
+/** The outline of a keep-out: the outlines around its sides, one over the other. The band covers their inner parts. */
 function rimOf(kind, outline, keepOut) {
   const rim = new Path2D(), quarter = Math.PI / 2;
   for (const { x, y, heading, length, curvature } of outline) {
@@ -299,8 +299,8 @@ function drawDragon(context, camera, palette, transparent, dragon) {
 }
 
 /**
- * A line around all boards together, below them, in the colour and the dashes of a dragon. It is left out between two
- * turns of a coil without room for it.
+ * A line around all boards together, below them, in the colour and the dashes of a dragon. The line is left out between
+ * two turns of a coil without room for it.
  */
 function casing(context, camera, palette, transparent, { stage, places, identity }) {
   const pixel = camera.unit / camera.scale;

@@ -111,7 +111,10 @@ function interpolate(from, to, length, u, handles) {
   }
 }
 
-/** Sets every heading to that of the bench behind; of the last handle of each dragon, to that of the bench before. */
+/**
+ * Sets every heading to the heading of the bench behind; the last heading of each dragon, to the heading of the bench
+ * before.
+ */
 function setHeadings(handles, dragons) {
   const count = handles.length;
   for (let k = STRIDE; k < count; k += STRIDE) {

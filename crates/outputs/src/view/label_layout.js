@@ -20,7 +20,7 @@ const LEAST_LINE = 6;
 /** The radius of the sign at an event's place, in units: its line ends there. */
 export const RING = 27;
 
-/** Returns how far before its place the line of an item without a board ends, in units. */
+/** Returns the distance from the place of an item without a board at which its line ends, in units. */
 export const shortOf = ({ hasRing }) => (hasRing ? RING : 4);
 
 /** Returns the distance from a point to a board. */
@@ -63,7 +63,7 @@ function meetsRing({ from, to }, { x, y, radius }) {
 const coversRing = (box, { x, y, radius }) => Math.hypot(Math.max(0, Math.abs(x - box.x) - box.half),
     Math.max(0, Math.abs(y - box.y) - box.tall)) < radius;
 
-/** Which squares of the picture boards cover. */
+/** The squares of the picture that boards cover. */
 class BoardMap {
   constructor(boards, width, height) {
     this.columns = Math.ceil(width / SQUARE) + 1;
@@ -98,8 +98,9 @@ class BoardMap {
 
 /**
  * Places labels in the order of their importance. Each of `items` has a `key` and the size of its box, `half` and
- * `tall`. It also has either `board` (an index among `boards`) or the place `x`, `y` of an event. `marked`: indices of
- * outlined boards; `rings`: { x, y, radius }; `keep`: boxes that are taken; `last`: the earlier offsets by key.
+ * `tall`. Each item also has either `board` (an index among `boards`) or the place `x`, `y` of an event. `marked`:
+ * indices of outlined boards; `rings`: { x, y, radius }; `keep`: boxes that are taken; `last`: the earlier offsets by
+ * key.
  *
  * Returns a label for each item: `box`, its `line` (null for a badge), and the end `share` of the line on the board.
  * `isBadge` marks a label without room, whose number stands on the board itself.

@@ -33,8 +33,8 @@ export class Labels {
 
   /**
    * Draws labels, in the order of their importance. Each has `text`, `key`, `ink`, and `large` (times the usual size).
-   * It also has either `dragon` and `bench`, or the place `x`, `y` of an event. `keep` are boxes that words may not
-   * cover. Returns the boxes written, each with its text, its bench, and the end of its line.
+   * Each label also has either `dragon` and `bench`, or the place `x`, `y` of an event. `keep` are boxes that words may
+   * not cover. Returns the boxes written, each with its text, its bench, and the end of its line.
    */
   draw(context, camera, palette, { dragons, items, rings, marked, keep }) {
     const { width, height, ratio, unit } = camera, now = performance.now();
@@ -165,7 +165,7 @@ function boardOf({ stage, places }, bench, camera) {
       free: Math.max(0, FREE * (1 - (2 * stage.hole_inset) / board.l)) };
 }
 
-/** The boards that may be taken for that of a box. */
+/** The boards that may be taken for the board of a box. */
 function boardsNear(dragons, camera, box, unit) {
   const [x, y] = camera.toStage(box.x, box.y), near = [];
   for (const dragon of dragons) {
@@ -180,7 +180,7 @@ function boardsNear(dragons, camera, box, unit) {
   return near;
 }
 
-/** The index of each dragon's first board among those of all. */
+/** The index of each dragon's first board among the boards of all. */
 function firsts(dragons) {
   const starts = new Map();
   let next = 0;

@@ -41,9 +41,9 @@ export function viewOf({ width, height }, camera) {
 
 /**
  * A dragon's boards that light the picture, in pixels. A board has its middle, direction `c`, `s`, half the length
- * along it `dx`, `dy`, and the front handle `ax`, `ay`. It also has how much its lanterns are `lit` and `burn` white.
- * The head, the tail and the pearl are added where they are among the boards. The exposure is less for a coil, which
- * has many lanterns to a square metre, than for a procession.
+ * along it `dx`, `dy`, and the front handle `ax`, `ay`. A board also has the shares `lit` and `burn` to which its
+ * lanterns are lit and burn white. The head, the tail and the pearl are added where they are among the boards. The
+ * exposure is less for a coil, which has many lanterns to a square metre, than for a procession.
  */
 export function boardsOf(view, dragon) {
   const { stage, places, show } = dragon, count = places.length / STRIDE - 1, boards = [], margin = 5 * view.pixels;

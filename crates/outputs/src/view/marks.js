@@ -11,7 +11,7 @@ const SMALL = 500;
 /** The interval of searches for the nearest boards while a show plays, ms; in a team of more benches than `SMALL`. */
 const NEAREST_INTERVAL = 200, NEAREST_OF_MANY = 1000;
 
-/** The benches among these numbers, which count through all handles: those of obstacles follow the handles. */
+/** The benches among these numbers, which count through all handles: the numbers of obstacles follow the handles. */
 const benchesAmong = (dragons, ...numbers) => numbers.filter((number) => number != null && ownerOf(dragons, number));
 
 /** The deepest overlap of a stream of pictures, searched only if the publisher reports one. */
@@ -31,8 +31,8 @@ export class Overlap {
 }
 
 /**
- * The nearest two boards, and the board nearest to an obstacle. They are searched a few times a second; their places
- * are those of each picture.
+ * The nearest two boards, and the board nearest to an obstacle. The boards are searched a few times a second; their
+ * places are computed for each picture.
  */
 export class Nearest {
   constructor() {
@@ -65,8 +65,8 @@ export class Nearest {
 
 /**
  * The marks of a state. Each has the benches it concerns (`pair`, numbers through all handles), a place, and a colour
- * of the palette. It also has whether the place is a ghost (in the future), whether the outlines are dashed, and a
- * `line` between the two. The caller, which knows the language, sets `text` and `names`. `near` are the lines of
+ * of the palette. A mark also states whether the place is a ghost (in the future), and whether the outlines are dashed.
+ * Its `line` is between the two. The caller, which knows the language, sets `text` and `names`. `near` are the lines of
  * `Nearest`.
  */
 export function marksOf({ state, alert, dragons, overlap, near }) {

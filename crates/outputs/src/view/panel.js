@@ -20,8 +20,8 @@ const spokenOf = new Map();
 /**
  * The state, the sentence and the countdown of a situation. `trouble` is the reason why nothing comes, or null, and
  * `silent` the seconds without a frame, or null. `stale` is true if the whole picture is stale. `of` is the dragon of
- * the situation, or null for a single dragon. `seconds` are those until the event `ahead` (NaN without a countdown).
- * `stands` is true if the show stands still, and `now` is the present state in words.
+ * the situation, or null for a single dragon. `seconds` are the seconds until the event `ahead` (NaN without a
+ * countdown). `stands` is true if the show stands still, and `now` is the present state in words.
  */
 export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, stage, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
@@ -89,7 +89,7 @@ function countdown({ state, seconds, ahead, stands }, last, own) {
   last.mark = mark;
 }
 
-/** The time without a status after which a chase counts as dead (ms). It sends five a second. */
+/** The time without a status after which a chase counts as dead (ms). A chase sends five statuses a second. */
 const CHASE_SILENCE = 2000;
 
 /** The chase of the dragon of the header, as long as one runs; `of` is its name, or null for a single dragon. */

@@ -276,7 +276,8 @@ export class Seat {
         end = bench === 0 ? half - 1.1 : -half;
     const crown = () => figure && drawFigure(context, view, figure(), { x: x + end * c, y: y + end * s, c, s },
         this.balls);
-    // The head is at the front of its board, the tail at the rear: which is behind the lanterns?
+    // The head is at the front of its board, the tail at the rear. On a board that leads away from the eye the head is
+    // behind the lanterns, else the tail.
     const isBehind = isAway === (bench === 0);
     if (isBehind) crown();
     this.lanterns(context, view, thing, isAway);

@@ -102,7 +102,7 @@ const CLOTHES = [
   [["#0d0802", "#59390e", "#c28434"], ["#64120b", "#b02a16", "#f0764a"]],
 ];
 
-/** A leg at a moment of its step: hip, knee, foot and toe, of which the foot is off the ground while it moves ahead. */
+/** A leg at a moment of its step: hip, knee, foot and toe. The foot is off the ground while it moves ahead. */
 function leg(context, { face, side, hip }, at, apart) {
   const swing = 0.3 * Math.sin(at), lift = Math.max(0, 0.13 * Math.cos(at)), from = apart * 0.085 * face;
   const knee = [from + (0.62 * swing + 0.06) * side, 0.46 + 0.6 * lift],

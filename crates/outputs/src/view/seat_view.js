@@ -53,7 +53,7 @@ export class SeatView {
     return out;
   }
 
-  /** Returns how far away and how deep the floor is at a row of pixels, m; null above the horizon. */
+  /** Returns the distance `away` and the `depth` of the floor at a row of pixels, m; null above the horizon. */
   floorAt(row) {
     const tangent = (row - this.cy) / this.f,
         away = (this.eye.z * (this.cos - tangent * this.sin)) / (this.sin + tangent * this.cos);

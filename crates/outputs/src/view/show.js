@@ -1,5 +1,5 @@
-// What the show look needs of one dragon: which lanterns burn white, which are lit, its trail, the flash of a contact.
-// In: the pose, the situation. Draws nothing: lanterns.js does.
+// The state of one dragon in the show look: the lanterns that burn white, the lit lanterns, the trail, the flash of a
+// contact. In: the pose, the situation. Draws nothing: lanterns.js does.
 
 import { STRIDE } from "./hermite.js";
 
@@ -9,7 +9,7 @@ const FLASH = 1600, EMBERS = 1500;
 const KEPT = 2000, DYING = 6000, RISING = 2000;
 /** The benches, as a share of the team, whose lanterns die down at the same time. */
 const TOGETHER = 0.3;
-/** Flames stand still this long after the show has paused (ms). */
+/** The time after which the flames of a paused show stand still (ms). */
 const RESTING = 60_000;
 /** Seconds of show time between two places of the trail, and its length. */
 const TRAIL_STEP = 0.5, TRAIL = 4;
@@ -32,7 +32,7 @@ export class Show {
     this.life = 0;
     this.embers = 1;
     this.now = this.time = this.stoodAt = this.lostAt = 0;
-    /** Benches whose lanterns burn white, each with how much, from 0 to 1. */
+    /** The benches whose lanterns burn white, each with its share of white, from 0 to 1. */
     this.burning = new Map();
   }
 
@@ -63,7 +63,7 @@ export class Show {
     if (!flash) this.flash = null;
   }
 
-  /** Returns how much the lanterns of a bench are lit, from 0 to 1: the tail's die first. */
+  /** Returns the share to which the lanterns of a bench are lit, from 0 to 1: the tail's die first. */
   lit(bench, count) {
     return this.life === 1 ? 1 : smooth((this.life * (1 + TOGETHER) - bench / count) / TOGETHER);
   }

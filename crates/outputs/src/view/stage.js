@@ -109,8 +109,8 @@ function fitCanvas() {
 /** The publisher of the header. */
 let header = publishers[0];
 /**
- * The most urgent publisher that is present: by the gravest past event, then by the soonest coming event. Of two nearly
- * equal countdowns that of the header stays there, since the header is read aloud.
+ * The most urgent publisher that is present: by the gravest past event, then by the soonest coming event. The header
+ * keeps its publisher if another countdown is nearly equal, since the header is read aloud.
  */
 function foremost() {
   const rank = ({ sight, isThere }) => (sight.stale ? (isThere ? -1 : -2)
@@ -165,7 +165,7 @@ function paint(there) {
     const { stage, places, colours, path, obstacles, marks, sight, identity } = dragon,
         own = dragon === whose ? chosen : -1;
     const named = { chosen: own, chosenName: dragon.benchName(own), endNames: dragon.endNames() };
-    // Without words a line between boards says nothing.
+    // A line between boards has no meaning without words.
     const drawn = labels ? marks : marks.filter(({ kind }) => kind !== "nearest");
     return { stage, places, colours, path: path.lines, obstacles, marks: drawn, ...named, identity,
         stale: sight.stale && !allStale };
@@ -328,7 +328,7 @@ function help() {
   element("keys-conduct").hidden = element("conduct").hidden;
   element("keys").showModal();
 }
-/** Says where the head is, for a screen reader; again if the words are the same. */
+/** Announces the place of the head to a screen reader, again if the words are the same. */
 function speak() {
   if (!whose.isThere) return;
   const { handles } = whose.newest, speed = speedOf(handles, 0), values = { x: handles[0].toFixed(2),
@@ -366,7 +366,7 @@ function tap(x, y) {
   choose(-1);
 }
 const isWanted = (event) => keySwitch.acts(event, canvas);
-// An audience's picture obeys no hand that happens to touch it.
+// The picture of an audience ignores every hand that touches it by chance.
 if (words.show) lock(() => `${say("locked")} · ${element("time").textContent} · ${element("playback").textContent}`);
 if (words.show) keys["?"] = () => null;
 if (!words.show || words.hands) attach(canvas, { pan, tap: words.show ? () => null : tap, keys,

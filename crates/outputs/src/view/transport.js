@@ -29,7 +29,7 @@ export class Transport {
     this.frame = null;
     /** The wall seconds for which a looped show stands at its end; null if it is not known to begin again. */
     this.stand = null;
-    /** That time as this page last saw it, and whether it saw the present end begin. */
+    /** The wall seconds of the last end that this page saw, and whether this page saw the present end begin. */
     this.seen = NaN;
     this.isWhole = false;
   }

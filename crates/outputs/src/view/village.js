@@ -1,10 +1,10 @@
-// The still background of the view from a seat, drawn once for each seat. It is the stone floor, the night over the
-// village, and the heads of the spectators who sit in front. Called by seat.js. The village stands on a ring around the
-// stage, so that another seat sees other houses.
+// The still background of the view from a seat, drawn once for each seat. The background is the stone floor, the night
+// over the village, and the heads of the spectators who sit in front. Called by seat.js. The village stands on a ring
+// around the stage, so that another seat sees other houses.
 
 import { blank, hash } from "./sprites.js";
 
-/** The side of the paving, which repeats, and from which depth on it fades, and until where, m. */
+/** The side of the paving, which repeats, and the depths between which the paving fades, m. */
 const PAVING = 9.6, FADING = [14, 44];
 /** Houses of the ring, and the village's scale at its usual distance, m. */
 const HOUSES = 34, USUAL = 38;
@@ -178,7 +178,7 @@ function door(context, x, lamp, glow) {
   }
 }
 
-/** Those who stand at the far side, lit by the dragon. */
+/** The spectators who stand at the far side, lit by the dragon. */
 function watchers(context, width, high, metre) {
   for (let k = 0; k < width / (0.4 * metre); k++) {
     const x = (k + 0.6 * hash(k + 11)) * 0.4 * metre, tall = (1.42 + 0.3 * hash(k + 12)) *
@@ -197,7 +197,7 @@ function watchers(context, width, high, metre) {
   }
 }
 
-/** Those who sit in front: shadows with a rim of light. The canvas is as wide as the picture. */
+/** The spectators who sit in front: shadows with a rim of light. The canvas is as wide as the picture. */
 export function frontRow({ width, height }) {
   const [canvas, context] = blank(width, Math.max(1, Math.round(0.2 * height))), size = 0.115 * height,
       apart = 0.92 * size;

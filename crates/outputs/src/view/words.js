@@ -295,7 +295,7 @@ export function proofOf({ event, status, time_lo, time_hi, obstacle }, showEnd) 
     return { text: say("provedBetween", { kind, lo, hi: outward(time_hi, 1e-9), beyond }), canCome: !isBeyond };
   }
   if (status === "undecided") return { text: say("provedUpTo", { kind, lo }), canCome: true };
-  // Without an end of the path the proof only says that the lock comes first.
+  // Without an end of the path the proof only states that the lock comes first.
   if (status === "none") return { text: lo === null ? say("provedNone", { kind }) : say("provedNoneBefore",
       { kind, lo }), canCome: event !== "path_end" };
   return { text: "", canCome: false };

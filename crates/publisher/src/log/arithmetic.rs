@@ -16,8 +16,8 @@ const ELEMENTARY_FUNCTIONS: &str = "libm 0.2.16";
 pub struct Arithmetic {
     /// The processor's architecture, for people: `x86_64`.
     pub architecture: String,
-    /// The name of the instructions that read the tables ([`Instructions::name`]); with several dragons that of each,
-    /// between commas.
+    /// The name of the instructions that read the tables ([`Instructions::name`]); with several dragons the name for
+    /// each, separated by commas.
     pub instructions: String,
     /// The crate of the elementary functions and its version.
     pub elementary_functions: String,

@@ -40,7 +40,7 @@ pub enum Line {
     StepFinished {
         /// The period.
         tick: u64,
-        /// How it ended, by name.
+        /// The result of the step, by name.
         code: String,
     },
     /// Periods without a frame: they had passed before it could be computed.

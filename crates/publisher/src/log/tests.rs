@@ -174,11 +174,12 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     let mut writer = LogWriter::new(SharedFile(file.clone()), line);
     reader.empty(&mut writer);
     let counts = writer.counts();
-    // Four frames, the ticks of six, and of the next with its three commands; that of the one behind has no room whole.
+    // Four frames, the ticks of six lost frames, and the tick of the next one with its three commands. The whole record
+    // of the frame after that has no room.
     assert_eq!((counts.frames, counts.lost), (4, 7));
     let text = String::from_utf8(file.borrow().clone()).unwrap();
     assert_eq!(text.matches("\"command\":\"state\"").count(), 3, "{text}");
-    // It takes nothing more, though it has room again: what is missing would not show.
+    // The queue takes nothing more, though it has room again: the missing records would not show.
     publisher.publish(Outgoing::new(&FrameHeader { tick: 40, ..Default::default() }, show.frame(40))).unwrap();
     assert!(reader.queue.is_empty());
 }

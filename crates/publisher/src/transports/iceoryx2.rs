@@ -94,7 +94,7 @@ struct Iceoryx2 {
     control: Option<control::ControlThread>,
 }
 
-/// Creates the transport, for every scene. It opens no service yet, and starts the thread that removes [`stale_files`].
+/// Creates the transport, for every scene, and starts the thread that removes [`stale_files`]. Opens no service yet.
 ///
 /// # Errors
 /// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
@@ -257,8 +257,8 @@ impl Publisher for SharedMemoryPublisher {
     }
 
     fn maintain(&mut self) {
-        // A late subscriber gets the history only when the publisher updates its connections.
-        // The stage names what is in alerts and cues.
+        // A late subscriber gets the history only when the publisher updates its connections. The stage has the names
+        // that belong to alerts and cues.
         self.stage.maintain();
         self.scene.maintain();
         if let Some(alerts) = &mut self.alerts {

@@ -19,8 +19,8 @@ pub enum Next {
 /// The refusal of a held show.
 const HELD: &str = "the show is held: only hold, release and state queries are obeyed until it is released";
 
-/// Converts calls to commands. It stores a distinction that the standard makes and the show does not: whether a paused
-/// simulation counts as stopped.
+/// Converts calls to commands. The adapter stores a distinction that the standard makes and the show does not: whether
+/// a paused simulation counts as stopped.
 #[derive(Debug, Default)]
 pub struct ServiceAdapter {
     /// The simulated seconds of a paused show after the last reset.

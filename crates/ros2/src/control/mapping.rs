@@ -1,10 +1,10 @@
-//! The two mappings of service calls to DDS, told apart by the bytes of a request.
+//! The two mappings of service calls to DDS, distinguished by the bytes of a request.
 //!
 //! `rmw_cyclonedds_cpp` puts 16 bytes of the client before each request and each response. `rmw_fastrtps_cpp`
 //! ("enhanced" in RPC over DDS 1.0, section 7.2.4) identifies the request beside the message. A request of one mapping
 //! is random numbers in the other. Requests that conduct the show have fixed lengths, so no bytes are a request in
-//! both. Requests for parameters must end where their lists end. The 8 bytes of Cyclone's client are random. Its
-//! request would be taken for the other kind only if these bytes were the lengths of a fitting list. So each client
+//! both. Requests for parameters must end where their lists end. The 8 bytes of Cyclone's client are random. A request
+//! of Cyclone would be taken for the other kind only if these bytes were the lengths of a fitting list. So each client
 //! gets its answer in its own mapping. Called by the control thread.
 
 /// Bytes that Cyclone puts before a message: its client (8 bytes) and the number of the call (8 bytes).

@@ -55,7 +55,7 @@ fn the_bytes_are_those_of_the_protocol_description() {
     assert_eq!(info_frame(7, 9, "dragon", &names).packets, [info.to_vec()]);
 }
 
-/// A chunk as the description defines it: id, whether it has chunks in it, content; and what follows it.
+/// A chunk as the description defines it: its id, true if it has chunks in it, its content; and the bytes after it.
 fn take_chunk(bytes: &[u8]) -> (u16, bool, &[u8], &[u8]) {
     let id = u16::from_le_bytes([bytes[0], bytes[1]]);
     let field = u16::from_le_bytes([bytes[2], bytes[3]]);

@@ -68,7 +68,8 @@ proptest! {
         assert_percentiles_of(steps, summary.step_ns);
     }
 
-    /// Every period that a late wake-up covers counts with what was left of it, however many they are.
+    /// Every period that a late wake-up covers counts with the lateness that remains there, however many periods there
+    /// are.
     #[test]
     fn a_late_wake_up_counts_once_for_every_period_it_covers(exponent in 0.0f64..5.3, on_time in 0usize..50) {
         const PERIOD_NS: u64 = 50_000;

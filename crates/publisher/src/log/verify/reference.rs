@@ -31,12 +31,12 @@ pub struct Reference {
 
 /// The second solver of a dragon, and the greatest distance from it so far.
 struct OneReference {
-    /// The dragon, if it is one of several: it tells its own time.
+    /// The dragon, if it is one of several: its motion has its own time.
     dragon: Option<Dragon>,
     solver: Box<dyn Solver>,
     chain: Chain,
     head_speed: f64,
-    /// Metres from the stage's origin to that of the path's own coordinates.
+    /// Metres from the stage's origin to the origin of the path's own coordinates.
     placed: f64,
     accuracy: f64,
     /// Metres: the greatest distance so far, and its tolerance.
@@ -116,7 +116,7 @@ impl OneReference {
         }
     }
 
-    /// Compares a frame's handles of this dragon, of which `first` is the number of the first.
+    /// Compares this dragon's handles in a frame; `first` is the number of the first one.
     fn compare_frame(&mut self, first: usize, time: f64, poses: &[HandlePose]) -> Result<(), String> {
         let own_time = self.solve(time)?;
         let places = poses.iter().enumerate();

@@ -25,7 +25,7 @@ fn a_stop_that_another_client_resumes_meanwhile_fails() {
     assert_eq!(adapter.proceed(stop, Command::Pause, &paused), Next::Execute(Command::Restart));
     let resumed = outcome(Code::Done, PlaybackState::Playing, 50.0);
     assert_eq!(result_of(adapter.proceed(stop, Command::Restart, &resumed)), result::STATE_TRANSITION_ERROR);
-    // Held meanwhile: not from this state.
+    // The show is held meanwhile: it cannot be stopped from this state.
     let held = outcome(Code::Refused, PlaybackState::Held, 70.0);
     assert_eq!(result_of(adapter.proceed(stop, Command::Restart, &held)), result::INCORRECT_TRANSITION);
 }
@@ -44,7 +44,7 @@ fn stopped_is_where_a_reset_has_left_a_paused_show_and_nowhere_else() {
     assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 50.0), state::PAUSED);
     adapter.proceed(Call::Reset(0), Command::Restart, &outcome(Code::Done, PlaybackState::Paused, 50.0));
     assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 50.0), state::STOPPED);
-    // Another queue has moved it, plays it, holds it, or it is at its end.
+    // Another queue has moved the show, plays it or holds it, or the show is at its end.
     assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 60.0), state::PAUSED);
     assert_eq!(state_at(&mut adapter, PlaybackState::Playing, 50.0), state::PLAYING);
     assert_eq!(state_at(&mut adapter, PlaybackState::Held, 50.0), state::PAUSED);
