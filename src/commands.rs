@@ -83,11 +83,11 @@ impl Common {
         self.names.first().map_or("", String::as_str)
     }
 
-    /// Tests the names. Each name is given once, and a command of one publisher has one name. All stand in one place,
-    /// since clap replaces those before the command by those after it.
+    /// Tests the names. Each name is given once, and a command of one publisher has one name. All names stand in one
+    /// place, since clap replaces names before the command by names after it.
     ///
     /// # Errors
-    /// Bad input: the sentence says what was expected.
+    /// Bad input: the sentence states what was expected.
     pub fn check_names(&self, takes_several: bool) -> Result<(), CommandError> {
         let refused = |sentence: String| Err(CommandError::BadInput(sentence));
         let is_option =
@@ -270,7 +270,7 @@ pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     timeline
 }
 
-/// Warns of the time up to which a search that gave up came.
+/// Warns that a search gave up, with the time that the search reached.
 pub fn warn_of_gap(timeline: &Timeline) {
     if let Some(until) = timeline.searched_until() {
         log::warn!(

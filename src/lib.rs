@@ -1,4 +1,4 @@
-//! A bench dragon, live: where every handle of a coiling chain of benches is, published at a fixed rate.
+//! A bench dragon, live: the place of every handle of a coiling chain of benches, published at a fixed rate.
 //!
 //! This library is the crates of the workspace under one name. Without the feature `library` it is [`messages`] and
 //! [`client`]: all that a subscriber compiles. `ARCHITECTURE.md` draws how the crates depend on each other.
@@ -11,7 +11,7 @@
 //! - `motion`: the path, the solvers, the events, the clearance. Pure.
 //! - `show`: the scene file, checked, and its frames by tick. Deterministic.
 //! - `certify`: events, clearances and speeds with a proof; the plans of a choreographer.
-//! - `proof`: the checker of certificates. It depends on no other crate of this workspace.
+//! - `proof`: the checker of certificates. The checker depends on no other crate of this workspace.
 //! - `publisher`: the fixed-rate loop, its shared memory, its log.
 //! - `ros2_messages`, `ros2`: the messages of ROS 2, and its topics and services.
 //! - `recording`: MCAP recordings, their replay, and the verification of logs.

@@ -77,7 +77,7 @@ struct TimecodeArguments {
     /// Simulated seconds a second of timecode
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
-    /// How long to go on when timecode stops, before the show is paused
+    /// The time for which the show continues when timecode stops, before it is paused
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = wall_seconds)]
     freewheel: f64,
     /// The frame rate: auto, 24, 25, 29.97, 29.97df or 30
@@ -104,10 +104,10 @@ struct PsnArguments {
     /// The stage's axes that are the sender's x, y and z, as of `send psn`
     #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
     axes: Axes,
-    /// The dragon whose head it is, in a show of several
+    /// The dragon whose head follows the tracker, in a show of several
     #[arg(long, value_name = "NAME")]
     dragon: Option<String>,
-    /// How long to go on when the tracker is not seen, before the show is paused
+    /// The time for which the show continues when the tracker is not seen, before it is paused
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = wall_seconds)]
     freewheel: f64,
 }

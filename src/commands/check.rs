@@ -1,4 +1,4 @@
-//! `check`: what a scene models and leaves out, and its solver with the reason.
+//! `check`: the model of a scene, its omissions, and its solver with the reason.
 
 mod description;
 mod several;
@@ -55,7 +55,7 @@ pub struct CheckArguments {
     certify: Option<PathBuf>,
 }
 
-/// What is proved of a least clearance, in every line of `check --prove --json`.
+/// The proved bounds of a least clearance, in every line of `check --prove --json`.
 #[derive(Serialize)]
 struct ProvedBounds {
     #[serde(rename = "least_clearance_lo")]
@@ -64,13 +64,13 @@ struct ProvedBounds {
     hi: Option<f64>,
     #[serde(rename = "least_clearance_status")]
     status: &'static str,
-    /// Simulated seconds up to which that is proved, unless to the end of the show.
+    /// Simulated seconds up to which the bounds are proved, unless to the end of the show.
     proved_until: Option<f64>,
     time: Option<f64>,
 }
 
 impl ProvedBounds {
-    /// Creates the fields of a proof up to a time, or to the end of the show. The upper bound is that of a time.
+    /// Creates the fields of a proof up to a time, or to the end of the show. The upper bound is met at `time`.
     fn new(lo: Option<f64>, hi: Option<f64>, until: Option<f64>, time: Option<f64>) -> Self {
         let status = match (lo.is_some() && hi.is_some(), until.is_none()) {
             (true, true) => "proved",
@@ -80,8 +80,8 @@ impl ProvedBounds {
         Self { lo, hi, status, proved_until: until.map(rounded_down), time }
     }
 
-    /// Creates the fields of an enclosure, if there is one. They are its bounds, the metres of travel up to which they
-    /// hold, and those where the upper bound is met.
+    /// Creates the fields of an enclosure, if there is one. The fields are its bounds, the metres of travel up to which
+    /// these hold, and the metres where the upper bound is met.
     fn of(found: Option<([f64; 2], Option<f64>, f64)>, time_at: impl Fn(f64) -> f64) -> Self {
         let Some(([lo, hi], until, travelled)) = found else { return Self::new(None, None, None, None) };
         Self::new(Some(lo), Some(hi), until.map(&time_at), Some(time_at(travelled)))
@@ -298,7 +298,7 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
 }
 
 impl CheckArguments {
-    /// Writes the file of --swept and returns what it holds.
+    /// Writes the file of --swept and returns its content.
     fn covered(&self, scene: &Scene, timeline: &Timeline, common: &Common) -> Result<Option<Swept>, CommandError> {
         let Some(file) = &self.swept else { return Ok(None) };
         let stretch =
@@ -416,7 +416,7 @@ fn clearance_line(
     }
 }
 
-/// Returns what a certificate proves of the scene with this text.
+/// Returns the proved results of a certificate for the scene with this text.
 fn proved(scene: &str, file: &Path, common: &Common) -> Result<Vec<String>, CommandError> {
     let shown = file.display().to_string();
     let opened = File::open(file)

@@ -136,7 +136,7 @@ fn dragons_of(scene: &Scene, event: &Event) -> Vec<usize> {
     dragons
 }
 
-/// Returns what a result of a show of several dragons is about: the kind of event, and the names.
+/// Returns the subject of a result of a show of several dragons: the kind of event, and the names.
 fn subject(scene: &Scene, outcome: &CertifiedEvent) -> String {
     let dragons = scene.ensemble.as_ref().map_or(&[][..], |ensemble| ensemble.dragons());
     let names: Vec<&str> =

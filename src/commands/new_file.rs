@@ -130,7 +130,7 @@ fn prefix(file: &Path) -> OsString {
 fn unnamed(folder: &Path) -> io::Result<File> {
     let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
     let file = File::from(rustix::fs::open(folder, flags, Mode::from_raw_mode(0o666))?);
-    // It gets its name by way of this link, which a system without /proc does not have.
+    // The file gets its name by way of this link, which a system without /proc does not have.
     descriptor(&file).metadata()?;
     Ok(file)
 }

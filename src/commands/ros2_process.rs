@@ -27,7 +27,8 @@ const TEST_INTERVAL: Duration = Duration::from_millis(20);
 const LONGEST_END: Duration = Duration::from_secs(5);
 /// The lifetime after which a process is restarted at once.
 const LIFETIME: Duration = Duration::from_secs(5);
-/// The first and the longest time before the restart of a process with a shorter lifetime. It doubles each time.
+/// The first and the longest time before the restart of a process with a shorter lifetime. The time doubles with each
+/// restart.
 const DELAYS: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(60));
 
 /// A line of `send ros2 --json` on standard output.
@@ -89,7 +90,7 @@ impl Ros2Request {
     }
 }
 
-/// The facts of a show that ROS 2 is told of.
+/// The facts of a show that ROS 2 needs.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "a program without ROS 2 refuses before it reads them"))]
 pub struct Ros2Show {

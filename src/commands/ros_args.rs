@@ -29,8 +29,8 @@ pub struct NodeNames {
 }
 
 impl NodeNames {
-    /// Returns the publisher's name: that of `--name`, with the node's names in place of its last word and the words
-    /// before it.
+    /// Returns the publisher's name: the value of `--name`, with the node's names in place of its last word and of the
+    /// words before that word.
     pub fn applied_to(&self, name: &str) -> String {
         let (before, last) = name.rsplit_once('/').unwrap_or(("", name));
         let namespace = self.namespace.as_deref().map_or(before, |namespace| namespace.trim_matches('/'));
@@ -45,11 +45,11 @@ impl NodeNames {
 /// Bad input: an argument that is not understood, or a command that understands none.
 pub fn translated(arguments: impl IntoIterator<Item = OsString>) -> Result<(Vec<OsString>, NodeNames), CommandError> {
     let (mut own, mut names): (Vec<OsString>, _) = (Vec::new(), NodeNames::default());
-    // Files of parameters, and the place of their options: a file speaks of nodes, whose names may follow it.
+    // Files of parameters, and the place of their options: a file is about nodes, whose names may follow it.
     let (mut files, mut place) = (Vec::new(), 0);
     let mut arguments = arguments.into_iter();
     while let Some(argument) = arguments.next() {
-        // What follows belongs to no option.
+        // The arguments after this one belong to no option.
         if argument == "--" {
             own.push(argument);
             break;

@@ -46,7 +46,7 @@ struct PsnArguments {
     /// The address of this machine's interface to send by; without it, the machine's routes decide
     #[arg(long, value_name = "IP")]
     interface: Option<Ipv4Addr>,
-    /// Which handles of each dragon, counted from 1: all, head, tail, 1,2,9 or head,20-40
+    /// The handles of each dragon to send, counted from 1: all, head, tail, 1,2,9 or head,20-40
     #[arg(long, value_name = "WHICH", default_value = "all")]
     trackers: Selection,
     /// The stage's axes for the desk's x, y and z: x, y (into the depth) and up, in any order; a minus reverses one

@@ -1,4 +1,4 @@
-//! `soak`: a publisher and subscribers as processes for hours, and a verdict. It starts `soak-subscriber`.
+//! `soak`: a publisher and subscribers as processes for hours, and a verdict. The command starts `soak-subscriber`.
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -29,7 +29,7 @@ use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_se
 /// Sleep of a slow subscriber: longer than a queue of 64 frames lasts at 60 Hz.
 const SLOW_PAUSE: Duration = Duration::from_millis(1500);
 
-/// Clients of the control service for which there is room beside the conductor's.
+/// Clients of the control service for which there is room beside the load generator.
 const MOST_FLAKY_CLIENTS: usize = 8;
 
 /// Arguments of `soak`.
@@ -180,7 +180,7 @@ impl SoakArguments {
                 self.flaky_clients
             )));
         }
-        // The conductor and the process of ROS 2 read the frames too.
+        // The load generator and the process of ROS 2 read the frames too.
         let (conducts, has_ros2) = (self.conduct.is_some(), self.ros2 || scene.ros2.is_some());
         let others = usize::from(conducts) + usize::from(has_ros2);
         let all = self.subscribers.saturating_add(self.slow).saturating_add(self.flaky).saturating_add(others);

@@ -33,8 +33,8 @@ pub struct ViewArguments {
     /// Serve the files of this folder below /pages/, for your own page
     #[arg(long, value_name = "DIR")]
     pages: Option<PathBuf>,
-    /// A certificate of `events --certify`: checked while the page is served. If a publisher shows that scene, the
-    /// page says what is proved of its events; may be repeated
+    /// A certificate of `events --certify`: checked while the page is served. If a publisher shows that scene, the page
+    /// shows the proved results of its events; may be repeated
     #[arg(long, value_name = "FILE")]
     certificate: Vec<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! What `check` says of a scene without its motion: teams, paths, placements, solvers, alerts and outputs.
+//! The report of `check` on a scene without its motion: teams, paths, placements, solvers, alerts and outputs.
 
 use bench_dragon::motion::ensemble::{Dragon, Ensemble};
 use bench_dragon::motion::model::segment::SegmentOutline;
@@ -9,7 +9,7 @@ use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 
 use super::super::{CommandError, Output, figure, number};
 
-/// Prints what a scene is.
+/// Prints the description of a scene.
 pub(super) fn describe(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
     output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
     dragons(scene, output)?;
@@ -39,7 +39,7 @@ fn dragons(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Prints the solver of each dragon, of which `choice` is that of a dragon alone, and whether velocities are computed.
+/// Prints the solver of each dragon, and whether velocities are computed. `choice` is the solver of a dragon alone.
 fn solvers(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Result<(), CommandError> {
     if let Some(choice) = choice {
         output.line(&format!("  Solver: {}.", choice.reason))?;
@@ -85,7 +85,7 @@ fn alerts(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Result
     ))
 }
 
-/// Prints where the frames go.
+/// Prints the destinations of the frames.
 fn publishing(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
     let single = scene.single_precision.map_or(String::new(), |single| format!("; poses32 has {single}"));
     output.line(&format!("  Publishing: {} frames per second to shared memory{single}.", number(scene.rate)))?;

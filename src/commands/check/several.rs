@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::super::{CommandError, Common, Output, progress_bar};
 use super::{CertificateFile, ProvedBounds, proved_sentence};
 
-/// What is proved of one dragon, of one and an obstacle, or of two: a line of `check --prove --json`.
+/// The proved least clearance of one dragon, of one and an obstacle, or of two: a line of `check --prove --json`.
 #[derive(Serialize)]
 pub(super) struct Part {
     dragons: Vec<String>,
@@ -49,7 +49,7 @@ pub(super) fn enclosed(
     Ok(parts(scene, ensemble, &found))
 }
 
-/// Returns what is proved, in the order of the certificate.
+/// Returns the proved clearances, in the order of the certificate.
 fn parts(scene: &Scene, ensemble: &Ensemble, found: &SeveralClearances) -> Vec<Part> {
     let mut parts = Vec::new();
     for (k, own) in found.own.iter().enumerate() {
@@ -117,7 +117,7 @@ pub(super) fn of_boards(parts: &[Part]) -> (Option<f64>, Option<f64>, bool) {
     (lo, least(|part| part.proved.hi), is_whole)
 }
 
-/// Prints what is proved.
+/// Prints the proved clearances.
 pub(super) fn print(parts: &[Part], output: &mut Output) -> Result<(), CommandError> {
     if let (Some(lo), Some(hi), true) = of_boards(parts) {
         output.line(&format!("  {}", proved_sentence((lo, hi), None, 0.0)))?;

@@ -22,7 +22,7 @@ struct ProvedLine<'a> {
     proved: &'a Proved,
 }
 
-/// Prints what a certificate proves, or why it proves nothing; `shown` is the file's name in sentences.
+/// Prints the results of a certificate, or the reason of its refusal; `shown` is the file's name in sentences.
 pub(super) fn print(common: &Common, shown: &str, checked: Result<Proved, Refused>) -> Result<(), CommandError> {
     let proved = match checked {
         Err(Refused::DoesNotFollow { line, problem }) if common.json => {

@@ -213,7 +213,7 @@ impl Keyboard {
         if self.unanswered == 0
             && let Some(action) = self.waiting.pop_front()
         {
-            // A conductor without pending requests has room.
+            // A command client without pending requests has room.
             let _ = self.send(action);
         }
         outcome
