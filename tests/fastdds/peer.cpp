@@ -7,9 +7,9 @@
 // Both take --domain D. TOPIC and SERVICE are names on the wire without their prefixes: "rt/", or "rq/" and "rr/".
 // HEX is the request's body, little-endian, without the four bytes of the encapsulation.
 //
-// `subscribe` prints a JSON line for each sample, and one when the subscriber exists. It prints another when the
-// subscriber has ended, with the quality of service that the publisher offers. It ends after S seconds, or some time
-// after N samples. With --joins that happens N times, each with a participant of its own.
+// `subscribe` prints a JSON line for each sample, and one when the subscriber exists. `subscribe` prints another when
+// the subscriber has ended, with the quality of service that the publisher offers. The subscriber ends after S seconds,
+// or some time after N samples. With --joins that happens N times, each with a participant of its own.
 // `call` makes the first call of N new clients, each with a participant that knows the server before, and prints a JSON
 // line for each. Called by tests/ros2/fast_dds.rs, which builds this file.
 
@@ -186,7 +186,7 @@ public:
 
   bool knows(const std::string& what) const { return known.count(what) > 0; }
 
-  // Returns the reliability and durability of the latest writer of a topic, as discovery tells them.
+  // Returns the reliability and durability of the latest writer of a topic, as discovery reports them.
   std::string offered(const std::string& topic) {
     const std::lock_guard<std::mutex> guard(lock);
     return offers[topic];

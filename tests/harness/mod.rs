@@ -28,8 +28,8 @@ fn executable() -> &'static str {
     FILE.expect("a test program that is built with the program")
 }
 
-/// Returns the time after which a process or its next line is missing: longer than a busy machine needs. It bounds a
-/// hang, not a speed.
+/// Returns the time after which a process or its next line is missing: longer than a busy machine needs. The time
+/// bounds a hang, not a speed.
 pub fn patience() -> Duration {
     Duration::from_secs(if long() { 3600 } else { 600 })
 }

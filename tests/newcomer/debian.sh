@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # A newcomer on a fresh Debian 12. The script installs Debian into a folder and clones this repository there as an
-# ordinary user. It runs the first commands of README.md and a subscriber in Python. Then it runs tests/run from an empty
-# target folder, and times it. To be run by hand, as root.
-# The Rust toolchain and what cargo has downloaded are this machine's; all else comes from Debian and PyPI.
+# ordinary user. It runs the first commands of README.md and a subscriber in Python. Then it runs tests/run from an
+# empty target folder, and times it. To be run by hand, as root. The Rust toolchain and the downloads of cargo are this
+# machine's; all else comes from Debian and PyPI.
 set -euo pipefail
 [ $# = 1 ] && [ "$(id -u)" = 0 ] || { echo "usage, as root: $0 FOLDER" >&2; exit 2; }
 command -v rustc >/dev/null || { echo "rustc is not in the PATH here: sudo env PATH=\"\$PATH\" $0 $1" >&2; exit 2; }

@@ -290,7 +290,7 @@ fn a_show_follows_the_art_net_timecode_of_another_library() {
     assert_eq!((&locked["source"], &locked["frame_rate"]), (&"artnet".into(), &"25".into()));
     let output = sender.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    // The last label is 00:00:17:24; the show goes on for the time of the freewheel.
+    // The last label is 00:00:17:24; the show continues for the time of the freewheel.
     state(&lines, "lost");
     let shown = Process::start(program(name).args(["--json", "control", "state"])).output();
     let time = serde_json::from_slice::<Value>(&shown.stdout).unwrap()["sim_time"].as_f64().unwrap();

@@ -1,5 +1,5 @@
-//! Control of a running publisher over shared memory, from the command line and from Python. It works in every state,
-//! at an exact tick, and at no cost to the stream.
+//! Control of a running publisher over shared memory, from the command line and from Python. Control works in every
+//! state, at an exact tick, and at no cost to the stream.
 
 use crate::harness;
 

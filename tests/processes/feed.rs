@@ -243,7 +243,7 @@ fn a_scene_with_more_cues_finds_its_services_open() {
     let _more = open(40);
 }
 
-/// Of two publishers the first sends no frames, and has a stage. Nothing is taken for the show's data before a frame
+/// The first of two publishers sends no frames, and has a stage. Nothing is taken for the show's data before a frame
 /// has come, and the show's stage comes before that frame.
 #[test]
 fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {

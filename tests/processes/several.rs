@@ -1,5 +1,5 @@
-//! A show of several dragons, as programs: it runs, is watched, recorded and proved under its one name. What does not
-//! know several refuses it with one sentence.
+//! A show of several dragons, as programs: it runs, is watched, recorded and proved under its one name. A command or an
+//! option for one dragon refuses it with one sentence.
 
 use crate::harness;
 
@@ -37,7 +37,7 @@ fn a_show_of_two_runs_is_recorded_and_proved() {
     }
 }
 
-/// The contact is that of the two: 3 s before it the show waits.
+/// The contact is between the two dragons: the show waits 3 s before the contact.
 #[test]
 fn a_cue_before_the_contact_of_two_pauses_the_show() {
     let (folder, name) = (tempfile::tempdir().unwrap(), "several_cue");

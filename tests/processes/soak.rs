@@ -66,11 +66,11 @@ fn twenty_seconds_pass_with_nothing_missed() {
                 assert_eq!(number(seen, "last_sequence") + 1, frames, "{subscriber}");
                 // Periods may have passed between the last frame and the stop.
                 assert!((frames..=frames + skipped).contains(&(number(seen, "last_tick") + 1)), "{subscriber}");
-                // It was there from the first second or so on.
+                // The subscriber was there from about the first second on.
                 assert!(number(seen, "received") > frames / 2, "{subscriber}");
             }
-            // A read every 1.5 s, and a queue that lasts one second: a third of all frames is missed. Of fewer frames,
-            // since the loop was late, the queue holds more.
+            // A read every 1.5 s, and a queue that lasts one second: a third of all frames is missed. The queue holds a
+            // greater share of the fewer frames of a late loop.
             "slow" => assert!(number(seen, "missed") > 500 || skipped > frames / 8, "{subscriber}"),
             _ => assert!(number(subscriber, "incarnations") >= 3, "{subscriber}"),
         }

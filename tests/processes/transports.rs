@@ -62,7 +62,7 @@ fn number(line: &Value, field: &str) -> u64 {
 const DISCOVERY: u64 = 2 * RATE;
 
 /// Checks the frames of one run. None is lost except `left_out`, which the transport counted itself because it was
-/// behind, and over ROS 2 those of the discovery. Each frame has the time of its tick and complete content.
+/// behind, and over ROS 2 the frames of the discovery. Each frame has the time of its tick and complete content.
 fn check_frames(transport: &str, frames: &[&Value], left_out: u64) {
     let sequence = |frame: &Value| number(frame, "sequence");
     let reliable_from = sequence(frames[0]) + if transport == "ros2" { DISCOVERY } else { 0 };

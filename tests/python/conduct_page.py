@@ -156,7 +156,8 @@ def time_line(page):
     until(lambda: abs(float(page.input_value("#conduct-seek")) - state()["sim_time"]) < 0.1, "the thumb is where the show is")
     # A screen reader reads the value.
     assert re.fullmatch(r"\d+(\.\d)?", page.input_value("#conduct-seek")), page.input_value("#conduct-seek")
-    # A connection that breaks before the answer to a seek: the bar says so, and the server's return makes no late jump.
+    # A connection that breaks before the answer to a seek: the bar reports it, and the server's return makes no late
+    # jump.
     before, sent = state(), lambda: sum('"seek"' in text and "120" in text for text in page.evaluate("sent"))
     page.evaluate("window.swallows = true; window.sent.length = 0")
     seek(page, 120)
@@ -203,8 +204,8 @@ def keyboard(page):
 
 
 def keys_are_off(page, before):
-    """Letters typed anywhere conduct nothing, and the bar says so; with the focus in the bar they do. Then they are switched
-    on, and stay so."""
+    """Letters typed anywhere conduct nothing, and the bar states that; with the focus in the bar they conduct. Then the
+    keys are switched on, and stay on."""
     for key in ("h", ".", "Space", "ArrowRight"):
         page.keyboard.press(key)
     says(page, "Keys conduct only in this bar")
@@ -246,7 +247,7 @@ def held(page):
 
 
 def at_the_end(page, browser, url):
-    """A page that loads while the show is paused sets its speed, and at the end the button does as it says."""
+    """A page that loads while the show is paused sets its speed, and at the end the button does as its label states."""
     page.close()
     page = opened(browser, f"{url}#keys")
     until(lambda: bar_is_shown(page) and page.locator("#conduct-rate option").count() > 1, "the speeds")

@@ -306,7 +306,7 @@ class Obstacle:
 
 
 def signed(obstacle, corners, limit=math.inf):
-    """Returns signed distances minus the keep-out. Of many boards that overlap only some are measured, by chance; the
+    """Returns signed distances minus the keep-out. Only some of many boards that overlap are measured, by chance; the
     others have no number."""
     found = obstacle.distances(corners, limit + obstacle.keep_out)
     deep = np.argwhere(found <= 0)
@@ -326,7 +326,8 @@ def ways(corners):
 
 
 def selected(benches, possible):
-    """Returns the benches of which an interval is possible, these intervals by bench, and those of any bench."""
+    """Returns the benches with a possible interval, the possible intervals by bench, and the possible intervals of any
+    bench."""
     some = possible.any(axis=(1, 2))
     return benches[some], possible[some], possible.any(axis=0)
 

@@ -4,8 +4,8 @@
 
 TIME, seconds, is a guess, correct to a microsecond. The clearance of each board is enclosed half a unit of the last
 digit before and after the time printed. All are positive before, and one is negative after. `ground.py` tests that
-nothing is met earlier. The scene, in coordinates of its path, is that of `second_judge.py`. It shares no code with the
-program.
+nothing is met earlier. `second_judge.py` reads the scene, in coordinates of its path. The script shares no code with
+the program.
 """
 
 import sys

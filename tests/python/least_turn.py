@@ -5,10 +5,10 @@
 A link locks where its rear handle is at a place p of the path whose tangent is perpendicular to the link. The front
 handle is then at the first place ahead at the distance of the link. So the least product of tangent and link over all p
 is 0 with the least radius. Prints that radius, and the metres from the beginning of the S to p. No contact and no stall
-is looked for. It shares no code with the program.
+is looked for. The script shares no code with the program.
 
-With the team's size it prints another line. The line has the radius at which the boards come free, and the two benches
-that overlap last, counted from 0.
+With the team's size the script prints another line. The line has the radius at which the boards come free, and the two
+benches that overlap last, counted from 0.
 """
 
 import math

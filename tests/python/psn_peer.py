@@ -5,12 +5,12 @@
 
 Listens to UDP port P and subscribes to the publishers NAME, the first of which must be running. Ends with an empty
 packet, or when no packet has come for two seconds after the first. With --progress, it waits two minutes. The numbers
-of a frame's trackers, STEP apart, tell their publisher. Every frame must decode completely. Each is compared, every
+of a frame's trackers, STEP apart, identify their publisher. Every frame must decode completely. Each is compared, every
 tracker, to float32, with the frame of the shared memory that has the same head. Prints a line when it listens, and one
 with the counts. With --npm, the decoder of that folder (npm's @jwetzell/posistagenet) gets the same packets and must
 decode the same. With --progress, prints a line five times a second. The line has for each publisher the number of times
-its trackers have `stopped`. It also has the number of frames since then that were `equal`, judged by the head's place.
-With --samples, the counts come with every 20th frame that was equal: its simulated time, and position, speed and
+its trackers have `stopped`. The line also has the number of frames since then that were `equal`, judged by the head's
+place. With --samples, the counts come with every 20th frame that was equal: its simulated time, and position, speed and
 orientation of every tracker.
 """
 

@@ -5,7 +5,7 @@
 
 `subscribe` prints `ready`, then `frame` at the first frame, and ends when a publisher has come and gone. FILE then
 holds the bytes of every message. `compare` decodes every message of every topic of the recordings with
-mcap-ros2-support, and the same files with rosbags. It prints their number by topic, or fails.
+mcap-ros2-support, and the same files with rosbags. `compare` prints their number by topic, or fails.
 """
 
 import argparse

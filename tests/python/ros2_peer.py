@@ -200,8 +200,8 @@ def quality(reliability, durability, depth=100):
 
 
 def offered(reader, participants):
-    """Returns the quality of service of the publishers that a reader has matched, and the lease of their participants in
-    seconds, as discovery tells them."""
+    """Returns the quality of service of the publishers that a reader has matched, and the lease of their participants
+    in seconds, as discovery reports them."""
     found = [reader.get_matched_publication_data(handle) for handle in reader.get_matched_publications()]
     # A publisher that has gone in between has no data, and the last sample of a participant that has gone no lease.
     found = [each for each in found if each is not None]

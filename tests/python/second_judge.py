@@ -1,20 +1,20 @@
-"""Checks the claims of certificates with the ball arithmetic of Arb. It shares no code with the program.
+"""Checks the claims of certificates with the ball arithmetic of Arb. The script shares no code with the program.
 
     second_judge.py [--places N] [--seed S] CERTIFICATE...
 
 The checks are by question:
 
 - Events: each event at both ends of its enclosure, first touches of obstacles among them. At N random times of the
-  stretches that are said to be clear, or to move forward: all boards, links and obstacles.
+  stretches that are claimed to be clear, or to move forward: all boards, links and obstacles.
 - The least clearance: all boards at N random times and at N times near the least, and the two nearest.
 - The greatest speed: the speeds of all handles at N random times, and the fastest.
-- The least pitch: N random pitches that are said to end with an overlap or a lock. Also N places of the head with the
-  pitch that is free.
+- The least pitch: N random pitches that are claimed to end with an overlap or a lock. Also N places of the head with
+  the pitch that is free.
 
-In N random steps of each certificate, the spans contain the handles, and boards are as far apart as is said. Of several
-dragons it checks each alone, and each two on the stage at times of the show. Path and chain are built as docs/proofs.md
-defines them. A follower is the first point backward along the path at the distance of the link, enclosed in numbers of
-192 bits.
+In N random steps of each certificate, the spans contain the handles, and boards are as far apart as claimed. For
+several dragons the script checks each alone, and each two on the stage at times of the show. Path and chain are built
+as docs/proofs.md defines them. A follower is the first point backward along the path at the distance of the link,
+enclosed in numbers of 192 bits.
 
 Prints a JSON object for each file. Its `refused` and `undecided` are a sentence or null. The numbers of what was
 checked follow, with the random places that were undecided.
@@ -44,7 +44,7 @@ LINES = {
     "greatest_speed": ("speeds", "fast", "greatest_speed"),
     "least_pitch": ("reach", "overlap", "head_locks", "far", "step", "least_pitch"),
 }
-# The same of two of several dragons.
+# The same lines for two of several dragons.
 LINES_OF_TWO = {
     "events": ("both", "meeting", "result"),
     "least_clearance": ("both", "near_both", "meeting", "least_clearance"),
@@ -422,7 +422,7 @@ class Scene:
 
 
 class Placement:
-    """Where the path's own coordinates are on the stage: mirrored, then turned, then moved."""
+    """The place of the path's own coordinates on the stage: mirrored, then turned, then moved."""
 
     def __init__(self, table):
         self.origin = [arb(float(c)) for c in table.get("origin", [0.0, 0.0])]

@@ -137,7 +137,7 @@ def told_apart(page, handles):
 
 
 def fault_of_casings(page, handles, to_pixel):
-    """Returns how the casings in the picture of the page fail to differ, or nothing."""
+    """Returns the fault of the casings in the picture of the page, or nothing."""
     pixels = shot(page)
     pixel = 1 / numpy.hypot(*(to_pixel(1, 0) - to_pixel(0, 0)))
     box = page.locator("#stage").bounding_box()

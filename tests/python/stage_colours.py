@@ -32,7 +32,7 @@ def frames(first, last, step):
 
 
 def reversals(shades, least=4):
-    """Returns how often a series turns back by at least some shades."""
+    """Returns the number of times that a series turns back by at least some shades."""
     turns, way, extreme = 0, 0, shades[0]
     for shade in shades:
         if way >= 0 and shade <= extreme - least or way <= 0 and shade >= extreme + least:

@@ -96,7 +96,7 @@ def one_page_of_two():
 
 
 def two_are_drawn_apart():
-    """Two dragons of one path, one of them moved, turned round and mirrored: each is where its placement says, and no
+    """Two dragons of one path, one of them moved, turned round and mirrored: each is where its placement states, and no
     board is drawn elsewhere."""
     dragon = """
 [[dragons]]

@@ -17,7 +17,7 @@ from stage_show import luminance
 from stage_transport import command
 
 SQUARE = "config/square.toml"
-# Of that scene, in metres.
+# The obstacles and the boundary of that scene, in metres.
 WELL, KERB, WELL_KEEP_OUT = (-3.9, 0.1), 1.6, 1.5
 SPECTATORS, SPECTATORS_KEEP_OUT = numpy.array([[-9.0, 12.0], [9.0, 12.0]]), 1.5
 BOUNDARY = numpy.array([[-20, 15], [20, 15], [20, -15], [-12.5, -15]], float)
@@ -34,7 +34,7 @@ def along(start, end, aside=0.0, count=600):
     return start + numpy.linspace(0.02, 0.98, count)[:, None] * (end - start) + aside * numpy.array([-way[1], way[0]])
 
 
-# All of that scene: their outlines, and the distances that boards keep.
+# All obstacles of that scene: their outlines, and the distances that boards keep.
 OBSTACLES = [
     ("well", shapely.Point(WELL), KERB + WELL_KEEP_OUT),
     ("camphor tree", shapely.Point(2.6, 0), 0.8 + 1),
@@ -123,7 +123,8 @@ def lines_join_what_is_nearest():
         assert met["obstacle"]["name"] == name and away[name] - 1e-6 < met["place"]["away"] < away[name] + 0.02, (away, met)
         assert met["text"].startswith(f"{met['place']['away']:.3f}\u00a0m to the {met['obstacle']['name']}"), met
         assert pair["text"] == f"{pair['place']['away']:.3f}\u00a0m", pair
-        # Both are lines: their ends are as far apart as they say, the one on the board of the bench.
+        # Both are lines: their ends are as far apart as their words state, and the second line begins on the board of
+        # its bench.
         for mark in (pair, met):
             start, end = (numpy.array([place["x"], place["y"]]) for place in mark["line"])
             assert abs(numpy.hypot(*(end - start)) - mark["place"]["away"]) < 1e-6, mark

@@ -34,7 +34,7 @@ def distances(points, handles, scale):
 
 
 def points_of(label):
-    """Returns the points of a label that say which board it names: where its line ends, or every part of a box."""
+    """Returns the points of a label that identify its board: the end of its line, or every part of a box."""
     if label["end"]:
         return numpy.array([[label["end"]["x"], label["end"]["y"]]])
     if label["isBadge"]:

@@ -222,7 +222,7 @@ def gone_with_its_scene():
 
 
 def one_of_two_is_proved():
-    """Of several dragons, only the one with the certified scene has proved results."""
+    """Among several dragons, only the dragon with the certified scene has proved results."""
     with scenes() as given, browser() as (page, complaints):
         jade = f"{NAME}_jade"
         child = [PROGRAM, "--name", jade, "--scene", str(given.other), "run", "--quiet", "--json", *given.before_contact()]

@@ -137,7 +137,8 @@ def everybody_is_told():
 
 
 def a_loop_is_announced():
-    """As the scene says; or, for an option of the publisher, after two ends that were alike."""
+    """The time until a loop begins again: from the scene or, for an option of the publisher, from two ends that were
+    alike."""
     with server() as url, browser() as (page, complaints):
         page.goto(url)
         said = page.evaluate("""async () => {
@@ -198,7 +199,8 @@ def distances_are_measured():
 
 
 def the_clearance_of_the_whole_show_is_a_curve():
-    """Its points are those of `solve`-d chains elsewhere: at 300 s the frame's own; its least place is the contact."""
+    """The curve's points are from chains solved elsewhere: at 300 s it has the frame's clearance; its least place is
+    the contact."""
     with server() as url, started("view", "--json", "--port", "0", "--control") as conducted, publisher(*STILL), browser() as (page, complaints):
         page.goto(url)
         drawn(page)
@@ -223,7 +225,7 @@ def the_clearance_of_the_whole_show_is_a_curve():
 
 
 def the_chase_stands_in_the_header():
-    """LTC's label and error, as long as a chase runs; a chase that is killed is told."""
+    """LTC's label and error, as long as a chase runs; the death of a chase is shown."""
     import socket
     import threading
 

@@ -109,7 +109,7 @@ PACED = """async (cost) => {
 
 
 def slow_computer_shows_stills():
-    """Below ten pictures a second the seat is a still that is renewed every four seconds, and says so."""
+    """Below ten pictures a second the seat is a still that is renewed every four seconds, and the page states that."""
     with server() as url, publisher("--start", "300"), browser(screen=None) as (page, complaints):
         page.goto(f"{url}#seat")
         drawn(page)

@@ -66,7 +66,8 @@ def header_says_what_the_show_does():
             heard = page.evaluate("heard.length")
             shows(page, "PAUSED", "^for " + LATER)
             assert stands(page) == paused, "the countdown of a paused show runs"
-            # A busy machine can leave the page without frames for a moment; then it says so, and "Paused." again.
+            # A busy machine can leave the page without frames for a moment; then the page reports that, and "Paused."
+            # again.
             further = page.evaluate("heard")[heard:]
             assert set(further) <= {"no frames", "Paused."}, further
             legible(page)

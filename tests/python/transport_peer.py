@@ -2,9 +2,10 @@
 
     transport_peer.py --transport iceoryx2|ros2 --name NAME --seconds S [--until KIND ...]
 
-Prints a JSON line for every frame, alert, stage and status, in the order of reading, and one at the end. It may be
-started before the publisher, and stays while publishers come and go. After SIGTERM it stays until the last of them has
-gone and all its messages are read. With --until it ends a second after a message of each of these kinds has come.
+Prints a JSON line for every frame, alert, stage and status, in the order of reading, and one at the end. The subscriber
+may be started before the publisher, and stays while publishers come and go. After SIGTERM it stays until the last of
+them has gone and all its messages are read. With --until it ends a second after a message of each of these kinds has
+come.
 """
 
 import argparse

@@ -112,7 +112,7 @@ class Terminal:
     def lines(self):
         """Returns the rows; the indented rows that continue an alert are joined to it.
 
-        On a busy machine the publisher may be late by seconds, and the monitor says so."""
+        On a busy machine the publisher may be late by seconds, and the monitor reports that."""
         lines = []
         for row in self.rows():
             if row.startswith(INDENT):

@@ -90,7 +90,7 @@ fn product_code() -> Vec<(PathBuf, String)> {
     files.filter(|path| !is_test(path)).map(read).collect()
 }
 
-/// Only some files distinguish the kinds of a curve, and outside the model none distinguishes those of a segment.
+/// Only some files distinguish the kinds of a curve, and outside the model none distinguishes the kinds of a segment.
 #[test]
 fn only_the_listed_files_know_the_kinds_of_a_curve() {
     // Each is followed by a kind or, in the page, is a kind itself.
@@ -104,7 +104,7 @@ fn only_the_listed_files_know_the_kinds_of_a_curve() {
     assert_eq!(found.collect::<BTreeSet<_>>(), BTreeSet::from(KNOW_KINDS));
     let mut seen = 0;
     for (file, text) in &code {
-        // Of `StageSegment::` and its like the name is another.
+        // `StageSegment::` and similar names are other types.
         let is_own = |at: usize| !text[..at].ends_with(|before: char| before.is_alphanumeric());
         let matches = text.match_indices("Segment::").filter(|(at, _)| is_own(*at)).count();
         if file.starts_with("crates/motion/src/model") || file.starts_with("crates/proof") {
@@ -114,7 +114,7 @@ fn only_the_listed_files_know_the_kinds_of_a_curve() {
         }
     }
     assert!(seen > 5, "{seen} matches in the model");
-    // The checker's model is its own; all others use a property of a curve.
+    // The checker has its own model; all other files use properties of a curve.
     for (file, text) in code.iter().filter(|(file, _)| !file.starts_with("crates/proof")) {
         let asks = [".is_line(", ".is_arc(", ".is_spiral("].iter().find(|kind| text.contains(**kind));
         assert_eq!(asks, None, "{}", file.display());

@@ -175,7 +175,7 @@ fn stage_path_and_each_cue_come_exactly_once_to_each_subscriber() {
     // The subscriber of cues is matched by now: no cue has passed.
     let go = program(name).args(["control", "go"]).output().unwrap();
     assert!(go.status.success(), "{}", text(&go.stderr));
-    // A late frame can pass two cues, which then have the same stamp: their names tell them apart.
+    // A late frame can pass two cues, which then have the same stamp: their names distinguish them.
     let names = |printed: Vec<String>| -> Vec<Option<usize>> {
         let samples = printed.iter().map(|line| serde_json::from_str::<Value>(line).unwrap());
         let name = |sample: Value| {
@@ -245,8 +245,8 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     let ages: Vec<u64> = ages.collect();
     let old = ages.iter().filter(|age| **age > 300).count();
     assert!(old <= joins as usize / 3 && ages.iter().all(|age| *age < 1300), "ms: {ages:?}");
-    // Beside a subscriber that stays, RustDDS keeps some alerts. They are withheld from a new subscriber, unless a busy
-    // machine is too late.
+    // Beside a subscriber that stays, RustDDS keeps some alerts. These alerts are withheld from a new subscriber,
+    // unless a busy machine is too late.
     let mut stays = Process::start(&mut subscriber(name, "alerts", &["--transient-local", "--seconds", "900"]));
     let received = stays.lines();
     (0..4).for_each(|_| drop(received.until("sample")));
@@ -298,10 +298,10 @@ fn memory(process: u32) -> f64 {
 /// The end of one subscriber.
 #[derive(PartialEq)]
 enum Visit {
-    /// It received its messages, and left or was killed.
+    /// The subscriber received its messages, and left or was killed.
     Served,
-    /// It discovered no publisher within a minute, as beside many other participants happens to Fast DDS at times: it
-    /// says nothing of ours.
+    /// The subscriber discovered no publisher within a minute, as happens to Fast DDS at times beside many other
+    /// participants. This proves nothing about the program.
     Undiscovered,
 }
 
@@ -336,7 +336,7 @@ fn visit(name: &str, index: usize) -> Visit {
 }
 
 /// Removes the shared memory that killed participants of Fast DDS have left, half a megabyte each: no process holds its
-/// lock. A participant that starts may not hold it yet, so what is younger than a minute stays.
+/// lock. A participant that starts may not hold it yet, so memory that is younger than a minute stays.
 fn remove_left_memory() {
     let age = |lock: &Path| lock.metadata().ok()?.modified().ok()?.elapsed().ok();
     for lock in fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path()) {
@@ -350,9 +350,8 @@ fn remove_left_memory() {
     }
 }
 
-/// Half of the subscribers are killed, the others leave. A subscriber that spins would never end, as one of Fast DDS
-/// does that is sent an empty change. `BENCH_DRAGON_SUBSCRIBERS` is their number, 4,000 by default; 200,000 take a
-/// night.
+/// Half of the subscribers are killed, the others leave. A subscriber of Fast DDS that is sent an empty change spins,
+/// and would never end. `BENCH_DRAGON_SUBSCRIBERS` is their number, 4,000 by default; 200,000 take a night.
 #[test]
 fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_messages() {
     // Beside many other processes a subscriber may discover the publisher later than within its minute.

@@ -216,7 +216,7 @@ fn the_process_of_ros_2_is_one_subscriber_inherits_no_files_and_ends_with_a_kill
     let publisher = Process::start(publisher.arg("--scene").arg(scene).args(["run", "--ros2"]));
     let child = ros2_of(&publisher);
     wait_until("the show runs", || control("killed_parent", &["state"]).0 == 0);
-    // It is the one subscriber.
+    // The process of ROS 2 is the one subscriber.
     let another = program("killed_parent").args(["watch", "--json", "--duration", "1"]).output().unwrap();
     assert!(text(&another.stderr).contains("publish.subscribers"), "{}", text(&another.stderr));
     let of_publisher = files_of_nodes(publisher.id());
@@ -224,7 +224,8 @@ fn the_process_of_ros_2_is_one_subscriber_inherits_no_files_and_ends_with_a_kill
     assert!(!files_of_nodes(child).is_empty());
     // A process may look at a file of another one's node for a moment.
     wait_until("no file is inherited", || files_of_nodes(child).is_disjoint(&of_publisher));
-    // Without this its memory grows with the subscribers that come and go, which only the long run measures.
+    // Without this variable the memory of the process grows with the subscribers that come and go, which only the long
+    // run measures.
     let environment = std::fs::read(format!("/proc/{child}/environ")).unwrap();
     assert!(environment.split(|byte| *byte == 0).any(|variable| variable == b"MALLOC_ARENA_MAX=1"));
     publisher.signal(SIGKILL);
@@ -323,7 +324,7 @@ fn the_diagnostics_tell_of_a_chase_and_of_its_end() {
     let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let chase = Process::start(program(name).args(["chase", "artnet", "--listen", &port.to_string()]));
     let subject = format!("{}: chase", unique(name));
-    // The topic is that of all shows of the domain.
+    // All shows of the domain share the topic.
     /// A test of a status of the chase, with a function that returns its figures.
     type Test = dyn Fn(&Value, &dyn Fn(&str) -> String) -> bool;
     let until = |is_it: &Test| {
@@ -364,7 +365,7 @@ fn the_diagnostics_tell_of_a_chase_and_of_its_end() {
         });
         must_stop.store(true, Ordering::Relaxed);
     });
-    // Without timecode the show goes on for a while, and is paused then.
+    // Without timecode the show continues for a while, and is paused then.
     until(&|status, value| value("state") == "lost" && value("locked") == "false" && status["level"] == 2);
     chase.signal(SIGKILL);
     chase.output();

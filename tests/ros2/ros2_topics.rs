@@ -149,7 +149,7 @@ fn have_common_stamps(lines: &[Value], is_sim: bool) -> bool {
         && (!is_sim || has_one("clock", &|message| nanoseconds(&message["clock"])))
 }
 
-/// Two shows with every topic: the scene of one leaves its stamps on `/clock`, that of the other puts them on wall
+/// Two shows with every topic: the scene of one leaves its stamps on `/clock`, the scene of the other puts them on wall
 /// time.
 #[test]
 fn stamps_are_on_the_clock_or_on_wall_time_as_the_scene_requests() {
@@ -178,7 +178,8 @@ fn stamps_are_on_the_clock_or_on_wall_time_as_the_scene_requests() {
     for ((_publisher, _subscriber, printed), is_sim) in started.into_iter().zip([true, false]) {
         let mut lines: Vec<Value> = Vec::new();
         let received = |lines: &[Value], topic: &String| messages(lines, topic).len();
-        // Of one frame: tf2 finds a transform at the stamp of the poses. On a busy machine a topic may begin late.
+        // Poses and transforms of one frame: tf2 finds a transform at the stamp of the poses. On a busy machine a topic
+        // may begin late.
         while topics.iter().any(|topic| received(&lines, topic) < if latched.contains(topic) { 1 } else { 2 })
             || !have_common_stamps(&lines, is_sim)
         {
@@ -245,7 +246,7 @@ fn a_default_subscription_gets_every_topic_and_discovers_its_quality_of_service(
     }
     for topic in topics {
         let matched = lines.iter().find(|line| line["by"] == topic).unwrap();
-        // So long after a publisher's death its topics are listed.
+        // The topics of a dead publisher are listed for this time.
         assert_eq!(matched["leases_s"], serde_json::json!([50.0]), "{matched}");
         let offered = &matched["offered"];
         let durability = if events.contains(&topic) { "TransientLocal" } else { "Volatile" };

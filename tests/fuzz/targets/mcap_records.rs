@@ -97,7 +97,7 @@ pub fn parsed(data: &[u8]) -> Option<Vec<Record>> {
 }
 
 /// Returns the messages in chunks, and those before the first chunk, of a file whose every chunk is whole, readable and
-/// complete. Behind a length beyond the file, it takes the messages of all chunks that begin at any byte. Returns
+/// complete. Behind a length beyond the file, all chunks that begin at any byte contribute their messages. Returns
 /// `None` for any other file.
 pub fn messages(data: &[u8]) -> Option<Vec<Known>> {
     let mut records = parsed(data)?;

@@ -109,7 +109,7 @@ fn check_upgraded(data: &[u8], answer: &[u8]) {
         return;
     }
     let asked: Vec<Vec<u8>> = frames.into_iter().filter(|frame| frame.0 == 0x81).map(|frame| frame.1).collect();
-    // The first message tells if this client may send commands.
+    // The first message states whether this client may send commands.
     assert_eq!(answers.len(), asked.len() + 1, "{answers:?} to {}", String::from_utf8_lossy(sent));
     for (asked, answer) in asked.iter().zip(&answers[1..]) {
         assert_eq!(asked == b"clock", answer["type"] == "clock", "{answer}");

@@ -123,8 +123,8 @@ impl Sent {
         }
     }
 
-    /// Returns the number of these messages that a replay sends. Of the messages before the first frame, it sends only
-    /// the latest if they have been read by then.
+    /// Returns the number of these messages that a replay sends. A replay sends only the latest of the messages before
+    /// the first frame if they have been read by then.
     fn outgoing(&self, ticks: &[u64]) -> RangeInclusive<usize> {
         let first = self.frames.first().map_or(0, |(_, tick)| *tick);
         ticks.len() - ticks.iter().filter(|tick| **tick < first).count().saturating_sub(1)..=ticks.len()

@@ -123,7 +123,7 @@ fn a_byte_that_is_wrong_costs_messages_and_invents_none() {
     }
 }
 
-/// A length beyond the file says nothing of the next record, which the chunks' own lengths and checks show.
+/// A length beyond the file does not locate the next record; the chunks' own lengths and checks do.
 #[test]
 fn a_damaged_length_costs_no_message() {
     if !can_run(python_modules(&["mcap", "blake3"])) {

@@ -46,7 +46,7 @@ fn a_default_subscription_gets_every_topic_and_discovers_its_quality_of_service(
     stopped(publisher);
 }
 
-/// Of a subscriber that is stopped for longer than messages are kept, older messages are acknowledged in its name.
+/// Older messages are acknowledged in the name of a subscriber that is stopped for longer than messages are kept.
 #[test]
 fn a_subscriber_that_was_stopped_gets_the_messages_of_now() {
     if !can_run(peer_program().map(drop)) {
@@ -74,10 +74,10 @@ fn a_subscriber_that_was_stopped_gets_the_messages_of_now() {
     stopped(publisher);
 }
 
-/// The numbers of a writer begin at 1: smaller ones than before are those of another writer.
+/// The numbers of a writer begin at 1: a number smaller than the one before is from another writer.
 #[test]
 fn a_subscriber_loses_no_message_and_gets_none_twice_when_another_writer_relieves_the_first() {
-    // It takes two processors for a minute, and other tests then wait for discovery.
+    // The test takes two processors for a minute, and other tests then wait for discovery.
     if !long() || !can_run(peer_program().map(drop)) {
         return;
     }
@@ -91,7 +91,7 @@ fn a_subscriber_loses_no_message_and_gets_none_twice_when_another_writer_relieve
     let publisher = publisher(name, &show);
     let mut subscriber = Process::start(&mut subscriber(name, "handles", &["--seconds", "3000", "--depth", "20000"]));
     let printed = subscriber.lines();
-    // The number of the writer, and that of the frame: after the header of 24 bytes and the number of the run.
+    // The writer's number, and the frame's number, which follows the header of 24 bytes and the number of the run.
     let next = || {
         let sample: Value = serde_json::from_str(&printed.until("sample")).unwrap();
         let frame = u64::from_str_radix(&sample["hex"].as_str().unwrap()[64..80], 16).unwrap().swap_bytes();

@@ -30,7 +30,7 @@ fn nodes_beside(name: &str) -> Vec<String> {
             }
         });
         node.stop_spinner();
-        // ros2-client holds eight events and loses further ones: on a busy machine that of this node, too.
+        // ros2-client holds eight events and loses further ones: on a busy machine also the event of this node.
         match found {
             Ok(nodes) => return nodes,
             Err(_) => assert!(std::time::Instant::now() < deadline, "no node {name} within {:?}", harness::patience()),

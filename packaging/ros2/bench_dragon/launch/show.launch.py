@@ -1,4 +1,4 @@
-"""A show on ROS 2, and RViz if asked for.
+"""A show on ROS 2, and RViz on request.
 
     ros2 launch bench_dragon show.launch.py scene:=paper name:=gold rate:=60 rviz:=true
 """
