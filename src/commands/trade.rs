@@ -240,7 +240,7 @@ fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasure
     output.line(&format!(
         "* no other has both fewer bytes and a smaller error. Errors: the largest over all {} handles at the moments of a \
          display at {display_rate} Hz that runs behind the stream by the delay, in the {} s up to the last whole second \
-         before the show freezes and at {} moments spread over it, against newton at the simulated time meant to be on display. Single: poses \
+         before the show ends and at {} moments spread over it, against newton at the simulated time meant to be on display. Single: poses \
          rounded to 32 bits, as `precision = \"f32\"` publishes them. Of a core: computing the frames by the solver of the scene, \
          without transport.",
         scene.team().handles(),

@@ -101,8 +101,9 @@ impl<'a> Pair<'a> {
     pub fn rear_product(&self) -> Interval {
         self.product(self.rear, self.front)
     }
-    /// Returns g(u, x) by Taylor's formula of the second order along the rear's span. With a junction in the span
-    /// nothing is known of it.
+
+    /// Returns g(u, x) by Taylor's formula of the second order along the rear's span. With a junction in the span the
+    /// result is 0, which proves no product positive.
     pub fn second_order_rear_product(&self, path: &Path) -> Interval {
         let Self { front, rear, middle, distance, .. } = self;
         let place = path.middle_of(rear.span);
