@@ -190,7 +190,7 @@ impl Supervisor {
             delay = if began.elapsed() >= LIFETIME { Duration::ZERO } else { (2 * delay).clamp(shortest, longest) };
             let reason = ended.map_or_else(|error| error.to_string(), |(status, _)| status.to_string());
             log::warn!(
-                "the process of ROS 2 ended ({reason}): restarted in {} s; the show itself goes on",
+                "the process of ROS 2 ended ({reason}): restarted in {} s; the show itself continues",
                 delay.as_secs_f64()
             );
             let restart = Instant::now() + delay;
