@@ -286,8 +286,9 @@ fn a_reliable_subscriber_that_stops_reading_holds_nobody_up() {
     let summary = summary(&output);
     let number = |value: &Value| value.as_u64().unwrap();
     assert_eq!(number(&summary["frames"]) + number(&summary["skipped"]), 1800, "{summary}");
-    // None, unless the machine is so busy that acknowledgements come seconds late.
-    assert!(number(&summary["ros2"]["discarded"]) <= 60, "{summary} {printed}");
+    // None, unless the machine is so busy that acknowledgements come seconds late. If the publisher kept what the
+    // subscriber has not acknowledged, it would discard more than 1,400 of the 1,800 frames.
+    assert!(number(&summary["ros2"]["discarded"]) <= 300, "{summary} {printed}");
     assert!(printed.matches("discarded").count() <= 1, "printed more than once: {printed}");
 }
 
