@@ -179,9 +179,9 @@ fn a_show_follows_the_tracker_of_another_one() {
     command.args(["tests/python/chase_tracker.py", "--leader", &unique(leader), "--follower", &unique(follower)]);
     command.args(["--from", &from, "--to", &to, "--seconds", "14", "--result"]).arg(result_file(follower));
     let relay = Process::start(&mut command);
+    let result = result(follower, relay);
     let locked = state(&lines, "locked");
     assert_eq!((&locked["source"], &locked["tracker"]), (&"psn".into(), &1.into()));
-    let result = result(follower, relay);
     assert!(result["p50"].as_f64().unwrap() < 0.1, "{result}");
     assert!(result["p99"].as_f64().unwrap() < 0.5 && result["frames"].as_u64().unwrap() > 200, "{result}");
     state(&lines, "lost");
