@@ -404,7 +404,7 @@ def least_below(show, obstacle, times, corners, than):
 
 def run(program, scene, *arguments):
     command = [program, "--scene", str(scene), "--quiet", "--json", *arguments]
-    output = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    output = subprocess.run(command, capture_output=True, text=True, timeout=1800)
     assert output.returncode == 0, f"{command}: {output.stderr}"
     return [json.loads(line) for line in output.stdout.splitlines()]
 
