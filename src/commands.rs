@@ -31,7 +31,7 @@ mod scene_facts;
 pub mod send;
 mod service_manager;
 pub mod soak;
-pub mod soak_conductor;
+pub mod soak_load_generator;
 pub mod solve;
 pub mod swept;
 pub mod trade;

@@ -62,10 +62,10 @@ pub enum Command {
     SoakSubscriber(commands::soak::SoakSubscriberArguments),
     /// The commanding process of soak --conduct
     #[command(hide = true)]
-    SoakConductor(commands::soak_conductor::SoakConductorArguments),
+    SoakLoadGenerator(commands::soak_load_generator::SoakLoadGeneratorArguments),
     /// A client that soak --conduct kills
     #[command(hide = true)]
-    SoakClient(commands::soak_conductor::SoakClientArguments),
+    SoakClient(commands::soak_load_generator::SoakClientArguments),
     /// Write man pages and shell completions for a package
     #[command(hide = true)]
     WriteManual(commands::write_manual::WriteManualArguments),
@@ -119,8 +119,8 @@ fn main() -> ExitCode {
         Command::Plan(arguments) => commands::plan::plan(&common, arguments),
         Command::Soak(arguments) => commands::soak::soak(&common, arguments),
         Command::SoakSubscriber(arguments) => commands::soak::subscribe(&common, arguments),
-        Command::SoakConductor(arguments) => commands::soak_conductor::conduct(&common, arguments),
-        Command::SoakClient(arguments) => commands::soak_conductor::client(&common, arguments),
+        Command::SoakLoadGenerator(arguments) => commands::soak_load_generator::conduct(&common, arguments),
+        Command::SoakClient(arguments) => commands::soak_load_generator::client(&common, arguments),
         Command::WriteManual(arguments) => commands::write_manual::write_manual(CommandLine::command(), arguments),
         Command::Check(arguments) => commands::check::check(&common, arguments),
     });

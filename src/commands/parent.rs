@@ -1,5 +1,5 @@
 //! The option of a process that exits when its parent process exits. Called by `run`, `send`, `soak-subscriber` and
-//! `soak-conductor`.
+//! `soak-load-generator`.
 
 use nix::sys::signal::{SigSet, Signal};
 

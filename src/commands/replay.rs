@@ -9,7 +9,7 @@ use bench_dragon::messages::{Stage, StageMessage};
 use bench_dragon::publisher::live::End;
 use bench_dragon::publisher::run::{Hooks, Publishing};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
-use bench_dragon::recording::mcap::reader::ReadError;
+use bench_dragon::recording::mcap::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
 use bench_dragon::ros2_messages::settings::Topic;
 use bench_dragon::show::scene::{Accepted, Scene};

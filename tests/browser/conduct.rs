@@ -11,7 +11,7 @@ use std::net::TcpStream;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use harness::{Process, json_lines, program, scene_file, text, wait};
+use harness::{Process, answering, json_lines, program, scene_file, text};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tungstenite::stream::MaybeTlsStream;
@@ -31,14 +31,7 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     let scene = cued_scene(name);
     let mut command = program(name);
     command.args(["--scene", scene.to_str().unwrap(), "run", "--quiet", "--json", "--rate", "50"]);
-    let publisher = Process::start(command.args(arguments));
-    for _ in 0..600 {
-        if state(name).is_some() {
-            return publisher;
-        }
-        wait(0.1);
-    }
-    panic!("no publisher");
+    answering(Process::start(command.args(arguments)), || program(name))
 }
 
 /// Returns the state of the show; `None` if no publisher runs.

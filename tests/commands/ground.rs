@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use tempfile::NamedTempFile;
 
-use crate::harness::{can_run, long, python, python_modules, text};
+use crate::harness::{can_run, cases, python, python_modules, text};
 
 /// The scenes with a touch known to 40 digits: the time, s, and the bench.
 const TOUCHES: [(&str, &str, u32); 3] = [
@@ -37,9 +37,8 @@ fn obstacles_are_met_where_a_brute_force_meets_them() {
     for (name, ..) in TOUCHES {
         judge(&[&scene_of_touch(name)]);
     }
-    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
     // Ten scenes of each family, in three processes side by side.
-    let count = if long() { 600 } else { [30, 9][usize::from(is_short)] };
+    let count = cases(9, 30, 600);
     std::thread::scope(|scope| {
         for part in 0..3 {
             scope.spawn(move || judge(&["--random", &format!("{}", 1 + part * count), &format!("{count}")]));

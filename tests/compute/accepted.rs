@@ -291,8 +291,7 @@ fn tried(index: usize, all: bool) -> (Vec<Status>, Option<Until>, bool) {
 
 #[test]
 fn every_certificate_of_a_tight_route_is_accepted() {
-    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
-    let numbers = numbers().unwrap_or(0..if harness::long() { 100_000 } else { [200, 40][usize::from(is_short)] });
+    let numbers = numbers().unwrap_or(0..harness::cases(40, 200, 100_000));
     let count = numbers.len();
     let stride = if harness::long() { LONG_STRIDE } else { STRIDE };
     let next = AtomicUsize::new(numbers.start);

@@ -158,8 +158,7 @@ fn the_least_clearances_of_the_square_are_enclosed_to_a_nanometre() {
 
 #[test]
 fn the_least_clearances_of_random_scenes_are_enclosed() {
-    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
-    let count = if harness::long() { 3000 } else { [120, 30][usize::from(is_short)] };
+    let count = harness::cases(30, 120, 3000);
     let (mut obstacles, mut whole) = (0, 0);
     for index in 0..count {
         let (of_scene, enclosed) = compared(&random_scene(&mut Rng::with_seed(0xbe51de + index)), 60);

@@ -107,8 +107,7 @@ fn ends_with_a_contact_of_two(scene: &Scene) -> bool {
 
 #[test]
 fn least_clearances_of_random_pairs_are_proved() {
-    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
-    let count = if harness::long() { 600 } else { [24, 12][usize::from(is_short)] };
+    let count = harness::cases(12, 24, 600);
     let mut rng = Rng::with_seed(3904);
     let (mut whole, mut apart, mut touched, mut cases) = (0, 0, 0, 0);
     while cases < count {

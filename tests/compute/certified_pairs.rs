@@ -46,8 +46,7 @@ fn first_contact(proved: &Proved) -> Option<&ProvedEvent> {
 
 #[test]
 fn first_contacts_of_random_pairs_are_proved() {
-    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
-    let count = if harness::long() { 1000 } else { [60, 15][usize::from(is_short)] };
+    let count = harness::cases(15, 60, 1000);
     let mut rng = Rng::with_seed(3903);
     let (mut between, mut without, mut undecided, mut cases) = (0, 0, 0, 0);
     while cases < count {

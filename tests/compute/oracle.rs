@@ -17,6 +17,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
 use std::time::{Duration, Instant};
 
+use crate::harness;
 use chain::Chain;
 use comparison::{CheckerResult, Comparison, verdict};
 use scenes::{FAMILIES, Random, random_scene, read};
@@ -130,13 +131,8 @@ fn the_program_agrees_with_brute_force() {
         return;
     }
     let seed = number_from("BENCH_DRAGON_ORACLE_SEED").unwrap_or(1);
-    let is = |name: &str, value: &str| std::env::var(name).is_ok_and(|given| given == value);
-    let scenes = match number_from("BENCH_DRAGON_ORACLE_SCENES") {
-        Some(scenes) => scenes as usize,
-        None if is("BENCH_DRAGON_LONG", "1") => 10_000,
-        None if is("BENCH_DRAGON_CASES", "few") => 50,
-        None => 200,
-    };
+    let given = number_from("BENCH_DRAGON_ORACLE_SCENES").map(|scenes| scenes as usize);
+    let scenes = given.unwrap_or_else(|| harness::cases(50, 200, 10_000));
     let (next, tally) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {

@@ -132,8 +132,7 @@ fn certificates_of_the_example_scenes_with_a_stage_are_accepted() {
 
 #[test]
 fn certificates_of_random_scenes_with_obstacles_are_accepted() {
-    let is_short = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
-    let count = if harness::long() { 5000 } else { [200, 40][usize::from(is_short)] };
+    let count = harness::cases(40, 200, 5000);
     let mut counts = [0; 3];
     for index in 0..count {
         for status in statuses(&random_scene(&mut Rng::with_seed(0x57a6e + index))) {

@@ -1,15 +1,19 @@
 // A Fast DDS process that subscribes to topics and calls services as rmw_fastrtps does, with payloads as bytes.
 //
 //     peer subscribe TOPIC TYPE [--best-effort] [--transient-local] [--depth N] [--seconds S] [--samples N]
-//         [--linger S] [--joins N] [--lease S]
+//         [--linger S] [--joins N] [--lease S] [--shared-memory]
 //     peer call SERVICE REQUEST_TYPE RESPONSE_TYPE HEX [--timeout S] [--clients N] [--heartbeat S]
 //
 // Both take --domain D. TOPIC and SERVICE are names on the wire without their prefixes: "rt/", or "rq/" and "rr/".
 // HEX is the request's body, little-endian, without the four bytes of the encapsulation.
 //
-// `subscribe` prints a JSON line for each sample, and one when the subscriber exists. `subscribe` prints another when
-// the subscriber has ended, with the quality of service that the publisher offers. The subscriber ends after S seconds,
-// or some time after N samples. With --joins that happens N times, each with a participant of its own.
+// The transport is UDP, the only one of the publisher. With --shared-memory the transports are those that Fast DDS has
+// by default, shared memory and UDP. Fast DDS 2.9.1 at times crashes when it closes its shared memory.
+//
+// `subscribe` prints a JSON line for each sample, one when the subscriber exists, and one when it is matched with a
+// publisher. `subscribe` prints another when the subscriber has ended, with the quality of service that the publisher
+// offers. The subscriber ends after S seconds, or some time after N samples. With --joins that happens N times, each
+// with a participant of its own.
 // `call` makes the first call of N new clients, each with a participant that knows the server before, and prints a JSON
 // line for each. Called by tests/ros2/fast_dds.rs, which builds this file.
 
@@ -43,8 +47,10 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
 using namespace eprosima::fastdds::dds;
+using eprosima::fastdds::rtps::UDPv4TransportDescriptor;
 using eprosima::fastrtps::rtps::GUID_t;
 using eprosima::fastrtps::rtps::InstanceHandle_t;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
@@ -101,6 +107,7 @@ struct Options {
   uint32_t domain = 0;
   bool reliable = true;
   bool transient_local = false;
+  bool shared_memory = false;
   int depth = 10;
   int joins = 1;
   int clients = 1;
@@ -119,6 +126,8 @@ struct Options {
         reliable = false;
       } else if (option == "--transient-local") {
         transient_local = true;
+      } else if (option == "--shared-memory") {
+        shared_memory = true;
       } else if (i + 1 == count) {
         fail("unexpected argument " + option);
       } else {
@@ -217,6 +226,10 @@ public:
   Peer(const Options& options, Events& events) : options(options), events(events) {
     DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
     qos.wire_protocol().builtin.discovery_config.leaseDuration = options.lease;
+    if (!options.shared_memory) {
+      qos.transport().use_builtin_transports = false;
+      qos.transport().user_transports.push_back(std::make_shared<UDPv4TransportDescriptor>());
+    }
     participant = DomainParticipantFactory::get_instance()->create_participant(options.domain, qos, &events,
                                                                                StatusMask::none());
     if (!participant) fail("no participant");
@@ -303,8 +316,14 @@ void subscribe(const std::string& name, const std::string& type, const Options& 
     std::printf("{\"type\":\"made\",\"made_ns\":%lld}\n", made);
     std::fflush(stdout);
     uint64_t samples = 0;
+    bool is_matched = false;
     auto end = in(options.seconds);
-    while (events.wait(end, [&] { return events.take_data(); })) {
+    while (events.wait(end, [&] { return events.take_data() || (!is_matched && events.writers > 0); })) {
+      if (!is_matched && events.writers > 0) {
+        is_matched = true;
+        std::printf("{\"type\":\"matched\"}\n");
+        std::fflush(stdout);
+      }
       Bytes bytes;
       SampleInfo info;
       while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) {

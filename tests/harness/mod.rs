@@ -407,6 +407,20 @@ pub fn long() -> bool {
     is_set("BENCH_DRAGON_LONG")
 }
 
+/// Returns true if few random cases are requested, as by `tests/run --quick`.
+pub fn few() -> bool {
+    std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few")
+}
+
+/// Returns the number of cases for [`few`] cases, for a usual run, or for [`long`] tests.
+pub fn cases<T>(of_few: T, usual: T, of_long: T) -> T {
+    match () {
+        () if long() => of_long,
+        () if few() => of_few,
+        () => usual,
+    }
+}
+
 /// Prints a line that is visible even if the test passes: libtest captures `println!` and `eprintln!` only.
 pub fn aloud(line: &str) {
     let _ = std::io::stderr().write_all(format!("{line}\n").as_bytes());
@@ -462,6 +476,22 @@ pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
         assert!(Instant::now() < deadline, "not within {:?}: {what}", patience());
         std::thread::sleep(Duration::from_millis(10));
     }
+}
+
+/// Returns the process of a publisher when a publisher answers commands. `program` returns the program with the name of
+/// the publisher.
+pub fn answering(mut publisher: Process, program: impl Fn() -> Command) -> Process {
+    wait_until("an answer of the publisher", || {
+        let has_ended = publisher.0.try_wait().unwrap().is_some();
+        has_ended || program().args(["control", "state"]).output().unwrap().status.success() || {
+            wait(0.1);
+            false
+        }
+    });
+    if let Some(status) = publisher.0.try_wait().unwrap() {
+        panic!("the publisher ended with {status}: {}", text(&publisher.output().stderr));
+    }
+    publisher
 }
 
 pub fn wait(seconds: f64) {

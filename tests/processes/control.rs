@@ -11,26 +11,13 @@ use bench_dragon::messages::ControlResponse;
 use bench_dragon::messages::control::{Code, Command as Conduct};
 use bench_dragon::messages::state::PlaybackState;
 use harness::{
-    LONG_QUEUE, Place, Process, can_run, example, json_lines, program, python, python_modules, root, scene_file,
-    stopped, summary, text, unique, wait,
+    LONG_QUEUE, Place, Process, answering, can_run, example, json_lines, program, python, python_modules, root,
+    scene_file, stopped, summary, text, unique, wait,
 };
 use serde_json::Value;
 
 fn publisher(name: &str, arguments: &[&str]) -> Process {
-    let process = Process::start(program(name).args(["run", "--json"]).args(arguments));
-    // The service of the loop's status is the last to appear.
-    let mut refusal = String::new();
-    for _ in 0..300 {
-        let (code, _, sentence) = control(name, &["state"]);
-        if code == 0 {
-            return process;
-        }
-        refusal = sentence;
-        wait(0.1);
-    }
-    // A running process must end before the test can read its output.
-    process.signal(nix::sys::signal::Signal::SIGINT);
-    panic!("{refusal}; the publisher: {}", text(&process.output().stderr));
+    answering(Process::start(program(name).args(["run", "--json"]).args(arguments)), || program(name))
 }
 
 /// Returns the exit code, the response as printed, and the sentence on standard error.
@@ -207,7 +194,7 @@ enum Stand {
 const STANDS: [Stand; 6] = [Stand::Playing, Stand::Paused, Stand::Stepping, Stand::Waiting, Stand::Held, Stand::Ended];
 
 /// Two clients of a publisher: one awaits the end of a step, the other commands meanwhile.
-struct Conductor {
+struct TwoClients {
     controller: Controller,
     second: String,
     step: Option<std::thread::JoinHandle<ControlResponse>>,
@@ -215,7 +202,7 @@ struct Conductor {
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-impl Conductor {
+impl TwoClients {
     fn new(name: &str) -> Self {
         Self { controller: Controller::new(&unique(name)).unwrap(), second: unique(name), step: None }
     }
@@ -288,7 +275,7 @@ fn every_command_in_every_state() {
     use PlaybackState::{Ended, Held, Paused, Playing};
     let name = "whole_table";
     let _publisher = publisher_with_a_cue(name);
-    let mut conductor = Conductor::new(name);
+    let mut clients = TwoClients::new(name);
     let held = (Refused, Held);
     // Playing, paused, stepping, waiting, held, ended: the code, and the state after the command. A step has no answer
     // before it is complete.
@@ -328,25 +315,25 @@ fn every_command_in_every_state() {
     ];
     for (command, expected) in table {
         for (stand, expected) in STANDS.into_iter().zip(expected) {
-            conductor.bring_to(stand);
-            assert_eq!(conductor.send(command), expected, "{command:?} while {stand:?}");
+            clients.bring_to(stand);
+            assert_eq!(clients.send(command), expected, "{command:?} while {stand:?}");
             // A command that cancels a step causes its refusal.
-            assert_eq!(conductor.end_step(), (stand == Stand::Stepping).then_some(Refused), "{command:?}");
+            assert_eq!(clients.end_step(), (stand == Stand::Stepping).then_some(Refused), "{command:?}");
         }
     }
     let unusable =
         [Conduct::Rate(0.0), Conduct::Rate(1e7), Conduct::Rate(f64::NAN), Conduct::Seek(-1.0), Conduct::Seek(1e9)];
     for command in unusable {
         for stand in STANDS {
-            conductor.bring_to(stand);
+            clients.bring_to(stand);
             let expected = if stand == Stand::Held { Refused } else { Code::OutOfRange };
-            assert_eq!(conductor.send(command).0, expected, "{command:?} while {stand:?}");
-            conductor.end_step();
+            assert_eq!(clients.send(command).0, expected, "{command:?} while {stand:?}");
+            clients.end_step();
         }
     }
     for (stand, expected) in [(Stand::Paused, Code::OutOfRange), (Stand::Held, Refused)] {
-        conductor.bring_to(stand);
-        assert_eq!(conductor.send(Conduct::Step(0)).0, expected, "no periods while {stand:?}");
+        clients.bring_to(stand);
+        assert_eq!(clients.send(Conduct::Step(0)).0, expected, "no periods while {stand:?}");
     }
 }
 
@@ -356,7 +343,7 @@ fn another_user_cannot_conduct() {
     if !can_run(root("become another user")) {
         return;
     }
-    let place = Place::new("conductors");
+    let place = Place::new("clients");
     let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100"]));
     let state = || json_lines(&place.program().args(["--json", "control", "state"]).output().unwrap()).pop();
     let deadline = Instant::now() + PATIENCE;

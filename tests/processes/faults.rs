@@ -15,7 +15,9 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal::{self, SIGBUS, SIGCONT, SIGINT, SIGKILL, SIGTERM};
 use serde_json::Value;
 
-use harness::{LONG_QUEUE, Lines, Place, Process, can_run, is_root, json_lines, long, root, summary, text, wait};
+use harness::{
+    LONG_QUEUE, Lines, Place, Process, answering, can_run, is_root, json_lines, long, root, summary, text, wait,
+};
 
 /// Returns a publisher whose subscribers lose nothing while the machine is too busy to run them.
 fn publisher(place: &Place, arguments: &[&str]) -> Process {
@@ -171,14 +173,10 @@ fn a_show_that_starts_on_a_slow_disk_is_found() {
     let place = Place::new("slow_disk");
     let mut slow = place.program();
     slow.args(["run", "--json", "--rate", "100", "--scene"]).arg(place.scene_publishing(LONG_QUEUE));
-    let publisher = Process::start(slow.env("LD_PRELOAD", preloaded("slow_disk")));
-    // Each of these looks, when it starts, for stale files of killed processes.
-    let answers = || place.program().args(["--json", "control", "state"]).output().unwrap().status.success();
     let began = Instant::now();
-    while !answers() {
-        assert!(began.elapsed() < Duration::from_secs(60), "no client finds the show");
-        wait(0.1);
-    }
+    // Each process that looks for the publisher looks for stale files of killed processes when it starts.
+    let publisher = Process::start(slow.env("LD_PRELOAD", preloaded("slow_disk")));
+    let publisher = answering(publisher, || place.program());
     // A node's file and a service's file take longer than an unfinished file may exist: otherwise nothing was slow.
     assert!(began.elapsed() > Duration::from_secs(5), "the disk was not slowed down");
     let steady = observer(&place);

@@ -10,10 +10,10 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use bench_dragon::client::shared_memory::{node, service_name};
-use bench_dragon::messages::{FrameHeader, HandlePose, LoopStatus};
+use bench_dragon::messages::{FrameHeader, HandlePose};
 use harness::{
-    Lines, Place, Process, can_run, example, json_lines, program, python, python_modules, scene_file, stopped, summary,
-    text, unique, wait, wait_until,
+    Lines, Place, Process, answering, can_run, example, json_lines, program, python, python_modules, scene_file,
+    stopped, summary, text, unique, wait, wait_until,
 };
 use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
@@ -21,13 +21,6 @@ use nix::sys::signal::Signal::{SIGINT, SIGTERM};
 
 /// The Python modules that the example subscriber needs.
 const PEER: [&str; 2] = ["iceoryx2", "numpy"];
-
-/// Returns once a publisher has created all its services, the status last.
-fn wait_for_publisher(name: &str) {
-    let (node, status) = (node().unwrap(), service_name(name, "status").unwrap());
-    let open = || node.service_builder(&status).publish_subscribe::<LoopStatus>().open();
-    wait_until("a publisher", || open().is_ok());
-}
 
 /// Returns the JSON lines of a process up to the last one, each within five minutes.
 fn lines_until(lines: &Lines, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
@@ -46,7 +39,7 @@ fn every_subscriber_gets_every_frame_at_60_hz() {
     let scene = scene_file("sixty", &[("[publish]", "[publish]\nqueue = 480")]);
     let publisher =
         Process::start(program("sixty").arg("--scene").arg(&scene).args(["run", "--json", "--start", "300"]));
-    wait_for_publisher(&unique("sixty"));
+    let publisher = answering(publisher, || program("sixty"));
     // The example in Rust ends by time: it starts once the slow start of Python is over.
     let arguments = ["examples/python/subscribe.py", "--json", "--seconds", "600", "--name", &unique("sixty")];
     let python = can_run(python_modules(&PEER)).then(|| {
@@ -231,7 +224,7 @@ fn python_reads_a_frame_and_an_alert_by_the_design_alone() {
         return;
     }
     let publisher = Process::start(program("design").args(["run", "--json", "--start", "405", "--time-scale", "0.1"]));
-    wait_for_publisher(&unique("design"));
+    let publisher = answering(publisher, || program("design"));
     let arguments = ["tests/python/by_design.py", "--name", &unique("design")];
     let output = Process::start(python().args(arguments)).output();
     publisher.signal(SIGINT);

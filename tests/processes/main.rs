@@ -2,7 +2,7 @@
 
 mod chase;
 mod cli;
-mod conductor;
+mod command_client;
 mod control;
 mod faults;
 mod feed;

@@ -11,7 +11,8 @@ use std::process::Command;
 
 use files::{Bytes, Kept, read};
 use harness::{
-    Process, can_run, json_lines, program, python, python_modules, stopped, text, unique, wait, wait_for_bytes,
+    Process, answering, can_run, json_lines, program, python, python_modules, stopped, text, unique, wait,
+    wait_for_bytes,
 };
 use nix::sys::signal::Signal;
 use serde_json::Value;
@@ -44,16 +45,6 @@ fn control(name: &str, arguments: &[&str]) -> (i32, Value, String) {
     let output = program(name).args(["--json", "control"]).args(arguments).output().unwrap();
     let line = json_lines(&output).pop().unwrap_or(Value::Null);
     (output.status.code().unwrap(), line, text(&output.stderr))
-}
-
-fn wait_for_publisher(name: &str) {
-    for _ in 0..600 {
-        if control(name, &["state"]).0 == 0 {
-            return;
-        }
-        wait(0.1);
-    }
-    panic!("no publisher of {name}");
 }
 
 /// Runs a replay, and returns its summary and the messages that a recorder received.
@@ -201,8 +192,7 @@ fn a_replay_can_be_watched_and_not_conducted() {
     let (name, folder) = ("replay_alone", tempfile::tempdir().unwrap());
     let (file, scene) =
         (played::small_recording("replay_small", folder.path()), scene(folder.path(), "school", 64, ""));
-    let playing = Process::start(&mut replay(name, &file, &scene, &["--loop"]));
-    wait_for_publisher(name);
+    let playing = answering(Process::start(&mut replay(name, &file, &scene, &["--loop"])), || program(name));
     let (code, line, _) = control(name, &["state"]);
     assert_eq!((code, &line["code"], &line["playback"]), (0, &"done".into(), &"playing".into()), "{line}");
     for command in [&["pause"][..], &["hold"], &["seek", "21"]] {

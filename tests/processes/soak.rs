@@ -16,8 +16,8 @@ use nix::unistd::Pid;
 use serde_json::Value;
 
 use harness::{
-    LONG_QUEUE, Place, Process, aloud, can_run, json_lines, long, program, python, python_modules, root, scene_file,
-    summary, text, unique, wait, wait_until,
+    LONG_QUEUE, Place, Process, aloud, answering, can_run, json_lines, long, program, python, python_modules, root,
+    scene_file, summary, text, unique, wait, wait_until,
 };
 
 /// Limits that any machine keeps. A subscriber that does not run for a while leaves frames in its queue, whose memory
@@ -176,13 +176,19 @@ fn a_scene_of_weak_accuracy_passes_with_the_links_it_promises() {
     assert!((1e-9..2e-5).contains(&worst), "{worst:e} m");
 }
 
-/// Waits until a publisher of this place answers: an unoptimised publisher makes its tables for seconds.
-fn until_publishing(place: &Place) {
-    let deadline = Instant::now() + Duration::from_secs(60);
-    while !place.program().args(["control", "state"]).output().unwrap().status.success() {
-        assert!(Instant::now() < deadline, "no publisher answers");
-        wait(0.1);
-    }
+/// Returns the process of a soak test when its publisher answers and each subscriber has then printed observations.
+fn observing(soak: Process, place: &Place) -> Process {
+    let soak = answering(soak, || place.program());
+    let written = |child: Pid| {
+        let counts = std::fs::read_to_string(format!("/proc/{child}/io")).unwrap();
+        counts.lines().find_map(|line| line.strip_prefix("wchar: ")?.parse::<u64>().ok()).unwrap()
+    };
+    let subscribers = children(&soak).into_iter().filter(|(_, command)| command.contains("\0soak-subscriber\0"));
+    let before = Vec::from_iter(subscribers.map(|(child, _)| (child, written(child))));
+    assert!(!before.is_empty());
+    // An observation of frames has some 800 bytes.
+    wait_until("observations", || before.iter().all(|(child, bytes)| written(*child) > bytes + 2000));
+    soak
 }
 
 #[test]
@@ -192,9 +198,7 @@ fn a_broken_limit_fails_even_when_interrupted() {
     soak.arg("--scene").arg(place.scene_publishing(LONG_QUEUE));
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "1"]);
     soak.args(["--max-skipped", "100%", "--max-lateness-p999", "1ns", "--max-rss-growth", "20MB"]);
-    let soak = Process::start(&mut soak);
-    until_publishing(&place);
-    wait(3.0);
+    let soak = observing(Process::start(&mut soak), &place);
     soak.signal(SIGINT);
     let output = soak.output();
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
@@ -338,9 +342,7 @@ fn report_of_bereft(signal: Signal) -> Value {
     let place = Place::new(&format!("bereft_{}", signal.as_str()));
     let mut soak = place.program();
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
-    let soak = Process::start(&mut soak);
-    until_publishing(&place);
-    wait(3.0);
+    let soak = observing(Process::start(&mut soak), &place);
     let publisher = children(&soak).into_iter().find(|(_, command)| command.contains("\0run\0")).unwrap().0;
     kill(publisher, signal).unwrap();
     let output = soak.output();

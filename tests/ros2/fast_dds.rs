@@ -6,15 +6,14 @@ mod streams;
 
 use crate::harness;
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Duration;
 
 use bench_dragon::soak::resources::child_of;
-use harness::{Process, can_run, json_lines, long, program, scene_file, stopped, text, unique, wait_until};
+use harness::{Lines, Process, answering, can_run, json_lines, long, program, scene_file, stopped, text, unique};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
@@ -67,6 +66,21 @@ fn subscriber(name: &str, topic: &str, arguments: &[&str]) -> Command {
     peer(&[&["subscribe", &path, &format!("{package}::msg::dds_::{kind}_")], arguments].concat())
 }
 
+/// The line of a message. The line of the end has the number of `samples`.
+const SAMPLE: &str = "\"type\":\"sample\"";
+
+/// Starts a subscriber and returns when it is matched with the publisher. A participant of Fast DDS that starts beside
+/// many others may discover nothing: there are five attempts.
+fn matched(name: &str, topic: &str, arguments: &[&str]) -> (Process, Lines) {
+    let attempt = |_| {
+        let mut process = Process::start(&mut subscriber(name, topic, arguments));
+        let lines = process.lines();
+        let first = lines.all_until_one(|line| line.contains("\"matched\"") || line.contains("\"end\""), "a match");
+        first.last().is_some_and(|line| line.contains("\"matched\"")).then_some((process, lines))
+    };
+    (0..5).find_map(attempt).unwrap_or_else(|| panic!("no subscriber of {topic} discovers the publisher"))
+}
+
 /// Returns a ROS 2 domain that the tests of the services do not use. Ports of domains above 101 are those that Linux
 /// gives to any socket.
 fn domain() -> u16 {
@@ -76,11 +90,7 @@ fn domain() -> u16 {
 /// Starts a show and returns when it answers over shared memory.
 fn publisher(name: &str, arguments: &[&str]) -> Process {
     let mut run = program(name);
-    let process = Process::start(run.env("ROS_DOMAIN_ID", domain().to_string()).args(arguments));
-    wait_until("the show runs", || {
-        program(name).args(["control", "state"]).output().is_ok_and(|output| output.status.success())
-    });
-    process
+    answering(Process::start(run.env("ROS_DOMAIN_ID", domain().to_string()).args(arguments)), || program(name))
 }
 
 /// A Fast DDS client sends its first request before RustDDS knows it, in half of all cases. Fast DDS repeats the
@@ -157,22 +167,15 @@ fn stage_path_and_each_cue_come_exactly_once_to_each_subscriber() {
         publisher(name, &["--scene", scene, "run", "--json", "--paused", "--start", "50.25", "--duration", "600"]);
     // Longer than any repetition would take.
     let waiting = ["--transient-local", "--seconds", "120", "--linger", "4", "--samples"];
-    let start = |topic: &str, samples: &str| {
-        let mut process = Process::start(&mut subscriber(name, topic, &[&waiting[..], &[samples]].concat()));
-        let lines = process.lines();
-        (process, lines)
-    };
+    let start = |topic: &str, samples: &str| matched(name, topic, &[&waiting[..], &[samples]].concat());
     let constant = ["stage", "path"].map(|topic| start(topic, "1"));
     let first = start("cues", "3");
-    first.1.until("made");
-    constant.iter().for_each(|(_, lines)| drop(lines.until("sample")));
+    constant.iter().for_each(|(_, lines)| drop(lines.until(SAMPLE)));
     let late = ["stage", "path"].map(|topic| start(topic, "1"));
     for (_, lines) in constant.into_iter().chain(late) {
-        let rest = lines.until("end");
-        let end: Value = serde_json::from_str(&rest).unwrap();
+        let end: Value = serde_json::from_str(&lines.until("\"end\"")).unwrap();
         assert_eq!(end["samples"], 1, "{end}");
     }
-    // The subscriber of cues is matched by now: no cue has passed.
     let go = program(name).args(["control", "go"]).output().unwrap();
     assert!(go.status.success(), "{}", text(&go.stderr));
     // A late frame can pass two cues, which then have the same stamp: their names distinguish them.
@@ -195,10 +198,15 @@ fn stage_path_and_each_cue_come_exactly_once_to_each_subscriber() {
 /// process: Fast DDS at times hangs or dies when many participants of one process come and go.
 fn joined(name: &str, joins: u32, further: &[&str]) -> Vec<(u64, Vec<u64>)> {
     let arguments = [&["--samples", "1", "--linger", "0.15", "--seconds", "60"], further].concat();
-    let join = |_| {
+    let attempt = |_| {
         let mut process = Process::start(&mut subscriber(name, "alerts", &arguments));
         let lines = process.lines().rest();
         let lines: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        // As in `matched`.
+        lines.iter().any(|line| line["type"] == "matched").then_some(lines)
+    };
+    let join = |_| {
+        let lines = (0..5).find_map(attempt).expect("a subscriber of alerts that discovers the publisher");
         let alerts: Vec<u64> = lines.iter().filter(|line| line["type"] == "sample").map(stamp).collect();
         assert!(!alerts.is_empty(), "no alert within 60 s: {lines:?}");
         (lines[0]["made_ns"].as_u64().unwrap(), alerts)
@@ -249,7 +257,7 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     // unless a busy machine is too late.
     let mut stays = Process::start(&mut subscriber(name, "alerts", &["--transient-local", "--seconds", "900"]));
     let received = stays.lines();
-    (0..4).for_each(|_| drop(received.until("sample")));
+    (0..4).for_each(|_| drop(received.until(SAMPLE)));
     for further in [&[][..], &kept] {
         let before = |(made, alerts): &(u64, Vec<u64>)| alerts.iter().filter(|alert| **alert < *made).count();
         let counts: Vec<usize> = joined(name, joins, further).iter().map(before).collect();
@@ -278,7 +286,7 @@ fn a_killed_subscriber_stops_no_other() {
     let scene = scene.to_str().unwrap();
     let publisher = publisher(name, &["--scene", scene, "run", "--json", "--duration", "600"]);
     let mut killed = Process::start(&mut subscriber(name, "handles", &["--seconds", "600", "--lease", "86400"]));
-    killed.lines().until("sample");
+    killed.lines().until(SAMPLE);
     killed.signal(Signal::SIGKILL);
     let mut other =
         Process::start(&mut subscriber(name, "handles", &["--seconds", "180", "--linger", "0", "--samples", "500"]));
@@ -335,21 +343,6 @@ fn visit(name: &str, index: usize) -> Visit {
     Visit::Served
 }
 
-/// Removes the shared memory that killed participants of Fast DDS have left, half a megabyte each: no process holds its
-/// lock. A participant that starts may not hold it yet, so memory that is younger than a minute stays.
-fn remove_left_memory() {
-    let age = |lock: &Path| lock.metadata().ok()?.modified().ok()?.elapsed().ok();
-    for lock in fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path()) {
-        let Some(segment) = lock.to_str().and_then(|lock| lock.strip_suffix("_el")) else { continue };
-        let is_segment = segment.contains("/fastrtps_") && !segment.contains("/fastrtps_port");
-        let is_old = age(&lock).is_some_and(|age| age > Duration::from_secs(60));
-        if is_segment && is_old && File::open(&lock).is_ok_and(|file| file.try_lock().is_ok()) {
-            // Another test program may have removed them.
-            let _ = fs::remove_file(segment).and_then(|()| fs::remove_file(&lock));
-        }
-    }
-}
-
 /// Half of the subscribers are killed, the others leave. A subscriber of Fast DDS that is sent an empty change spins,
 /// and would never end. `BENCH_DRAGON_SUBSCRIBERS` is their number, 4,000 by default; 200,000 take a night.
 #[test]
@@ -377,7 +370,6 @@ fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_mes
             }
         });
         memories.push(memory(process));
-        remove_left_memory();
     }
     let undiscovered = undiscovered.into_inner();
     println!("{} subscribers, {undiscovered} discovered nothing, MB: {memories:.1?}", rounds * beside);

@@ -10,8 +10,8 @@ use std::process::{Command, Output};
 use bench_dragon::soak::resources::child_of;
 use harness::hosts::Hosts;
 use harness::{
-    Process, can_run, json_lines, long, not_run, program, python, python_modules, scene_file, stopped, summary, text,
-    unique, wait, wait_until,
+    Process, answering, can_run, json_lines, long, not_run, program, python, python_modules, scene_file, stopped,
+    summary, text, unique, wait, wait_until,
 };
 use serde_json::Value;
 
@@ -56,7 +56,7 @@ fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
     }
     let seconds = if long() { 60 } else { 10 };
     let publisher = Process::start(program("content").args(["run", "--ros2", "--json", "--start", "300"]));
-    wait(1.0);
+    let publisher = answering(publisher, || program("content"));
     let length = seconds.to_string();
     let reliable = Process::start(&mut content("content", "handles", "reliable", &length));
     let best_effort = Process::start(&mut content("content", "poses", "best_effort", &length));

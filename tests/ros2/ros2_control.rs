@@ -10,7 +10,7 @@ use crate::harness;
 use std::process::Command;
 
 use enhanced::{Empty, Features, Outcome, State, Time, Trigger, enhanced, first_call};
-use harness::{Process, can_run, json_lines, long, program, python, python_modules, summary, text, unique, wait};
+use harness::{Process, answering, can_run, json_lines, long, program, python, python_modules, summary, text, unique};
 use serde_json::{Value, json};
 
 /// Returns a ROS 2 domain that other processes of this machine do not use meanwhile.
@@ -21,16 +21,7 @@ fn domain() -> u16 {
 fn publisher(name: &str, arguments: &[&str]) -> Process {
     let mut run = program(name);
     run.env("ROS_DOMAIN_ID", domain().to_string());
-    let process = Process::start(run.args(["run", "--json", "--ros2"]).args(arguments));
-    for _ in 0..600 {
-        if control(name, &["state"]).0 == 0 {
-            return process;
-        }
-        wait(0.1);
-    }
-    // A running process must end before the test can read its output.
-    process.signal(nix::sys::signal::Signal::SIGINT);
-    panic!("no publisher: {}", text(&process.output().stderr));
+    answering(Process::start(run.args(["run", "--json", "--ros2"]).args(arguments)), || program(name))
 }
 
 /// Returns exit code and response of `control`, over shared memory.

@@ -13,7 +13,8 @@ use std::time::{Duration, Instant};
 
 use bench_dragon::soak::resources::child_of;
 use harness::{
-    Lines, Process, can_run, json_lines, program, python, python_modules, scene_file, stopped, text, unique, wait_until,
+    Lines, Process, answering, can_run, json_lines, program, python, python_modules, scene_file, stopped, text, unique,
+    wait_until,
 };
 use nix::sys::signal::Signal::{SIGINT, SIGKILL, SIGTERM};
 use nix::sys::signal::kill;
@@ -192,7 +193,7 @@ fn a_process_of_ros_2_that_dies_early_is_restarted_after_a_time_that_doubles() {
         kill(Pid::from_raw(child as i32), SIGKILL).unwrap();
         wait_until("there is another one", || child_of(publisher.id()).is_some_and(|next| next != child));
     }
-    wait_until("the show runs", || control(name, &["state"]).0 == 0);
+    let publisher = answering(publisher, || program(name));
     publisher.signal(SIGINT);
     let output = publisher.output();
     assert!(output.status.success());
@@ -215,7 +216,7 @@ fn the_process_of_ros_2_is_one_subscriber_inherits_no_files_and_ends_with_a_kill
     let mut publisher = program("killed_parent");
     let publisher = Process::start(publisher.arg("--scene").arg(scene).args(["run", "--ros2"]));
     let child = ros2_of(&publisher);
-    wait_until("the show runs", || control("killed_parent", &["state"]).0 == 0);
+    let publisher = answering(publisher, || program("killed_parent"));
     // The process of ROS 2 is the one subscriber.
     let another = program("killed_parent").args(["watch", "--json", "--duration", "1"]).output().unwrap();
     assert!(text(&another.stderr).contains("publish.subscribers"), "{}", text(&another.stderr));
@@ -286,8 +287,7 @@ fn services_of_a_show_that_was_paused_before_know_its_rate() {
     }
     let name = "attached_paused";
     let arguments = ["run", "--json", "--paused", "--start", "50", "--time-scale", "2"];
-    let publisher = Process::start(program(name).args(arguments));
-    wait_until("the show runs", || control(name, &["state"]).0 == 0);
+    let publisher = answering(Process::start(program(name).args(arguments)), || program(name));
     let mut send = program(name);
     let bridge =
         Process::start(send.args(["send", "ros2", "--control"]).env("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"));
@@ -319,8 +319,9 @@ fn the_diagnostics_tell_of_a_chase_and_of_its_end() {
     }
     let name = "diagnosed_chase";
     let (subscriber, lines) = peer(name, &["diagnostics"]);
-    let publisher = Process::start(program(name).args(["run", "--ros2", "--json", "--paused", "--duration", "600"]));
-    wait_until("the show runs", || control(name, &["state"]).0 == 0);
+    let mut run = program(name);
+    run.args(["run", "--ros2", "--json", "--paused", "--duration", "600"]);
+    let publisher = answering(Process::start(&mut run), || program(name));
     let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let chase = Process::start(program(name).args(["chase", "artnet", "--listen", &port.to_string()]));
     let subject = format!("{}: chase", unique(name));

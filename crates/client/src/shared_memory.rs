@@ -10,8 +10,10 @@ use ::iceoryx2::config::Config;
 use ::iceoryx2::prelude::*;
 
 pub use error::{OpenError, failed, incomplete, port_error, service_error};
-pub use memory::{SHARED_MEMORY, check_room_to_subscribe, free_bytes, reserve_pages};
+pub use memory::{check_room_to_subscribe, free_bytes, reserve_pages};
 
+/// The folder of Linux for shared memory.
+pub const SHARED_MEMORY: &str = "/dev/shm";
 /// Publishers that a service admits: the show's, and the end of a tunnel to other machines. The end of a tunnel opens a
 /// publisher and a subscriber of every service.
 pub const MOST_PUBLISHERS: usize = 2;

@@ -8,6 +8,7 @@
 
 mod bag;
 mod disk;
+mod error;
 mod file;
 mod index;
 mod layout_history;
@@ -16,3 +17,5 @@ pub mod reader;
 pub mod recorder;
 pub mod recover;
 mod run;
+
+pub use error::ReadError;

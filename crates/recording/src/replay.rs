@@ -17,7 +17,8 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::mcap::reader::{Contents, ReadError, Recording};
+use super::mcap::ReadError;
+use super::mcap::reader::{Contents, Recording};
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, QUEUE_BYTES};

@@ -6,7 +6,8 @@
 
 use serde::Serialize;
 
-use crate::mcap::reader::{Item, ReadError, Recording, frame_of};
+use crate::mcap::ReadError;
+use crate::mcap::reader::{Item, Recording, frame_of};
 use bench_dragon_publisher::log::verify::reference::Reference;
 use bench_dragon_show::scene::Scene;
 

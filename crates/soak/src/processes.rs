@@ -122,7 +122,7 @@ impl Plan {
         conduct: &ConductPlan,
         sender: &Sender<ProcessEvent>,
     ) -> std::io::Result<Child> {
-        let mut command = self.command("soak-conductor");
+        let mut command = self.command("soak-load-generator");
         command.args(["--seed", &conduct.seed.to_string()]);
         if let Some(rate) = conduct.rate {
             command.args(["--rate", &rate.to_string()]);

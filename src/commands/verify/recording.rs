@@ -4,7 +4,8 @@ use std::path::Path;
 
 use bench_dragon::messages::hexadecimal;
 use bench_dragon::proof::scene_hash;
-use bench_dragon::recording::mcap::reader::{ReadError, Recording};
+use bench_dragon::recording::mcap::ReadError;
+use bench_dragon::recording::mcap::reader::Recording;
 use bench_dragon::recording::verify::{RecordingVerdict, compare};
 use bench_dragon::show::scene::Scene;
 use serde::Serialize;

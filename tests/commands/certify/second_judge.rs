@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use fastrand::Rng;
 use serde_json::{Value, json};
 
-use crate::harness::{Process, aloud, can_run, json_lines, long, python, python_modules, text};
+use crate::harness::{Process, aloud, can_run, cases, few, json_lines, python, python_modules, text};
 
 /// Random times and steps of each certificate.
 const PLACES: &str = "5";
@@ -275,17 +275,12 @@ fn a_second_judge_agrees_and_refuses_what_was_changed() {
     if !can_run(python_modules(&["flint"])) {
         return;
     }
-    let few = std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few");
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     // `long` is proved for minutes, and `ros2` is the paper's scene.
     let config: &[&str] =
-        if few { &["school"] } else { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] };
-    let all = match () {
-        () if few => 8,
-        () if long() => 500,
-        () => 50,
-    };
+        if few() { &["school"] } else { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] };
+    let all = cases(8, 50, 500);
     let read = |name: &&str| (name.to_string(), std::fs::read_to_string(format!("config/{name}.toml")).unwrap());
     let scenes: Vec<_> = config.iter().map(read).collect();
     let random = (0..).map(|number| (format!("random{number}"), scene(number)));

@@ -32,7 +32,7 @@ const MOST_LINES: usize = 40;
 const MOST_FRAMES: f64 = 1000.0;
 
 fn run(data: &[u8]) -> bool {
-    let lines = sealed_lines(data);
+    let lines = chained_lines(data);
     if data.iter().filter(|byte| **byte == b'\n').count() > MOST_LINES || !is_short(&lines) {
         return false;
     }
@@ -60,7 +60,7 @@ fn run(data: &[u8]) -> bool {
 }
 
 /// Returns the complete lines, up to the first wrong check.
-fn sealed_lines(data: &[u8]) -> Vec<Line> {
+fn chained_lines(data: &[u8]) -> Vec<Line> {
     let mut hasher = blake3::Hasher::new();
     let mut lines = Vec::new();
     for line in data.split_inclusive(|byte| *byte == b'\n') {
@@ -260,7 +260,7 @@ fn timeline(text: &str, scene: &Scene) -> Timeline {
 }
 
 /// Returns a log of these lines, each with a correct check.
-fn sealed(bodies: &[String]) -> Vec<u8> {
+fn chained(bodies: &[String]) -> Vec<u8> {
     let (mut hasher, mut log) = (blake3::Hasher::new(), Vec::new());
     for body in bodies {
         hasher.update(body.as_bytes());
@@ -347,7 +347,7 @@ fn log_of(show: &ShowLine, playback: Playback, commands: &[(u64, Command)], gap:
     }
     let reason = bench_dragon::publisher::live::End::Duration;
     bodies.push(body(&Line::End { frames, skipped, lost, reason }));
-    sealed(&bodies)
+    chained(&bodies)
 }
 
 fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
@@ -390,7 +390,7 @@ fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
             _ => bodies[at] = renumbered(&bodies[at], random),
         }
     }
-    sealed(&bodies)
+    chained(&bodies)
 }
 
 /// Replaces the value of a field by a limit, null, or a text.

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::Arc;
 
 use bench_dragon::publisher::live::{FrameSource, Outgoing, Period};
-use bench_dragon::recording::mcap::reader::ReadError;
+use bench_dragon::recording::mcap::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
 use bench_dragon::show::convert::Stamps;
 use mcap::{Message, MessageStream, Schema};

@@ -26,7 +26,7 @@ fn a_default_subscription_gets_every_topic_and_discovers_its_quality_of_service(
     let show = ["--scene", scene.to_str().unwrap(), "run", "--json", "--start", "50", "--duration", "600"];
     let publisher = publisher(name, &show);
     // The first message can be lost to discovery: a second proves the subscription.
-    let until_second = ["--depth", "10", "--samples", "2", "--linger", "0", "--seconds", "60"];
+    let until_second = ["--depth", "10", "--samples", "2", "--linger", "0", "--seconds", "60", "--shared-memory"];
     let start = |topic: &&str| Process::start(&mut subscriber(name, topic, &until_second));
     let subscribers: Vec<Process> = topics.iter().map(start).collect();
     let end_of =
@@ -93,7 +93,7 @@ fn a_subscriber_loses_no_message_and_gets_none_twice_when_another_writer_relieve
     let printed = subscriber.lines();
     // The writer's number, and the frame's number, which follows the header of 24 bytes and the number of the run.
     let next = || {
-        let sample: Value = serde_json::from_str(&printed.until("sample")).unwrap();
+        let sample: Value = serde_json::from_str(&printed.until(SAMPLE)).unwrap();
         let frame = u64::from_str_radix(&sample["hex"].as_str().unwrap()[64..80], 16).unwrap().swap_bytes();
         (sample["sequence"].as_u64().unwrap(), frame)
     };

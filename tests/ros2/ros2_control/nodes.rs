@@ -59,13 +59,7 @@ fn a_publisher_is_one_node_of_its_name_and_launch_files_choose_the_name() {
         "300",
     ]);
     run.args(["--ros-args", "-r", "__node:=gold", "-r", &namespace, "-p", "rate:=40", "-p", "use_sim_time:=false"]);
-    let launched = Process::start(&mut run);
-    let mut patience = 600;
-    while control("hall/gold", &["state"]).0 != 0 {
-        patience -= 1;
-        assert!(patience > 0, "no publisher");
-        wait(0.1);
-    }
+    let launched = answering(Process::start(&mut run), || program("hall/gold"));
     let name = format!("/{}", unique("hall/gold"));
     assert_eq!(nodes_beside(&name), [name]);
     // A period is a fortieth of a second.

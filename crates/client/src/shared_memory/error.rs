@@ -6,8 +6,7 @@ use ::iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 
-use super::MOST_PUBLISHERS;
-use super::memory::SHARED_MEMORY;
+use super::{MOST_PUBLISHERS, SHARED_MEMORY};
 
 /// The reason why the shared memory cannot be used.
 #[derive(Debug, thiserror::Error)]

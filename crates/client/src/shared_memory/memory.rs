@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
 
+use super::SHARED_MEMORY;
 use super::error::OpenError;
 
-/// The folder of Linux for shared memory.
-pub const SHARED_MEMORY: &str = "/dev/shm";
 /// Bytes that a subscriber needs for its bookkeeping, with a margin.
 const SUBSCRIBER_BYTES: u64 = 500_000;
 

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 use ::iceoryx2::config::Config;
 use ::iceoryx2::prelude::*;
 
-use super::memory::SHARED_MEMORY;
+use super::SHARED_MEMORY;
 
 /// The mode of an unfinished file below iceoryx2's folder.
 const UNFINISHED: u32 = 0o600;

@@ -20,17 +20,14 @@
 
 use std::time::{Duration, Instant};
 
-use super::cells::{HeadGridPoint, end_of_near, head_grid_points, head_track};
-use super::lists::{List, ListBuilder};
+use super::cells::{CELLS, HeadGridPoint, end_of_near, head_grid_points, head_track};
+use super::lists::{List, ListBuilder, Neighbour};
 use super::moving::{MovingBoard, Quadratic};
 use crate::model::Vector;
 use crate::model::path::Path;
 use crate::model::team::Team;
 use crate::solve::table::FollowerTable;
 use crate::solve::table::rows::Alpha;
-
-/// Cells to a row.
-pub(super) const CELLS: usize = 8;
 
 /// Rows of a block.
 pub(super) const BLOCK: usize = 64;
@@ -49,20 +46,6 @@ const MOST_WORK: usize = 5_000_000_000;
 
 /// Greatest size of all lists, bytes.
 const MOST_BYTES: usize = 128 << 20;
-
-/// Benches that can be near another one.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Neighbour {
-    /// Lower bound of their signed distance, metres.
-    pub bound: f32,
-    /// Number of benches further behind; [`Neighbour::ALL`] for all benches without an entry.
-    pub behind: u32,
-}
-
-impl Neighbour {
-    pub(super) const ALL: u32 = u32::MAX;
-    pub(super) const UNKNOWN: Self = Self { bound: f32::NEG_INFINITY, behind: Self::ALL };
-}
 
 /// Place of a frame's second handle in the table.
 #[derive(Debug, Clone, Copy)]

@@ -1,13 +1,15 @@
 //! Places of the handles and the head while the second handle is in a cell of the table. The places are quadratic
 //! polynomials of the cell's time with error bounds. Used only to make the table.
 
-use super::bounds::CELLS;
 use super::moving::Quadratic;
 use crate::model::Vector;
 use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::solve::table::FollowerTable;
 use crate::solve::table::rows::{Alpha, Band, Rows};
+
+/// Cells to a row.
+pub(super) const CELLS: usize = 8;
 
 /// The head at the boundary of a cell.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,6 @@
 //! The lists of the table: which boards can be near a board throughout a cell, and how near. Called by the making of
-//! the table only.
+//! the table; the search reads the entries.
 
-use super::bounds::Neighbour;
 use super::cells::handles;
 use super::grid::Grid;
 use super::moving::{MovingBoard, Quadratic};
@@ -22,6 +21,20 @@ const WORK_OF_HANDLE: usize = 400;
 const WORK_OF_LIST: usize = 300;
 const WORK_OF_VISIT: usize = 15;
 const WORK_OF_BOUND: usize = 250;
+
+/// Benches that can be near another one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Neighbour {
+    /// Lower bound of their signed distance, metres.
+    pub bound: f32,
+    /// Number of benches further behind; [`Neighbour::ALL`] for all benches without an entry.
+    pub behind: u32,
+}
+
+impl Neighbour {
+    pub(super) const ALL: u32 = u32::MAX;
+    pub(super) const UNKNOWN: Self = Self { bound: f32::NEG_INFINITY, behind: Self::ALL };
+}
 
 /// A finished list.
 #[derive(Debug, Clone, Copy)]

@@ -3,8 +3,9 @@
 
 use std::ops::Range;
 
-use super::bounds::{BLOCK, BoundTable, Located, Neighbour};
+use super::bounds::{BLOCK, BoundTable, Located};
 use super::grid::Grid;
+use super::lists::Neighbour;
 use super::{Nearest, board, circle_radius, corner_reach};
 use crate::model::board::Board;
 use crate::model::separation::{separation_board_board, signed_distance_board_board};

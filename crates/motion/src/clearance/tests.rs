@@ -2,7 +2,8 @@
 
 use std::cell::Cell;
 
-use super::bounds::{BLOCK, BoundTable, Neighbour};
+use super::bounds::{BLOCK, BoundTable};
+use super::lists::Neighbour;
 use super::*;
 use crate::model::Vector;
 use crate::model::curve::Side;

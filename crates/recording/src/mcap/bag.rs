@@ -6,7 +6,7 @@ use std::fs::read_dir;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::reader::ReadError;
+use super::error::ReadError;
 
 /// The file that lists the recordings, in their order.
 const METADATA: &str = "metadata.yaml";

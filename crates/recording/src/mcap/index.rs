@@ -11,7 +11,7 @@ use mcap::records::{AttachmentIndex, ChunkIndex, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Channel, MAGIC, McapError, parse_record};
 
-use super::reader::ReadError;
+use super::error::ReadError;
 
 /// Bytes of the footer with the final magic, and of the record before the index.
 const FOOTER_BYTES: usize = 37;

@@ -6,7 +6,8 @@
 
 use std::collections::VecDeque;
 
-use crate::mcap::reader::{Item, ReadError, Recording, frame_of, header_of};
+use crate::mcap::ReadError;
+use crate::mcap::reader::{Item, Recording, frame_of, header_of};
 use bench_dragon_messages::{CollisionAlert, Cue};
 use bench_dragon_ros2_messages::HandlePoses;
 

@@ -55,6 +55,21 @@ fn by_parry(shape: &Shape, board: &Board) -> f64 {
     distance(&at, &cuboid, &Pose::identity(), &sides).unwrap().distance
 }
 
+/// Returns the distance of a point to the sides of a shape.
+fn from_outline(shape: &Shape, point: Point) -> f64 {
+    if shape.kind() == ShapeKind::Circle {
+        return ((point - shape.points()[0]).norm() - shape.radius()).abs();
+    }
+    let corners = shape.points();
+    let sides = corners.len() - usize::from(shape.kind() == ShapeKind::Line);
+    let to_side = |side: usize| {
+        let (from, to) = (corners[side], corners[(side + 1) % corners.len()]);
+        let share = (point - from).dot(&(to - from)) / (to - from).norm_squared();
+        (point - (from + share.clamp(0.0, 1.0) * (to - from))).norm()
+    };
+    (0..sides).map(to_side).fold(f64::INFINITY, f64::min)
+}
+
 /// Returns true if a board and a shape have a common point, judged by parry and the winding number.
 fn overlap(shape: &Shape, board: &Board) -> bool {
     let enclosed = winding(shape.points(), board.centre).abs() > 0.5;
@@ -95,6 +110,7 @@ proptest! {
             prop_assert!((signed - by_parry(&shape, &board)).abs() < 1e-12, "{} {}", signed, by_parry(&shape, &board));
             let (on_board, on_shape) = shape.nearest_points(&board);
             prop_assert!(((on_board - on_shape).norm() - signed).abs() < 1e-12);
+            prop_assert!(from_outline(&shape, on_shape) < 1e-12);
             // The first point is in the board.
             prop_assert!(in_frame(&board, on_board).abs().zip_map(&Rectangle::of(&board).half, |c, h| c - h).max() < 1e-12);
         }

@@ -269,17 +269,25 @@ fn a_vector_turned_slightly_is_that_of_sine_and_cosine() {
     }
 }
 
-/// Checks the properties of every chain on any path. Each handle is on its segment, each link has its length, and no
-/// place between a handle and its follower is further away.
+/// Checks the properties of every chain on any path. Each handle is on its segment, and each link has its length and
+/// keeps it. No place between a handle and its follower is further away.
 fn assert_sound(team: Team, description: &PathDescription, time: f64) -> Vec<Seat> {
     let mut reference = Reference::new(team, description, 1.0).unwrap();
     let path = description.path().unwrap();
     let seats = reference.seats(time).unwrap_or_else(|_| panic!("{time} s: {description:?}"));
     let param = |seat: &Seat| Param { segment: seat.segment, at: seat.place.at.split() };
+    // By the tangents of the path in doubles: the slopes of the reference are not taken for granted.
+    let velocity = |seat: &Seat| path.tangent(param(seat)) * reference.handle(seat).speed;
+    assert!((reference.handle(&seats[0]).speed - 1.0).abs() < 1e-15);
     for (bench, pair) in seats.windows(2).enumerate() {
         let link = Real::from(team.link(bench));
         let error = (length(&(&pair[0].place.point - &pair[1].place.point)) - &link).rounded() / link.rounded();
         assert!(error.abs() < 1e-34, "{time} s, link {bench}: {error:e}");
+        let [front, rear] = [0, 1].map(|end| Point::from(pair[end].place.point.rounded()));
+        let velocities = [0, 1].map(|end| velocity(&pair[end]));
+        let lengthening = (front - rear).dot(&(velocities[0] - velocities[1])) / team.link(bench);
+        let error = lengthening / velocities[0].norm().max(velocities[1].norm());
+        assert!(error.abs() < 1e-13, "{time} s, link {bench} lengthens by {lengthening:e} m/s: {error:e}");
         let (front, rear) = (path.travelled(param(&pair[0])), path.travelled(param(&pair[1])));
         assert!(front > rear);
         let place = path.point(param(&pair[0]));

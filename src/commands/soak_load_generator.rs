@@ -1,4 +1,4 @@
-//! `soak-conductor` and `soak-client`: processes of `soak --conduct` that command its publisher.
+//! `soak-load-generator` and `soak-client`: processes of `soak --conduct` that command its publisher.
 
 use std::io::Write;
 use std::sync::atomic::Ordering;
@@ -16,9 +16,9 @@ use super::{CommandError, Common, stop_on_signals};
 /// Longest wait for an answer of the publisher.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Arguments of `soak-conductor`.
+/// Arguments of `soak-load-generator`.
 #[derive(Debug, clap::Args)]
-pub struct SoakConductorArguments {
+pub struct SoakLoadGeneratorArguments {
     /// The seed of its commands
     #[arg(long)]
     seed: u64,
@@ -37,7 +37,7 @@ pub struct SoakClientArguments {
 }
 
 /// Conducts until a signal comes, and prints its counts once a second.
-pub fn conduct(common: &Common, arguments: &SoakConductorArguments) -> Result<(), CommandError> {
+pub fn conduct(common: &Common, arguments: &SoakLoadGeneratorArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
     let scene = common.load_scene()?;

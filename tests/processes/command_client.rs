@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bench_dragon::client::control::command_client::{Action, CommandClient};
 use bench_dragon::client::control::{ControlError, Controller, PendingCommand};
 use bench_dragon::messages::control::Command as Conduct;
-use harness::{Process, long, program, scene_file, text, unique, wait};
+use harness::{Process, answering, long, program, scene_file, text, unique, wait};
 use nix::sys::signal::Signal;
 
 fn publisher(name: &str, arguments: &[&str]) -> Process {
@@ -17,20 +17,13 @@ fn publisher(name: &str, arguments: &[&str]) -> Process {
     let mut command = program(name);
     command.args(["--scene", scene.to_str().unwrap(), "run", "--quiet", "--json", "--start", "100"]);
     let rate: &[&str] = if arguments.contains(&"--rate") { &[] } else { &["--rate", "50"] };
-    let publisher = Process::start(command.args(rate).args(arguments));
-    for _ in 0..600 {
-        if control(name, &["state"]).0 == 0 {
-            return publisher;
-        }
-        wait(0.1);
-    }
-    panic!("no publisher");
+    answering(Process::start(command.args(rate).args(arguments)), || program(name))
 }
 
 /// Returns the numbers of actions in the order of their answers, each with its result in a word.
 fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize, String)> {
     let (sender, receiver) = std::sync::mpsc::channel();
-    let conductor = CommandClient::start(&unique(name), move |number: usize, conducted| {
+    let client = CommandClient::start(&unique(name), move |number: usize, conducted| {
         let word = match conducted {
             Ok((command, response)) => {
                 format!("{}: {}", command.name(), response.result().unwrap().name())
@@ -40,9 +33,9 @@ fn answers(actions: &[Action], between: impl FnOnce(), name: &str) -> Vec<(usize
         };
         sender.send((number, word)).unwrap();
     });
-    let conductor = conductor.unwrap();
+    let client = client.unwrap();
     for (number, action) in actions.iter().enumerate() {
-        conductor.request(number, *action).unwrap();
+        client.request(number, *action).unwrap();
         // Each command has been sent, or waits, before the next one starts.
         wait(0.02);
     }
