@@ -156,7 +156,7 @@ fn a_wide_enclosure_has_a_reason() {
 
 #[test]
 fn every_scene_of_the_repository_agrees() {
-    let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
+    let long = harness::long();
     // The search gives up, and reports that, for:
     // - handles at distances that no double distinguishes from the link's,
     // - paths of 1e10 metres,
@@ -204,7 +204,7 @@ fn every_scene_of_the_repository_agrees() {
 
 #[test]
 fn random_scenes_agree() {
-    let count = if std::env::var_os("BENCH_DRAGON_LONG").is_some() { 2500 } else { 250 };
+    let count = harness::cases(60, 250, 2500);
     let (next, decided, compared_events) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(0));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
@@ -254,8 +254,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
         let radius = path.point(path.param_at(lo)).coords.norm();
         (radius, hi - lo)
     };
-    let long = std::env::var_os("BENCH_DRAGON_LONG").is_some();
-    for microns in if long { vec![0.3, 1.0, 10.0, 100.0] } else { vec![1.0] } {
+    for microns in if harness::long() { vec![0.3, 1.0, 10.0, 100.0] } else { vec![1.0] } {
         let (touching, _) = contact(least - 1e-6 * microns);
         let (passing, _) = contact(least + 1e-6 * microns);
         assert!(touching > REACH && passing < REACH, "{microns} um: {touching} m and {passing} m");

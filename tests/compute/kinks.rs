@@ -171,7 +171,7 @@ fn motions() -> impl Strategy<Value = Motion> {
 /// `BENCH_DRAGON_LONG=1` takes 1,000 motions.
 #[test]
 fn velocities_keep_their_promise_at_the_kinks_of_random_routes() {
-    let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
+    let long = crate::harness::long();
     let config = Config { cases: if long { 1000 } else { 24 }, failure_persistence: None, ..Config::default() };
     let (compared, worst) = (Cell::new(0), Cell::new(0f64));
     let accuracy = (-9.0..-3.0f64).prop_map(|exponent| 10f64.powf(exponent));

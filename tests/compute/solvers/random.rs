@@ -90,8 +90,7 @@ fn at_some_time(subjects: impl Strategy<Value = Subject>) -> impl Strategy<Value
 /// Tests random subjects: every solver at a random time, the velocities as central differences, and the share of table
 /// frames.
 fn random_subjects(cases: u32, subjects: impl Strategy<Value = (Subject, f64)>, least_share_of_tables: f64) {
-    let long = std::env::var("BENCH_DRAGON_LONG").is_ok_and(|value| value == "1");
-    let cases = if long { 10_000 } else { cases };
+    let cases = crate::harness::cases(cases / 4, cases, 10_000);
     let config = Config { cases, failure_persistence: None, ..Config::default() };
     let (tables, compared) = (Cell::new(0), Cell::new(0u64));
     TestRunner::new(config)

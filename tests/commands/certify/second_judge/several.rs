@@ -6,7 +6,7 @@ use fastrand::Rng;
 use serde_json::{Value, json};
 
 use super::{Changed, certified, lines_of, scene, verdicts, with};
-use crate::harness::{aloud, can_run, long, python_modules};
+use crate::harness::{aloud, can_run, cases, python_modules};
 
 /// Returns a scene of two dragons: each goes the path of a random scene without obstacles, from a random place.
 fn scene_of_two(number: u64) -> String {
@@ -95,7 +95,7 @@ fn a_second_judge_agrees_about_several_dragons() {
     }
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let all = if long() { 60 } else { 8 };
+    let all = cases(4, 8, 60);
     let of = |number: u64| certified(folder, &format!("two{number}"), &scene_of_two(number), &["events", "clearance"]);
     let mut files: Vec<PathBuf> = (0..all).flat_map(of).collect();
     let agreed = files.len();
