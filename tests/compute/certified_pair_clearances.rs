@@ -1,7 +1,7 @@
 //! Certificates of the least clearances of several dragons. The checker accepts them, and refuses changed certificates.
 //! A brute force over the show's time finds nothing nearer, and the stated boards as near.
 //!
-//! `BENCH_DRAGON_LONG=1` makes 600 pairs in place of 40, `BENCH_DRAGON_CASES=few` 12.
+//! `BENCH_DRAGON_LONG=1` makes 600 pairs in place of 24, `BENCH_DRAGON_CASES=few` 12.
 
 use bench_dragon::certify::{BetweenEnclosure, CertificateLine, SeveralClearances, certify_several_clearances};
 use bench_dragon::messages::state::EventKind;

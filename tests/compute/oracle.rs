@@ -52,7 +52,7 @@ fn program_events(scene_toml: &str) -> Result<Vec<Event>, String> {
 }
 
 /// Time after which a scene is given up. The program's searches take a few seconds at most, on a processor of their own.
-/// `tests/run` gives this program only the time that all others leave.
+/// `tests/run` gives these tests only the time that all others leave.
 const PATIENCE: Duration = Duration::from_secs(1800);
 
 /// Runs [`program_events`] with a watchdog; returns `None` if the search hangs or panics.

@@ -319,7 +319,8 @@ void subscribe(const std::string& name, const std::string& type, const Options& 
     bool is_matched = false;
     auto end = in(options.seconds);
     while (events.wait(end, [&] { return events.take_data() || (!is_matched && events.writers > 0); })) {
-      if (!is_matched && events.writers > 0) {
+      // A message is proof of a match, and may come before its event.
+      if (!is_matched) {
         is_matched = true;
         std::printf("{\"type\":\"matched\"}\n");
         std::fflush(stdout);

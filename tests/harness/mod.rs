@@ -29,8 +29,8 @@ fn executable() -> &'static str {
 }
 
 /// Returns the time after which a process or its next line is missing: longer than a busy machine needs. The time
-/// bounds a hang, not a speed. `tests/run` gives the commands the time that the browser leaves: a minute of computing
-/// may take a quarter of an hour.
+/// bounds a hang, not a speed. `tests/run` gives the tests of commands the time that the browser leaves: a minute of
+/// computing may take a quarter of an hour.
 pub fn patience() -> Duration {
     Duration::from_secs(if long() { 3600 } else { 1800 })
 }
@@ -407,12 +407,12 @@ pub fn long() -> bool {
     is_set("BENCH_DRAGON_LONG")
 }
 
-/// Returns true if few random cases are requested, as by `tests/run --quick`.
+/// Returns true if few cases are requested, as by `tests/run --quick`.
 pub fn few() -> bool {
     std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few")
 }
 
-/// Returns the number of cases for [`few`] cases, for a usual run, or for [`long`] tests.
+/// Returns the first value if [`few`] cases are requested, the last for [`long`] tests, otherwise the second.
 pub fn cases<T>(of_few: T, usual: T, of_long: T) -> T {
     match () {
         () if long() => of_long,
@@ -469,7 +469,7 @@ pub fn root(what_for: &str) -> Result<(), String> {
     if is_root() { Ok(()) } else { Err(format!("only root can {what_for}")) }
 }
 
-/// Waits until a condition holds, for a minute at most.
+/// Waits until a condition holds, for [`patience`] at most.
 pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     let deadline = Instant::now() + patience();
     while !holds() {
@@ -481,17 +481,22 @@ pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
 /// Returns the process of a publisher when a publisher answers commands. `program` returns the program with the name of
 /// the publisher.
 pub fn answering(mut publisher: Process, program: impl Fn() -> Command) -> Process {
-    wait_until("an answer of the publisher", || {
-        let has_ended = publisher.0.try_wait().unwrap().is_some();
-        has_ended || program().args(["control", "state"]).output().unwrap().status.success() || {
-            wait(0.1);
-            false
+    let deadline = Instant::now() + patience();
+    loop {
+        if let Some(status) = publisher.0.try_wait().unwrap() {
+            panic!("the publisher ended with {status}: {}", text(&publisher.output().stderr));
         }
-    });
-    if let Some(status) = publisher.0.try_wait().unwrap() {
-        panic!("the publisher ended with {status}: {}", text(&publisher.output().stderr));
+        let answer = Process::start(program().args(["control", "state"])).output();
+        if answer.status.success() {
+            return publisher;
+        }
+        if Instant::now() > deadline {
+            // A running process must end before its output can be read.
+            publisher.signal(nix::sys::signal::Signal::SIGINT);
+            panic!("{}; the publisher: {}", text(&answer.stderr), text(&publisher.output().stderr));
+        }
+        wait(0.1);
     }
-    publisher
 }
 
 pub fn wait(seconds: f64) {

@@ -22,7 +22,7 @@ use nix::sys::signal::Signal::{SIGINT, SIGTERM};
 /// The Python modules that the example subscriber needs.
 const PEER: [&str; 2] = ["iceoryx2", "numpy"];
 
-/// Returns the JSON lines of a process up to the last one, each within five minutes.
+/// Returns the JSON lines of a process up to the last one.
 fn lines_until(lines: &Lines, is_last: impl Fn(&Value) -> bool) -> Vec<Value> {
     let mut read: Vec<Value> = Vec::new();
     while !read.last().is_some_and(&is_last) {

@@ -176,18 +176,22 @@ fn a_scene_of_weak_accuracy_passes_with_the_links_it_promises() {
     assert!((1e-9..2e-5).contains(&worst), "{worst:e} m");
 }
 
-/// Returns the process of a soak test when its publisher answers and each subscriber has then printed observations.
-fn observing(soak: Process, place: &Place) -> Process {
+/// Returns the process of a soak test when its publisher answers and each of its subscribers has then printed
+/// observations of frames.
+fn observing(soak: Process, place: &Place, subscribers: usize) -> Process {
     let soak = answering(soak, || place.program());
     let written = |child: Pid| {
         let counts = std::fs::read_to_string(format!("/proc/{child}/io")).unwrap();
         counts.lines().find_map(|line| line.strip_prefix("wchar: ")?.parse::<u64>().ok()).unwrap()
     };
-    let subscribers = children(&soak).into_iter().filter(|(_, command)| command.contains("\0soak-subscriber\0"));
-    let before = Vec::from_iter(subscribers.map(|(child, _)| (child, written(child))));
-    assert!(!before.is_empty());
-    // An observation of frames has some 800 bytes.
-    wait_until("observations", || before.iter().all(|(child, bytes)| written(*child) > bytes + 2000));
+    let mut before = Vec::new();
+    wait_until("the subscribers", || {
+        let all = children(&soak).into_iter().filter(|(_, command)| command.contains("\0soak-subscriber\0"));
+        before = all.map(|(child, _)| (child, written(child))).collect();
+        before.len() == subscribers
+    });
+    // The files of a node have some 2,000 bytes, an observation of frames 800.
+    wait_until("observations", || before.iter().all(|(child, bytes)| written(*child) > bytes + 6000));
     soak
 }
 
@@ -198,7 +202,7 @@ fn a_broken_limit_fails_even_when_interrupted() {
     soak.arg("--scene").arg(place.scene_publishing(LONG_QUEUE));
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "1"]);
     soak.args(["--max-skipped", "100%", "--max-lateness-p999", "1ns", "--max-rss-growth", "20MB"]);
-    let soak = observing(Process::start(&mut soak), &place);
+    let soak = observing(Process::start(&mut soak), &place, 1);
     soak.signal(SIGINT);
     let output = soak.output();
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
@@ -342,7 +346,7 @@ fn report_of_bereft(signal: Signal) -> Value {
     let place = Place::new(&format!("bereft_{}", signal.as_str()));
     let mut soak = place.program();
     soak.args(["soak", "--json", "--duration", "8h", "--rate", "100", "--subscribers", "2"]).args(ANY_SPEED);
-    let soak = observing(Process::start(&mut soak), &place);
+    let soak = observing(Process::start(&mut soak), &place, 2);
     let publisher = children(&soak).into_iter().find(|(_, command)| command.contains("\0run\0")).unwrap().0;
     kill(publisher, signal).unwrap();
     let output = soak.output();

@@ -1,7 +1,7 @@
 //! Random commands of a soak test, from a seed. Each answer is checked against the table of commands and the frames.
 //!
-//! The hidden command `soak-load-generator` runs a [`load_generator`] in its own process, a client of the publisher. The
-//! process prints [`Conducted`] once a second, which the [`fleet`](super::fleet) reads.
+//! The hidden command `soak-load-generator` runs a [`load_generator`] in its own process, a client of the publisher.
+//! The process prints [`Conducted`] once a second, which the [`fleet`](super::fleet) reads.
 
 mod answers;
 pub mod commands;

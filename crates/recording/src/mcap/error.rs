@@ -1,4 +1,5 @@
-//! The reasons why a recording cannot be played. Returned by the [`reader`](super::reader), its index and its bags.
+//! The reasons why a recording cannot be played. Returned by the [`reader`](super::reader), its
+//! index and its bags, and by the [`replay`](crate::replay).
 
 use std::io;
 

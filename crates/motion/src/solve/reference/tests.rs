@@ -439,7 +439,7 @@ fn any_step() -> impl Strategy<Value = RouteStep> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 30, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(30) })]
 
     #[test]
     fn random_routes_are_sound_and_newton_agrees(
