@@ -33,7 +33,7 @@ pub enum Command {
     Record(commands::record::RecordArguments),
     /// Publish a recording again, as the show was
     Replay(commands::replay::ReplayArguments),
-    /// Play the show of a log again and compare every bit; or that of a recording, and compare every pose
+    /// Compare every bit of a log, check every line of a certificate, or compare every pose of a recording
     Verify(commands::verify::VerifyArguments),
     /// Watch a running publisher from another process
     Watch(commands::watch::WatchArguments),
@@ -47,7 +47,7 @@ pub enum Command {
     Metrics(commands::metrics::MetricsArguments),
     /// Solve a scene offline and print every handle as a table
     Solve(commands::solve::SolveArguments),
-    /// Find contact, stall, lock and path end
+    /// Find contact, touch of an obstacle, stall, lock and path end; with --certify, prove them
     Events(commands::events::EventsArguments),
     /// Draw the stage at a time as an SVG
     Draw(commands::draw::DrawArguments),

@@ -74,7 +74,7 @@ struct TimecodeArguments {
     /// The label of simulated time 0
     #[arg(long, value_name = "HH:MM:SS:FF", default_value = "00:00:00:00")]
     offset: Label,
-    /// Simulated seconds a second of timecode
+    /// Simulated seconds per second of timecode
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
     /// The time for which the show continues when timecode stops, before it is paused
@@ -101,7 +101,7 @@ struct PsnArguments {
     /// The address of this machine's interface to listen at; without it, the machine's routes decide
     #[arg(long, value_name = "IP")]
     interface: Option<Ipv4Addr>,
-    /// The stage's axes that are the sender's x, y and z, as of `send psn`
+    /// The stage's axes for the sender's x, y and z, written as in `send psn --axes`
     #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
     axes: Axes,
     /// The dragon whose head follows the tracker, in a show of several
@@ -237,7 +237,7 @@ fn follow(
     inputs: Receiver<Input>,
     what: &str,
 ) -> Result<(), CommandError> {
-    // The end of the source, the latest state, and the reason to end.
+    // True once the source has ended, and the latest state.
     let state = RefCell::new((false, ChaseState::Silent));
     let (mut printed, mut other_scene) = (Ok(()), false);
     let mut notify = |notice: Notice| {

@@ -30,12 +30,12 @@ use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArguments {
-    /// A certificate of `events --certify`, `check --certify` or `plan speed --certify` for this scene: check it and
-    /// print what it proves
+    /// A certificate of `events`, `check`, `plan speed` or `plan pitch` with `--certify`, for this scene: check the
+    /// certificate and print its results; with --json, print no results
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
     /// Prove the least clearance of the show and that of each obstacle: enclose them within a nanometre, rounding
-    /// included. Seconds to minutes; with --json, print that alone
+    /// included. The proof takes seconds to minutes; with --json, print the proof (and the line of --swept) alone
     #[arg(long)]
     prove: bool,
     /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage

@@ -19,7 +19,7 @@ use super::{CommandError, Common, Output, figure, number, progress_bar, search_t
 /// Arguments of `draw`.
 #[derive(Debug, clap::Args)]
 pub struct DrawArguments {
-    /// Simulated seconds, or contact, stall, lock, path_end
+    /// Simulated seconds, or contact, obstacle, stall, lock, path_end
     #[arg(long, value_name = "TIME", default_value = "0", allow_negative_numbers = true, conflicts_with = "every")]
     at: String,
     /// Write to a file instead of standard output; with --every a pattern such as frames/%05d.svg
@@ -100,7 +100,8 @@ const MOST: f64 = 1e6;
 /// The greatest number of moments of an animation: browsers show larger files badly.
 const MOST_MOMENTS: f64 = 2000.0;
 
-/// Seconds between two moments of an animation, at least: the last one stands as many steps as there are in seconds.
+/// The least number of seconds between two moments of an animation. The last moment stays for seconds, and the SVG
+/// repeats its values at each step of that time.
 const LEAST_STEP: f64 = 1e-3;
 
 /// The radius or the width of a picture.

@@ -1,4 +1,4 @@
-//! `events`: the events that end the show, in order; with a proof on request.
+//! `events`: the events of a scene in order, and its least clearance; with a proof on request.
 
 use std::path::{Path, PathBuf};
 

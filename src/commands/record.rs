@@ -44,7 +44,8 @@ pub struct RecordArguments {
     /// recorded by default), markers, clock, tf
     #[arg(long, value_name = "TOPICS", value_delimiter = ',', value_parser = topic, conflicts_with = "recover")]
     topics: Vec<Topic>,
-    /// Size or duration (1GB, 500MB, 1h, 90s) at which the next file begins; each run begins another file anyway
+    /// Size or duration (1GB, 500MB, 1h, 90s) at which the next file begins; each run of the publisher
+    /// begins another file too
     #[arg(long, value_name = "SIZE|TIME", value_parser = split, conflicts_with = "recover")]
     split: Option<Split>,
     /// Wall time after which to end: 60, 90s, 5m, 8h

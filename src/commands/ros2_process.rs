@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use super::log_lines::LogSender;
 use super::{CommandError, Common};
 
-/// The interval of tests that the process runs.
+/// The interval at which the supervisor tests whether the process still runs.
 const TEST_INTERVAL: Duration = Duration::from_millis(20);
 /// The time in which the process must end after a signal; a longer-lived one is killed.
 const LONGEST_END: Duration = Duration::from_secs(5);

@@ -13,7 +13,7 @@ use super::{CommandError, Common, Output, figure, number, progress_bar, search_t
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("times").required(true))]
 pub struct SolveArguments {
-    /// Simulated seconds, or contact, stall, lock, path_end; several separated by commas
+    /// Simulated seconds, or contact, obstacle, stall, lock, path_end; several separated by commas
     #[arg(long, value_name = "TIMES", value_delimiter = ',', group = "times", allow_negative_numbers = true)]
     at: Vec<String>,
     /// Simulated seconds between two rows; with --until

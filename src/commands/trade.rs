@@ -207,8 +207,8 @@ fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), Comman
     let noise = measurements.first().map_or(f64::NAN, |first| first.noise);
     output.line(&format!(
         "* no other is both faster and more exact, where errors below {noise:.1e} m are rounding and count as equal. \
-         Errors: the largest over all handles at {SPREAD_SAMPLES} moments of the show and {LAST_SECOND_SAMPLES} of its \
-         last second, against a reference of more than 30 digits."
+         Errors: the largest over all handles at {SPREAD_SAMPLES} moments of the motion and {LAST_SECOND_SAMPLES} of \
+         its last second, against a reference of more than 30 digits."
     ))
 }
 

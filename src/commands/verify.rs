@@ -24,8 +24,9 @@ pub struct VerifyArguments {
 /// The first bytes of a recording.
 const MCAP_MAGIC: &[u8] = b"\x89MCAP";
 
-/// Verifies a log, a certificate or a recording. Exit code 0: a log or a recording has the same show, or close to it; a
-/// certificate is valid. 1: a difference, nothing to compare; a line that does not follow. 2: a file of another kind.
+/// Verifies a log, a certificate or a recording. Exit code 0: the log or the recording has the same show, within its
+/// accuracy; or the certificate is valid. Exit code 1: the show differs, nothing can be compared, or a line of the
+/// certificate does not follow. Exit code 2: the file cannot be read as one of these.
 pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), CommandError> {
     let shown = arguments.file.display().to_string();
     let unread = |error: io::Error| {

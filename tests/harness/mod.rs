@@ -187,6 +187,11 @@ impl Lines {
         format!("{end:?}; standard error: {errors}")
     }
 
+    /// Returns the lines that have come and were not read, without waiting.
+    pub fn so_far(&self) -> Vec<String> {
+        self.lines.try_iter().collect()
+    }
+
     /// Returns all lines until the process ends.
     pub fn rest(&self) -> Vec<String> {
         let deadline = Instant::now() + patience();

@@ -185,7 +185,7 @@ impl Step {
         let (port, sender) = command_queue();
         Self {
             show: ShowSource::new(show),
-            messages: FrameMessages::new(0),
+            messages: FrameMessages::new(0, 0),
             timeline: timeline.clone(),
             rules,
             frame,

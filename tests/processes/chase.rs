@@ -36,9 +36,11 @@ fn sender(name: &str, arguments: &[&str]) -> Process {
     Process::start(&mut command)
 }
 
-fn result(name: &str, sender: Process) -> Value {
+/// Returns the result of a sender, whose chase prints `lines`.
+fn result(name: &str, sender: Process, lines: &Lines) -> Value {
     let output = sender.output();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let failure = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{failure}the chase printed {:?}", lines.so_far());
     let file = result_file(name);
     let result = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
     let _ = std::fs::remove_file(file);
@@ -65,7 +67,7 @@ fn a_show_follows_art_net_timecode_with_jitter_loss_and_a_stall() {
     let sender = sender(name, &["--port", &port, "--seconds", "12"]);
     let locked = state(&lines, "locked");
     assert_eq!((&locked["source"], &locked["frame_rate"]), (&"artnet".into(), &"25".into()));
-    let result = result(name, sender);
+    let result = result(name, sender, &lines);
     assert!(result["p99"].as_f64().unwrap() < 0.02 && result["frames"].as_u64().unwrap() > 300, "{result}");
     assert_eq!(result["epochs"], 1, "{result}");
     // The end of timecode: freewheel, then pause.
@@ -81,7 +83,7 @@ fn a_jump_of_timecode_is_followed() {
     let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
     let sender = sender(name, &["--port", &port, "--seconds", "10", "--jump", "100"]);
     state(&lines, "locked");
-    let result = result(name, sender);
+    let result = result(name, sender, &lines);
     assert!(result["frames_to_follow"].as_f64().unwrap() < 12.0, "{result}");
     assert_eq!(result["epochs"], 2, "one jump: {result}");
 }
@@ -179,7 +181,7 @@ fn a_show_follows_the_tracker_of_another_one() {
     command.args(["tests/python/chase_tracker.py", "--leader", &unique(leader), "--follower", &unique(follower)]);
     command.args(["--from", &from, "--to", &to, "--seconds", "14", "--result"]).arg(result_file(follower));
     let relay = Process::start(&mut command);
-    let result = result(follower, relay);
+    let result = result(follower, relay, &lines);
     let locked = state(&lines, "locked");
     assert_eq!((&locked["source"], &locked["tracker"]), (&"psn".into(), &1.into()));
     assert!(result["p50"].as_f64().unwrap() < 0.1, "{result}");
@@ -222,7 +224,7 @@ fn the_log_of_a_chased_show_replays_bit_for_bit() {
     let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
     let sender = sender(name, &["--port", &port, "--seconds", "8", "--jump", "100"]);
     state(&lines, "locked");
-    result(name, sender);
+    result(name, sender, &lines);
     run.signal(Signal::SIGINT);
     let ended = run.output();
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));

@@ -87,7 +87,7 @@ impl Decoder {
         }
     }
 
-    /// Handles a sample, -1 to 1. Returns the event that the sample completes.
+    /// Handles a sample; full scale is -1 to 1. Returns the event that the sample completes.
     pub fn push(&mut self, sample: f32) -> Option<Event> {
         let sample = f64::from(sample);
         let at = self.samples as f64;
@@ -177,7 +177,7 @@ impl Decoder {
 mod tests {
     use super::*;
 
-    /// Encodes labels by the standard's table, bit after bit; `slope` samples for each change.
+    /// Encodes labels by the standard's table, bit after bit, as a square wave of amplitude `level`.
     fn sound(labels: &[Label], drop: bool, bits_per_second: f64, sample_rate: f64, level: f32) -> Vec<f32> {
         let mut changes = Vec::new();
         let mut time = 0.0;

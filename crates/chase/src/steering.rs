@@ -99,7 +99,7 @@ struct Show {
     epoch: u32,
     /// The latest command without an answer: the show may still execute this command.
     unanswered: Option<Command>,
-    /// True for a show that was paused when it was found, until the show plays or refuses [`Command::Go`].
+    /// True for a show that was paused or held when it was found, until the show plays or answers a command.
     is_new: bool,
     /// True if another client has made the show play while it should stand.
     is_released: bool,
@@ -376,7 +376,7 @@ mod tests {
     fn a_pause_whose_answer_is_lost_is_no_pause_of_another_client() {
         let mut steering = steering();
         assert!(matches!(steering.command(Goal::Stand(None), at(2)), Some(Command::Pause)));
-        // No answer is given up after two seconds, as one that is known to be lost.
+        // After two seconds without an answer the command counts as unanswered.
         assert_eq!(steering.command(Goal::Stand(None), at(200)), None);
         let paused = |tick| FrameHeader { playback: PlaybackState::Paused as u32, ..playing(tick, 0, 3.0) };
         steering.frame_came(&paused(201), at(201));

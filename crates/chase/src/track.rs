@@ -22,8 +22,8 @@ pub const MOST_DISTANCE: f64 = 1.0;
 const READINGS_TO_LOCK: u32 = 3;
 /// The time without a reading that is shown as freewheeling, seconds.
 const QUIET: f64 = 0.3;
-/// The greatest correction of the rate, and the error above which the show is sent to its place, both as parts of a
-/// second.
+/// The greatest correction of the rate, in simulated seconds per second, and the error above which the show is sent to
+/// its place, in seconds.
 const TAKE_UP: f64 = 0.5;
 const SEEK_ABOVE: f64 = 2.0;
 

@@ -198,8 +198,8 @@ impl Subscription {
         nodes
     }
 
-    /// Returns true if frames are passed over that a show of this machine may send. The reason is that another process
-    /// is selected: the end of a tunnel, selected while no show ran here.
+    /// Returns true if another process than this machine's show is selected, and frames that the show may have sent are
+    /// passed over. The other process is the end of a tunnel, selected while no show ran here.
     pub fn passes_over_the_show(&self, connection: &Connection) -> bool {
         let Selection::Following { selected, passes_over: true, .. } = &connection.selection else { return false };
         let process = |node: &UniqueNodeId| node.pid::<ipc::Service>().ok();
@@ -211,8 +211,8 @@ impl Subscription {
     /// another, and a publisher without alerts never creates the service of alerts.
     ///
     /// # Errors
-    /// [`OpenError::Full`] if a new service has no memory left, [`OpenError::Incompatible`] if its messages have
-    /// another layout.
+    /// [`OpenError::Full`] if a new service has no memory left, [`OpenError::OtherLayout`] if its messages have another
+    /// layout, [`OpenError::Incompatible`] if another property differs.
     pub fn open_missing_services(&self, connection: &mut Connection) -> Result<(), OpenError> {
         let missing = connection.missing();
         if connection.alerts.is_none() {
@@ -312,7 +312,8 @@ impl Connection {
         self.stage.is_some() && self.scene.is_some()
     }
 
-    /// Waits until a frame is announced, or for `timeout` but at least 1 ms. Does not wait if `timeout` is zero.
+    /// Waits until a frame is announced, or for `timeout` but at least 1 ms. Without the event service, waits 20 ms at
+    /// most. Does not wait if `timeout` is zero.
     pub fn wait(&self, timeout: Duration) {
         if timeout.is_zero() {
             return;
@@ -482,7 +483,8 @@ impl Connection {
         }
     }
 
-    /// Returns true if a message is handed over: its node is the node of the frames, or the next run begins with it.
+    /// Returns true if a message is handed over: its node or its run is that of the selected frames, or the selected
+    /// publisher has gone.
     fn admits(&self, origin: Origin, run_id: u64) -> bool {
         let Selection::Following { selected, .. } = &self.selection else { return false };
         selected.origin.node == origin.node

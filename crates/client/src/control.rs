@@ -245,7 +245,7 @@ impl Vigil {
             // One request at a time: each takes a period of the loop, and others wait behind it.
             match self.probe.as_ref().map(PendingCommand::poll) {
                 Some(Ok(None)) => return Ok(()),
-                // A step that has come to the end of the show is over when its periods are.
+                // At the end of the show, a step continues until its periods are over.
                 Some(Ok(Some(state)))
                     if matches!(state.playback_state(), Some(PlaybackState::Playing | PlaybackState::Ended))
                         && state.tick > self.tick =>

@@ -2,8 +2,8 @@
 //!
 //! In: the services of a name, over [`connection`](super::connection). Out: a [`FeedEvent`] for each message and each
 //! change. Only this file connects, opens services that appear later, distinguishes a silent publisher from a dead one
-//! ([`liveness`]), and finds gaps and new runs ([`sequence`]). `watch`, the stage picture and the subscribers of the
-//! soak test call [`Feed::poll`] in a loop and handle the events.
+//! ([`liveness`]), and finds gaps and new runs ([`sequence`]). Programs call [`Feed::poll`] in a loop and handle the
+//! events; [`polling`](super::polling) has such a loop.
 
 pub mod liveness;
 pub mod sequence;
@@ -157,7 +157,7 @@ struct Connected {
     shares_clock: bool,
     liveness: Liveness,
     last_open: Instant,
-    /// True if anything has been handed over, which begins with a frame.
+    /// True if anything has been handed over. Nothing is handed over before a frame has come.
     received: bool,
     /// The moment since which no publisher has sent anything; used until something has been handed over.
     quiet_since: Instant,

@@ -9,17 +9,17 @@ use iceoryx2::service::static_config::messaging_pattern::MessagingPattern as Des
 use crate::shared_memory::OpenError;
 use bench_dragon_messages::{
     ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, HandlePose32,
-    LoopStatus, SceneHeader, Stage,
+    LoopStatus, SceneHeader, Stage, StageSegment,
 };
 
-/// The name of a layout, which ends in its version: `bench_dragon/Stage/5`.
+/// The name of a layout, which ends in its version: `bench_dragon/HandlePose/1`.
 pub fn name<Message: ZeroCopySend>() -> &'static str {
     // SAFETY: only a name is read.
     unsafe { <Message as ZeroCopySend>::type_name() }
 }
 
 /// Returns the names of all layouts that this program sends and reads.
-pub fn names() -> [&'static str; 11] {
+pub fn names() -> [&'static str; 12] {
     [
         name::<HandlePose>(),
         name::<HandlePose32>(),
@@ -32,6 +32,7 @@ pub fn names() -> [&'static str; 11] {
         name::<ControlResponse>(),
         name::<SceneHeader>(),
         name::<Stage>(),
+        name::<StageSegment>(),
     ]
 }
 

@@ -1,5 +1,5 @@
-//! The loop of a subscriber that polls, for `send` and `metrics`. In: the events of a [`Feed`] of each publisher. Out:
-//! calls of a [`Handler`].
+//! The loop of a subscriber that polls, for `send`, `metrics` and `chase`. In: the events of a [`Feed`] of each
+//! publisher. Out: calls of a [`Handler`].
 //!
 //! Waking this process at each frame would cost the publisher more than it saves here; polling costs the publisher
 //! nothing.
@@ -71,7 +71,7 @@ pub fn poll_until(
     };
     let mut sources = names.iter().map(source).collect::<Result<Vec<_>, OpenError>>()?;
     loop {
-        // Read before the queues are emptied, so that everything sent before it was set is handled.
+        // `stop` is read before the queues are emptied: everything sent before `stop` was set is handled.
         let ending = stop.load(Ordering::Relaxed);
         for (publisher, source) in sources.iter_mut().enumerate().filter(|(_, source)| source.next <= Instant::now()) {
             let polled = source.feed.poll(Duration::ZERO, &mut |event| handler.handle(publisher, event));

@@ -61,11 +61,11 @@ pub fn corners(board: &Board) -> String {
     corners.join(" ")
 }
 
-/// Returns the boards and their handles, the tail at the bottom and the head on top.
+/// Returns the boards, the tail at the bottom and the head on top. [`handles`] returns the holes of the handles.
 pub fn group(boards: &[(usize, Board)], fill: impl Fn(usize) -> String, camera: &Camera, palette: &Palette) -> Group {
     let mut group = Group::new().set("id", "benches").set("stroke-linejoin", "round");
     let width = boards.first().map_or(0.0, |(_, board)| 2.0 * board.half_width);
-    // Minimum widths for a visible edge and for a visible hole.
+    // The least width on the sheet at which an edge is visible.
     if width * camera.scale > 5.0 {
         group = group.set("stroke", palette.ground).set("stroke-width", camera.metres(0.8));
     }

@@ -97,7 +97,7 @@ fn label(name: &str, (x, y): (f64, f64), camera: &Camera, palette: &Palette) -> 
     Group::new().add(rim.set("stroke-linejoin", "round")).add(place(palette.quiet))
 }
 
-/// Returns a point of a shape for its name: the middle of the corners, of a line the middle one.
+/// Returns a point of a shape for its name: the middle of the corners; for a line, the middle of a side halfway along.
 fn middle(shape: &Shape) -> Point {
     let points = shape.points();
     match shape.kind() {

@@ -19,13 +19,13 @@ pub struct Palette {
     pub quiet: &'static str,
     /// The path.
     pub faint: &'static str,
-    /// The viewport's outline.
+    /// The ground that boards cover, keep-outs, and the grid of plots.
     pub line: &'static str,
     /// Boards that touch or overlap.
     pub danger: &'static str,
     /// Events ahead.
     pub warning: &'static str,
-    /// A board without a known speed, or that stands still.
+    /// A board without a known speed, and obstacles.
     pub still: &'static str,
     /// The slowest board.
     pub slow: &'static str,

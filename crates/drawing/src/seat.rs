@@ -97,7 +97,7 @@ impl Eye {
         self.spot(Point::new(self.at.x - self.right.1 * away, self.at.y + self.right.0 * away), 0.0)
     }
 
-    /// Returns the flatness of a circle on the floor.
+    /// Returns the ratio of height to width of a circle on the floor, as seen from the eye.
     fn flat(&self, depth: f64) -> f64 {
         (self.height / depth).min(1.0)
     }

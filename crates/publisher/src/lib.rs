@@ -2,7 +2,7 @@
 //!
 //! [`live`] is the loop, its statistics and its command queue. [`transports`] carry frames to other processes.
 //! [`log`](mod@log) writes commands and hashes, from which a run can be computed again. [`run`] starts and stops all of
-//! them. Called by the commands `run` and `replay`.
+//! them for the commands `run` and `replay`. The command `verify` reads logs.
 
 pub mod live;
 pub mod log;

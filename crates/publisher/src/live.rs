@@ -1,8 +1,8 @@
 //! The live loop: wait for the deadline, get the frame, pass it to the publishers, count.
 //!
-//! In: a [`FrameSource`] and a [`Clock`]. Out: frames to every [`Publisher`], samples and alerts to a queue that never
-//! blocks. The loop knows no transport and no solver. [`run`](crate::run) calls [`run_loop`] on one thread and
-//! [`statistics`], which empties that queue, on another.
+//! In: a [`FrameSource`] and a [`Clock`]. Out: frames to every [`Publisher`], and samples, alerts and cues to two
+//! queues that never block. The loop knows no transport and no solver. [`run`](crate::run) calls [`run_loop`] on one
+//! thread and [`statistics`], which empties both queues, on another.
 
 pub mod control;
 pub mod realtime;
@@ -34,7 +34,7 @@ pub struct ShowCounts {
     pub shows_played: u64,
     /// Contacts that no search had found.
     pub unforeseen_contacts: u64,
-    /// Frames without a solution, which repeated the frame before.
+    /// Frames without a solution, which have the handles of the latest solution.
     pub unsolved_frames: u64,
 }
 
@@ -346,8 +346,8 @@ fn wait<C: Clock>(
     }
 }
 
-/// Passes the sample, the alerts and the cues to the statistics thread. If its queue is full, the percentiles miss the
-/// sample or the terminal misses the line. The published frame and alert are not affected.
+/// Passes the sample, the alerts and the cues to the statistics thread. If a queue is full, the percentiles miss the
+/// sample or the terminal misses the line. The published frame, alert and cue are not affected.
 fn report(reports: &mut Reports, outgoing: Outgoing<'_>, sample: Sample) {
     for alert in outgoing.alerts {
         let announcement = Announcement::Alert { alert: *alert, time_scale: outgoing.header.time_scale };

@@ -2,8 +2,8 @@
 //!
 //! [`LogPublisher`] is the loop's end. It copies the arrays of a frame into a queue without a lock, an allocation or a
 //! system call. A thread orders them as in the message, hashes them and writes. The log skips no frame while its queue
-//! has room. Without room, it records the frame's tick as lost. A frame and its commands are queued together, or not at
-//! all.
+//! has room. Without room, the log records the frame's tick as lost, after the commands of the frame. Without room for
+//! these records, the log ends.
 
 pub mod arithmetic;
 pub mod hash;
@@ -268,7 +268,8 @@ fn fail(shared: &LogState, sentence: String) {
 /// Writes the contents of the queue until the run is over.
 fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &LogState, file: &str) {
     loop {
-        // Read before the queue is emptied, so that everything queued before it was set is written.
+        // `stop` and `missing_from` are read before the queue is emptied: everything queued before they were set is
+        // written.
         let ending = shared.stop.load(Ordering::Acquire);
         let missing_from = shared.missing_from.load(Ordering::Acquire);
         reader.empty(&mut writer);
@@ -301,7 +302,7 @@ fn serve(mut reader: LogReader, mut writer: LogWriter<impl io::Write>, shared: &
 impl LogReader {
     /// Writes the contents of the queue.
     fn empty(&mut self, writer: &mut LogWriter<impl io::Write>) {
-        // A frame is longer than this first part.
+        // The first words of the queue are a whole record, or the beginning of a frame, which is longer.
         while let Ok(record) = self.queue.read_chunk(RECORD_WORDS) {
             let mut words = [0; RECORD_WORDS];
             let (first, second) = record.as_slices();
@@ -320,7 +321,7 @@ impl LogReader {
                 STEP_FINISHED => code(third).into_iter().for_each(|code| {
                     writer.command(tick, CommandRecord::StepFinished { code });
                 }),
-                // The loop's end wrote the number of a command; only its value can be out of range.
+                // A command of the loop has a known number and a valid value: no record is dropped here.
                 _ => Command::of_number(third as u32, f64::from_bits(fourth)).into_iter().for_each(|command| {
                     writer.command(tick, CommandRecord::Given { command, code: code(fifth) });
                 }),

@@ -1,7 +1,7 @@
 //! Start and stop of a publisher: the threads of the loop and of its statistics, and the transports' ends on both.
 //!
 //! In: a [`FrameSource`], the open transports, their command queues, a clock. Out: a [`Published`]. Prints nothing but
-//! warnings of the log: the caller gives [`Hooks`]. Called by the commands `run` and `replay`.
+//! warnings through the crate `log`: the caller prints in its [`Hooks`]. Called by the commands `run` and `replay`.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -35,7 +35,7 @@ pub enum RunError {
     /// The loop cannot run on the requested CPU.
     #[error(transparent)]
     Cpu(#[from] CpuError),
-    /// A thread panicked, which it has printed.
+    /// A thread panicked. The panic has been printed.
     #[error("the {0} thread ended early")]
     Thread(&'static str),
 }
@@ -73,7 +73,7 @@ pub struct Publishing<'a> {
     pub scene: &'a str,
     /// Nanoseconds that waiting subscribers have to connect before the first frame.
     pub lead_ns: u64,
-    /// A flag that the process of ROS 2 sets when it is connected. The first frame waits for the flag, 5 s at most.
+    /// A flag that is set when the process of ROS 2 is connected. The first frame waits for the flag, 5 s at most.
     pub awaited: Option<&'a AtomicBool>,
 }
 
@@ -82,13 +82,14 @@ pub type OpenTransports = [Box<dyn Transport>];
 
 /// The actions of the caller.
 pub struct Hooks<'a> {
-    /// Called once all transports are open.
+    /// Called after the wait for subscribers, when the loop's ends of all transports are open.
     pub opened: Box<dyn FnOnce(&OpenTransports) + 'a>,
     /// Called with each alert and cue, on the statistics thread.
     pub announce: Box<dyn FnMut(&Announcement) + Send + 'a>,
     /// Called with each sample, on the statistics thread.
     pub sample: Box<dyn FnMut(&Sample) + Send + 'a>,
-    /// Called on the statistics thread about ten times a second, as long as the loop does not hang.
+    /// Called on the statistics thread 10 to 50 times a second, depending on the rate, as long as the loop does not
+    /// hang.
     pub alive: Box<dyn FnMut() + Send + 'a>,
     /// Called once the loop has ended, before the transports shut down.
     pub ended: Box<dyn FnOnce(LoopCounts) + 'a>,

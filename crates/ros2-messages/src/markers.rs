@@ -75,9 +75,9 @@ pub struct MeshFile {
 pub struct Marker {
     /// The frame's stamp.
     pub header: Header,
-    /// `benches`, `contact`, `coming`, `sentence` or `numbers`.
+    /// `benches`, `contact`, `coming`, `sentence`, `numbers`, `obstacles`, `keep_out` or `obstacle_names`.
     pub ns: String,
-    /// The bench, from 0; for `numbers` the index among them.
+    /// The number of the bench or of the obstacle, from 0; for `numbers` the index among them.
     pub id: i32,
     /// The shape.
     pub r#type: i32,
@@ -93,7 +93,7 @@ pub struct Marker {
     pub lifetime: Duration,
     /// False.
     pub frame_locked: bool,
-    /// For `coming` the ends of the ring's dashes; otherwise empty.
+    /// For `coming` the ends of the ring's dashes, for `obstacles` and `keep_out` the outline; otherwise empty.
     pub points: Vec<Xyz>,
     /// Empty.
     pub colors: Vec<Color>,
@@ -103,7 +103,7 @@ pub struct Marker {
     pub texture: CompressedImage,
     /// Empty.
     pub uv_coordinates: Vec<UvCoordinate>,
-    /// For `sentence` and `numbers` the text; otherwise empty.
+    /// For `sentence`, `numbers` and `obstacle_names` the text; otherwise empty.
     pub text: String,
     /// Empty.
     pub mesh_resource: String,

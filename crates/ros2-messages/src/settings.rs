@@ -1,6 +1,6 @@
 //! The topics that a scene can request, their quality of service, and the limits of the diagnostics.
 //!
-//! A scene file states these settings; the ROS 2 transport and recordings read them.
+//! A scene file states these settings, and the ROS 2 transport reads them. A recording has the default settings.
 
 use std::collections::BTreeMap;
 
@@ -113,7 +113,7 @@ pub enum Reliability {
 pub enum Durability {
     /// No history.
     Volatile,
-    /// The last message; more, up to the depth, only while others subscribe.
+    /// The last message, whatever the depth.
     TransientLocal,
 }
 
@@ -154,7 +154,7 @@ impl StampClock {
 pub struct DiagnosticLimits {
     /// Skipped periods for a warning, at least 1.
     pub skipped_warn: u64,
-    /// Skipped periods for an error; by default a tenth of the loop's rate.
+    /// Skipped periods for an error; by default a tenth of the loop's rate, at least 2 and at least `skipped_warn`.
     pub skipped_error: Option<u64>,
     /// Wake-up lateness for a warning, 99th percentile, seconds; infinite by default: lateness within a period is
     /// harmless.

@@ -2,7 +2,7 @@
 //!
 //! A writer of RustDDS 0.15.1 keeps all messages that one of its subscribers has not acknowledged, up to its limit. A
 //! best-effort subscriber acknowledges nothing. A killed reliable subscriber acknowledges nothing until its lease ends.
-//! Both count (`Writer::remove_all_acked_changes_but_keep_depth`). RustDDS has no limit of time. So this file sends the
+//! RustDDS waits for both (`Writer::remove_all_acked_changes_but_keep_depth`), without end. So this file sends the
 //! writer, in our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2). For a best-effort subscriber the
 //! ACKNACK acknowledges all messages. For a reliable subscriber it acknowledges the messages that are older than
 //! [`AGE`] and not among the last `depth`. A reliable subscriber gets a GAP for these messages. RustDDS ignores the

@@ -113,7 +113,7 @@ struct ShowScene {
 
 /// The node of one run.
 struct OpenShow {
-    // Dropped before the topics: it may answer until then.
+    // Dropped before the topics: the services may answer until then.
     control: ControlThread,
     topics: Topics,
     divider: RateDivider,
@@ -259,7 +259,8 @@ impl ShowBridge {
         self.waiting_since = None;
     }
 
-    /// Sends a frame if it is due. The first frame opens the topics, when stage and scene have come.
+    /// Sends a frame if it is due. A frame opens the topics once stage and scene have come. After a time limit a frame
+    /// opens the topics without a scene.
     fn frame(
         &mut self,
         header: &FrameHeader,
@@ -299,7 +300,7 @@ impl ShowBridge {
         let rate = settings.greatest_rate();
         let topic_names = topic_names(&name, &settings, alerts, cues);
         let config = Ros2Config { name, handles: header.handles as usize, settings, alerts, cues, stage };
-        // The node of the run before has the same name, and its latest alert would be one more.
+        // The node of the run before has the same name, and subscribers would also get the latest alert of that run.
         self.ended = None;
         let mut node = node::open(context, &self.name)?;
         let endpoints = Endpoints::open(&self.name, context, &mut node, *control)?;

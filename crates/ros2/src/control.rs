@@ -111,9 +111,9 @@ struct Pending {
 
 /// The progress of a call.
 enum Progress {
-    /// Waits for room in the loop's queue.
+    /// Waits for room in the queue of the command client.
     Waiting(Command),
-    /// Sent to the loop.
+    /// Sent to the show.
     Sent(u64, Command),
     /// Answered; waits for its client's reply reader.
     Answered(Response, Instant),
@@ -189,7 +189,7 @@ impl Server {
         }
     }
 
-    /// Passes commands to the loop, in the order of reception, as far as its queue has room.
+    /// Passes commands to the show, in the order of reception, until too many commands have no answer.
     fn pass_on(&mut self) {
         let Some(commands) = &mut self.commands else { return };
         for pending in &mut self.pending {

@@ -101,8 +101,8 @@ pub fn check_name(name: &str) -> Result<(), Ros2Error> {
     if name.split('/').all(legal) { Ok(()) } else { Err(Ros2Error::Name(name.to_owned())) }
 }
 
-/// Returns a warning if `ROS_DISTRO` names another distribution than this program was built for. Humble and later
-/// distributions write some of the graph's messages differently; the topics do not differ.
+/// Returns a warning if `ROS_DISTRO` names another distribution than this program was built for. Humble writes some of
+/// the graph's messages in another form than later distributions; the topics do not differ.
 pub fn other_distribution(variable: impl Fn(&str) -> Option<String>) -> Option<String> {
     let built = ros2_client::COMPILED_ROS_DISTRO;
     let distribution = variable("ROS_DISTRO").filter(|name| !name.is_empty() && name != built.as_str())?;

@@ -56,9 +56,10 @@ impl OldMessages {
 
 /// Sends `reader` a GAP once: the messages of `writer` up to `last` are not for it.
 pub(super) fn send_gap(participant: &DomainParticipant, writer: GUID, reader: GUID, last: u64) {
-    // A volatile writer is replaced long before it has written more messages.
+    // A volatile writer is replaced long before its message numbers exceed 32 bits.
     let last = u32::try_from(last).unwrap_or(u32::MAX);
-    // Fast DDS goes through all numbers of a GAP, and earlier ones are withheld by its heartbeats.
+    // Fast DDS goes through all numbers of a GAP, so this GAP names the last ones only. Heartbeats of the writer
+    // withhold the earlier messages.
     let first = last.saturating_sub(UNACKNOWLEDGED_MESSAGES).max(1);
     if let Some(addresses) = reader_addresses(participant, reader).filter(|_| last > 0) {
         send(&datagram(writer.to_bytes(), reader.to_bytes(), first..=last), addresses.into_iter());

@@ -1,6 +1,7 @@
 //! The ROS 2 node and its topics, for one run of a show.
 //!
-//! The bridge creates and drops all objects of ros2-client on its thread.
+//! The bridge creates all objects of ros2-client on its thread, and drops the node and the topics there. The control
+//! thread drops the subscriptions of the services.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -56,7 +57,7 @@ pub(super) struct Topics {
     /// Messages that did not fit into a queue of RustDDS because a reliable subscriber was slow or dead.
     discarded: u64,
     matches: Matches,
-    // Dropped after the writers: they belong to it.
+    // Dropped after the writers, which belong to the node.
     node: Node,
 }
 
@@ -68,7 +69,7 @@ pub(super) fn open(context: &Context, name: &str) -> Result<Node, Ros2Error> {
     let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
     let (namespace, base) = name.rsplit_once('/').unwrap_or(("", name));
     let node_name = NodeName::new(&format!("/{namespace}"), base).map_err(|error| failed(&error))?;
-    // ros2-client's own would speak one mapping of service calls, and keep one line of the log.
+    // ros2-client's parameter services speak one mapping of service calls, and its log keeps one line.
     let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
     context.new_node(node_name, options).map_err(|error| failed(&error))
 }
@@ -272,7 +273,7 @@ mod tests {
             ..Stage::default()
         };
         let stage = StageMessage { stage, segments: Vec::new() };
-        // iceoryx2 takes no longer name.
+        // iceoryx2 takes names of at most 255 bytes.
         let name = "n".repeat(255);
         let diagnostics = DiagnosticArray::of(&name, &worst, &stage.stage, Some(&alert), &second);
         let diagnostics =

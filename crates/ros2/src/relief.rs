@@ -17,7 +17,7 @@ const OVERLAP: Duration = Duration::from_secs(10);
 
 /// The state of a relief.
 pub(super) struct Relief<Writer> {
-    /// Messages of the writer, or since a failed attempt to relieve it.
+    /// Messages of the writer, or since the latest attempt to create a second writer.
     written: u64,
     /// The writer that will write, and the time of its creation.
     next: Option<(Writer, Instant)>,

@@ -88,8 +88,8 @@ impl<Message: Serialize> TopicWriter<Message> {
         Stream { port: self, message: Arc::new(message) }
     }
 
-    /// Sends a message, or holds it until there is a subscriber or RustDDS takes it. Messages discarded because RustDDS
-    /// still refuses the one before are counted, and reported once.
+    /// Sends a message, or holds the message until there is a subscriber or RustDDS takes the message. While RustDDS
+    /// refuses a message, the next message replaces the refused message. Such a loss is counted, and reported once.
     pub(super) fn send(&mut self, message: Arc<Message>, discarded: &mut u64) {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));

@@ -12,8 +12,8 @@ use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
 use bench_dragon_messages::state::Level;
 
-/// The greatest number of alerts of one frame: contact, stall and lock, all passed in one step, and obstacles before,
-/// between and behind them. Approaching and clear are alone.
+/// The most alerts of one frame with one dragon: contact, stall and lock, all passed in one step, and obstacles
+/// before, between and behind them. Approaching and clear are alone. Several dragons can have more.
 pub const MOST_PER_FRAME: usize = 7;
 
 /// Clearance at which the level may be released, as a multiple of the clearance that raised it. Without this
@@ -31,7 +31,7 @@ pub struct Alert {
     /// The level.
     pub level: Level,
     /// The event of the alert. While the level is clear or approaching: the next contact, obstacle, stall or lock, if
-    /// any. Else: the latest event that has happened.
+    /// any. Otherwise: the event that has happened and raised the level.
     pub event: Option<TimedEvent>,
     /// The nearest two boards in the frame, or a board and an obstacle; `None` with neither.
     pub nearest: Option<PairClearance>,
@@ -91,8 +91,9 @@ impl LevelTracker {
     /// `sim_time` falls only at a restart.
     ///
     /// Every event since the previous frame is announced, even if one step passes several: so the alerts do not depend
-    /// on the rate. The first frame of a showing announces only the latest event passed. The countdown stops while the
-    /// show stands still (`moves` is false).
+    /// on the rate. An event that does not change the level is not announced, such as an obstacle after an obstacle.
+    /// The first frame of a showing announces only the latest event passed. The countdown stops while the show stands
+    /// still (`moves` is false).
     pub fn update(
         &mut self,
         tick: u64,

@@ -29,7 +29,7 @@ use bench_dragon_messages::{
 /// A stage has room for the most obstacles of a scene and its boundary.
 const _: () = assert!(crate::scene::stage::MOST_OBSTACLES < MOST_OBSTACLES);
 
-/// The header fields that the publisher sets: they do not follow from the frame.
+/// The header fields that the loop sets. They do not follow from the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamps {
     /// The run.

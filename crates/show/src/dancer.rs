@@ -20,6 +20,8 @@ pub(crate) struct Dancer {
     clearance: Option<ClearanceMonitor>,
     obstacles: Option<ObstacleMonitor>,
     placement: Placement,
+    /// The arguments of the latest solution.
+    solved: Option<(f64, bool)>,
     /// The name of the solver and the reason for its choice.
     pub reason: String,
     /// Greatest error of a clearance, metres.
@@ -31,7 +33,7 @@ pub(crate) struct Dancer {
 pub(crate) struct Closest {
     /// The nearest two boards that share no handle.
     pub boards: Option<PairClearance>,
-    /// The same, or a board that is nearer to an obstacle.
+    /// The nearest two boards that share no handle, or a board and an obstacle that are nearer.
     pub any: Option<PairClearance>,
 }
 
@@ -50,6 +52,7 @@ impl Dancer {
             clearance: scene.alerts.map(|_| own.clearance_monitor(&choice)),
             obstacles: scene.alerts.and_then(|_| own.obstacle_monitor(&choice)),
             placement: *motion.placement(),
+            solved: None,
             clearance_error: choice.clearance_error(own.team()),
             reason: choice.reason,
             solver: choice.solver,
@@ -61,8 +64,20 @@ impl Dancer {
         self.clearance.as_ref().map_or(0, |monitor| monitor.counters().pairs)
     }
 
-    /// Fills `chain` on the stage at a time of the dragon's own, and measures its clearance.
+    /// Fills `chain` with the dragon on the stage at `time`, its own time, and measures its clearance. `moves` is false
+    /// while the dragon stands: its velocities are then 0. Without a solution `chain` has the latest solution.
     pub(crate) fn solve(&mut self, time: f64, moves: bool, chain: &mut ChainMut) -> Result<Closest, NoFollower> {
+        let closest = self.solve_once(time, moves, chain);
+        if closest.is_ok() {
+            self.solved = Some((time, moves));
+        } else if let Some((time, moves)) = self.solved {
+            // A failed solution leaves the chain unspecified.
+            let _ = self.solve_once(time, moves, chain);
+        }
+        closest
+    }
+
+    fn solve_once(&mut self, time: f64, moves: bool, chain: &mut ChainMut) -> Result<Closest, NoFollower> {
         let solved_at = solve_in_at_or_just_before(self.solver.as_mut(), time, chain);
         let closest = solved_at.map(|solved_at| self.measure(solved_at, chain.positions()));
         if closest.is_ok() {
@@ -114,4 +129,37 @@ fn solve_in_at_or_just_before(solver: &mut dyn Solver, time: f64, chain: &mut Ch
         }
     }
     Ok(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A solver that writes the time into every handle, and has no solution after 10 s.
+    struct EndsAtTen;
+
+    impl Solver for EndsAtTen {
+        fn name(&self) -> &'static str {
+            "ends_at_ten"
+        }
+
+        fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+            chain.x.fill(time);
+            if time > 10.0 { Err(NoFollower) } else { Ok(()) }
+        }
+    }
+
+    #[test]
+    fn a_frame_without_a_solution_has_the_latest_solution() {
+        let scene = Scene::paper();
+        let choice = Dancer::choice(&scene, &scene.motion);
+        let whole = Dancer::new(&scene, &scene.motion, choice);
+        let mut dancer = Dancer { solver: Box::new(EndsAtTen), clearance: None, obstacles: None, ..whole };
+        let mut chain = Chain::new(scene.team().handles());
+        assert!(dancer.solve(3.0, true, &mut chain.all_mut()).is_ok());
+        for time in [20.0, 21.0] {
+            assert!(dancer.solve(time, true, &mut chain.all_mut()).is_err());
+            assert!(chain.x.iter().all(|x| *x == 3.0), "{:?}", chain.x);
+        }
+    }
 }

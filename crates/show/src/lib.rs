@@ -1,7 +1,8 @@
 //! The show: from a scene and a tick to one [`Frame`], always with the same bits.
 //!
 //! In: a scene, its timeline, and ticks. Out: frames. The show uses the solver, the events and the alert rules, but no
-//! wall clock and no transport. The live loop calls it.
+//! wall clock and no transport. The live loop, the verification of logs and the stage page call
+//! the show.
 
 pub mod alerts;
 pub mod clock;
@@ -69,7 +70,7 @@ pub struct Frame {
     /// Number of contacts that no search had found: boards that overlapped each other, or the keep-out of an obstacle,
     /// before the timeline's event.
     pub unforeseen_contacts: u64,
-    /// Number of frames without a solution: the previous chain was kept.
+    /// Number of frames without a solution: the chain is the latest solution.
     pub unsolved_frames: u64,
 }
 
@@ -128,7 +129,7 @@ pub struct Outcome {
     pub cue: u32,
 }
 
-/// The dragons in play: the only dragon of a show without names, or several.
+/// The dragons in play: the dragon of a scene with `[team]`, or the dragons of a scene with `[[dragons]]`.
 enum Cast {
     One(Box<Dancer>),
     Several(Box<Several>),

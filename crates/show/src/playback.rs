@@ -31,7 +31,7 @@ impl Playback {
     }
 }
 
-/// The start is not before the motion's end.
+/// The start is outside the motion: before 0, or not before the motion's end.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "{} s is outside the motion, expected at least 0 and less than {end:.9} s, at which it ends ({})",

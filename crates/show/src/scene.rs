@@ -1,7 +1,7 @@
 //! The scene file, checked once and converted to the types of the model.
 //!
-//! In: TOML text, or overrides from the command line. Out: a [`Scene`]: all its numbers are in range and its start is
-//! legal. Errors name the file, the line, the field and the expected value.
+//! In: TOML text. Out: a [`Scene`]: all its numbers are in range and its start is legal. Errors name the file, the
+//! line, the field and the expected value.
 
 pub mod accepted;
 pub mod cue;

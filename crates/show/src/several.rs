@@ -1,4 +1,5 @@
-//! The frames of a scene with several dragons: one chain of all, and the nearest boards of any two.
+//! The frames of a scene with several dragons: one chain with all handles, and the nearest two
+//! boards of all dragons.
 //!
 //! In: the scene and a time of the show. Out: the chain on the stage, the handles of all dragons one after the other,
 //! and its clearance. The show calls it in place of its one dragon.
@@ -110,15 +111,10 @@ impl Member {
         if self.solved == Some(state) {
             return Ok(());
         }
-        let before = self.solved.take();
+        self.solved = None;
         let (first, own_handles) = (self.handles.start, self.handles.len());
         let mut own = chain.range_mut(self.handles.clone());
-        let solved = self.dancer.solve(state.0, state.1, &mut own);
-        if let (Err(_), Some((time, moves))) = (&solved, before) {
-            // The frame keeps the dragon where it was.
-            let _ = self.dancer.solve(time, moves, &mut own);
-        }
-        let Closest { boards, any } = solved?;
+        let Closest { boards, any } = self.dancer.solve(state.0, state.1, &mut own)?;
         let numbered = |pair: PairClearance| {
             let PairClearance { bench_a, bench_b, .. } = pair;
             let bench_b = if bench_b < own_handles { bench_b + first } else { bench_b - own_handles + all_handles };

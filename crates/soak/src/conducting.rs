@@ -47,10 +47,11 @@ impl Conducting {
             if spawned.elapsed() < CLIENT_LIFETIME {
                 continue;
             }
-            self.clients_lost += u64::from(client.try_wait()?.is_some());
+            let had_ended = client.try_wait()?.is_some();
             client.kill()?;
             client.wait()?;
-            self.clients_killed += 1;
+            self.clients_lost += u64::from(had_ended);
+            self.clients_killed += u64::from(!had_ended);
             (*client, *spawned) = (plan.spawn_client()?, Instant::now());
         }
         Ok(())

@@ -42,7 +42,8 @@ pub fn columns(fleet: &Fleet) -> Vec<String> {
     publisher.chain(ros2).chain(subscribers).collect()
 }
 
-/// Returns the figures since the last call, in the order of [`columns`]; NaN for an unknown figure.
+/// Returns the present figures in the order of [`columns`]; NaN for an unknown figure. The latencies of the subscribers
+/// are those since the last call.
 pub fn row(fleet: &mut Fleet) -> Vec<f64> {
     let status = fleet.status();
     let held = fleet.measure_publisher();

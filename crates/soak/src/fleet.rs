@@ -37,10 +37,10 @@ pub enum FleetError {
     /// The publisher refuses its options or its scene: its own sentence.
     #[error("{0}")]
     Refused(String),
-    /// The publisher ended before all subscribers had received a frame.
+    /// The publisher ended before all steady subscribers had received a frame.
     #[error("the publisher ended at once ({0}){1}")]
     PublisherEnded(ExitStatus, String),
-    /// A subscriber ended before it received a frame.
+    /// A subscriber ended by itself before all steady subscribers had received a frame.
     #[error("the subscriber {0} ended at once: its error stands above")]
     SubscriberEnded(String),
     /// The load generator did not begin.

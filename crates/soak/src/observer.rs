@@ -144,7 +144,8 @@ impl Observer {
         self.check_links(handles);
     }
 
-    /// Counts the frames and periods between two frames of a run. Returns false if the second cannot follow the first.
+    /// Counts the skipped periods between two frames of a run. Returns false if the second frame cannot follow the
+    /// first.
     fn follow(&mut self, previous: &FrameHeader, header: &FrameHeader, received_ns: u64) -> bool {
         let advance = |of: fn(&FrameHeader) -> u64| of(header).checked_sub(of(previous)).filter(|step| *step > 0);
         let steps = (

@@ -21,7 +21,7 @@ use bench_dragon_publisher::live::statistics::RunSummary;
 pub struct Plan {
     /// This program.
     pub program: PathBuf,
-    /// Arguments of publisher and subscribers before their subcommand.
+    /// Arguments of every process before its subcommand.
     pub common: Vec<OsString>,
     /// Arguments of `run`.
     pub publisher: Vec<OsString>,

@@ -48,7 +48,7 @@ pub struct Report {
     pub conducted: Option<Conducted>,
     /// Further clients of the control service that were killed during a request.
     pub clients_killed: u64,
-    /// Figures over time; of several seconds in a row the greatest.
+    /// Figures over time. A row of several seconds has the greatest values of these seconds.
     pub history: History,
 }
 
@@ -62,7 +62,7 @@ pub struct SubscriberReport {
     /// The number of its processes.
     #[serde(rename = "incarnations")]
     pub processes: u64,
-    /// Counts and latencies, without those of the last second.
+    /// Counts and latencies since the start; `second` is null.
     pub seen: Observation,
 }
 

@@ -46,7 +46,7 @@ pub struct LimitCheck {
     pub name: &'static str,
     /// The greatest allowed value.
     pub limit: f64,
-    /// The value found; NaN (null in JSON) if it is not known, because the publisher left no summary.
+    /// The value found; NaN (null in JSON) for an unknown value: without a summary, a last status or any command.
     pub value: f64,
     /// The unit of both.
     pub unit: Unit,

@@ -14,7 +14,7 @@ use bench_dragon_show::scene::Scene;
 const SAMPLING_INTERVALS: [f64; 3] = [1.0, 0.1, 0.01];
 
 /// Measures all pairs against the live clearance, and sampled searches against the exact search. `exact_error` is the
-/// error of the contact in `timeline`, `solve_ns` the time of the fastest solver per frame.
+/// error of the contact in `timeline`, `solve_ns` the time per frame of the first solver measured.
 pub(super) fn measure(
     scene: &Scene,
     timeline: &Timeline,

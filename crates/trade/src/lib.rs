@@ -22,9 +22,9 @@ use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
 
-/// Number of samples of the error, spread evenly over the show.
+/// Number of samples of the error, spread evenly over the motion before its last second.
 pub const SPREAD_SAMPLES: usize = 200;
-/// Number of further samples, spread evenly over the last second.
+/// Number of further samples, spread evenly over the last second of the motion.
 pub const LAST_SECOND_SAMPLES: usize = 10;
 /// Warm-up frames before each sample, as in a running show.
 const WARM_UP_FRAMES: usize = 4;
@@ -43,11 +43,11 @@ pub struct Measurement {
     /// True if the requested accuracy is met, except where the motion itself amplifies rounding: see
     /// [`Measurement::noise`].
     pub meets: Option<bool>,
-    /// Nanoseconds per frame: the median over the show, without the time of reading the clock.
+    /// Nanoseconds per frame: the median over the motion, without the time of reading the clock.
     pub frame_ns: f64,
     /// Nanoseconds per frame: the 99th percentile.
     pub frame_ns_p99: f64,
-    /// Number of timed frames, in runs evenly over the show.
+    /// Number of timed frames, in runs evenly over the motion.
     pub frames_timed: usize,
     /// The greatest distance of a handle from its true position, metres.
     pub max_position_error: f64,
@@ -259,7 +259,8 @@ fn errors(scene: &Scene, candidate: &mut Candidate, samples: &[ReferenceSample])
     for sample in samples {
         for frame in (0..=candidate.warm_up_frames).rev() {
             let time = (sample.time - frame as f64 / scene.rate).max(0.0);
-            // The paper's solver is ahead of the truth, so it locks a little earlier. That sample is left out.
+            // The paper's solver is ahead of the truth, so it locks a little earlier. All samples from there on are
+            // left out.
             if candidate.solver.solve(time, &mut chain).is_err() {
                 return worst;
             }

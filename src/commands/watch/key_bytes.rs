@@ -12,8 +12,8 @@ pub enum Key {
     Right,
 }
 
-/// Returns the keys of these bytes, and the number of bytes they take; the rest is the beginning of another key. If no
-/// more bytes belong to them, an Escape without a whole sequence behind it is a key.
+/// Returns the keys of these bytes, and the number of bytes they take; the rest is the beginning of another key. With
+/// `is_over` no more bytes follow: an Escape without a whole sequence is skipped, and the bytes after it are keys.
 pub fn keys_of(bytes: &[u8], is_over: bool) -> (Vec<Key>, usize) {
     const ESCAPE: u8 = 0x1b;
     let (mut keys, mut at) = (Vec::new(), 0);

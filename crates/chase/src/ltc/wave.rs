@@ -82,7 +82,7 @@ impl Format {
         is_valid.then_some(Self { sample_rate, block_bytes, sample_bytes, is_float: kind == FLOAT })
     }
 
-    /// Returns the first channel's sample of a block, -1 to 1.
+    /// Returns the first channel's sample of a block: -1 to 1, or -4 to 4 for floats.
     pub fn sample(&self, block: &[u8]) -> f32 {
         let sample = block.get(..self.sample_bytes).unwrap_or_default();
         match *sample {

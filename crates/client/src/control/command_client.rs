@@ -1,7 +1,7 @@
 //! Commands sent by a separate thread, so that the caller never waits for an answer or for a publisher that hangs.
 //!
 //! In: an [`Action`] with a tag. Out: the tag and the result, passed to a function on that thread. Called by `watch`
-//! for its keys, by the stage picture's server for its browsers and by the ROS 2 services.
+//! for its keys, by the stage picture's server for its browsers, by the ROS 2 services and by the chase.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -19,8 +19,8 @@ use bench_dragon_messages::state::PlaybackState;
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
 /// Time without a command after which the service is closed, so that another publisher can create it again.
 const IDLE: Duration = Duration::from_secs(1);
-/// Commands that may be pending at once, and holds besides: the service admits 8 of a client, and one requests the
-/// state during a step.
+/// The most pending commands, and the most pending holds besides them. The service admits 8 requests of one client, one
+/// of which requests the state during a step.
 const MOST_PENDING: usize = 4;
 const MOST_HOLDS: usize = 3;
 /// Commands that may be unanswered, sent or not.

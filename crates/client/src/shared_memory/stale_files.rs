@@ -5,10 +5,10 @@
 //! - in shared memory: it waits without end for the file to be finished, and so does the program that created the node;
 //! - among the services: every later attempt to open that service fails.
 //!
-//! A program that creates a node calls [`remove_unfinished_files`] before, and [`spawn_reaper`] on a thread that is not
-//! real-time. The mode of a file shows that it is unfinished: its creator sets the mode last. A file that is still
-//! being created is left alone. On a busy disk this takes seconds, since iceoryx2 syncs the files of nodes and
-//! services.
+//! A node is created after a call of [`remove_unfinished_files`]. Publishers of frames and subscribers also call
+//! [`spawn_reaper`], on a thread that is not real-time. The mode of a file shows that it is unfinished: its
+//! creator sets the mode last. A file that is still being created is left alone. On a busy disk this takes seconds,
+//! since iceoryx2 syncs the files of nodes and services.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

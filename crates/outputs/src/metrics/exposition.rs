@@ -41,7 +41,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Returns the format that a request prefers by its header `Accept`.
+    /// Returns OpenMetrics if the header `Accept` names OpenMetrics, whatever the weights; otherwise Prometheus.
     pub fn accepted(accept: &str) -> Self {
         if accept.contains("application/openmetrics-text") { Self::OpenMetrics } else { Self::Prometheus }
     }

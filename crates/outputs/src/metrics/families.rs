@@ -263,7 +263,7 @@ impl Families<'_> {
                 "bench_dragon_clearance_meters",
                 Kind::Gauge,
                 Some("meters"),
-                "Distance of the nearest two boards that share no handle, negative if they overlap.",
+                "Least clearance of boards that share no handle, and of boards and obstacles; negative in an overlap.",
                 header.min_clearance,
             ));
         }

@@ -19,8 +19,9 @@ function textOf(address) {
 }
 
 /**
- * Parses the address: each word with its value, `true` without a value, numbers as numbers, a place as three numbers;
- * and `unknown`, all unknown words. Commas or & separate words; numbers after a comma belong to the word before.
+ * Parses the address: each word with its value, and `unknown`, all unknown words. A value is a list of numbers, even of
+ * one number, or a language; it is `true` for a word without a value. Commas or & separate words; numbers after a comma
+ * belong to the word before.
  */
 export function wordsOf(hash) {
   const said = { unknown: [] };

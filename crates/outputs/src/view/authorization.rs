@@ -140,7 +140,7 @@ impl<'a> Visitor<'a> {
 
     fn pass_on(&mut self, authorization: &Authorization, id: Value, action: Action) -> Option<String> {
         let too_many = "too many commands are waiting";
-        // A hold is always accepted: one more than all others.
+        // A hold has one place more than the other commands.
         let most = if action == Action::Send(Command::Hold) { MOST_UNANSWERED + 1 } else { MOST_UNANSWERED };
         if self.unanswered >= most {
             return Some(refused(&id, too_many));
@@ -189,7 +189,7 @@ fn action(name: &str, value: Option<f64>) -> Result<Action, String> {
     }
 }
 
-/// Returns the response to a command that never reaches the publisher.
+/// Returns the response to a command that the publisher has not answered.
 fn refused(id: &Value, sentence: &str) -> String {
     json!({"type": "answer", "id": id, "code": null, "sentence": sentence}).to_string()
 }

@@ -22,7 +22,6 @@ export class Curve {
     svg.setAttribute("preserveAspectRatio", "none");
     svg.append(this.line);
     [this.now, this.least, this.text] = ["i", "b", "span"].map((tag) => document.createElement(tag));
-    // Head room for the sign of the least place, whose middle may be at an edge.
     element.replaceChildren(svg, this.now, this.least, this.text);
   }
 

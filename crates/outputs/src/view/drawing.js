@@ -433,7 +433,7 @@ function benches(context, camera, palette, { stage, places, colours }) {
   context.fill();
 }
 
-/** A sign on a board: light on dark, so that one of the two is visible on every colour. */
+/** A sign on a board: a line with a rim. One is light and one dark, so that one is visible on every colour. */
 function onBoard(context, palette, width, pixel) {
   context.strokeStyle = palette.near;
   context.lineWidth = width + 3 * pixel;

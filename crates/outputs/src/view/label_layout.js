@@ -118,7 +118,7 @@ export function layout({ boards, items, rings, marked, keep, width, height, unit
         : [{ share: 0, x: item.x, y: item.y }];
     const foreign = own ? rings : rings.filter(({ x, y }) => Math.hypot(x - item.x, y - item.y) > 1);
     let best = null;
-    // With `relaxed`, signs and lines may meet rings.
+    // With `relaxed`, boxes and lines may meet rings, and lines to events may cross outlined boards.
     const attempt = (end, angle, far, relaxed) => {
       const c = Math.cos(angle), s = Math.sin(angle), { half, tall } = item;
       const box = { x: end.x + c * (far * unit + half * Math.abs(c)), y: end.y + s * (far * unit + tall * Math.abs(s)),

@@ -41,7 +41,7 @@ function union([x, y, width, height], [ox, oy, wide, high]) {
 }
 
 export class Lanterns {
-  /** `ambient` is the light besides the lanterns', in red, green and blue; a `transparent` picture has no ground. */
+  /** `moon` and `day` select a light besides the lanterns'; a `transparent` picture has no ground. */
   constructor({ transparent, moon, day }) {
     this.transparent = transparent;
     this.ambient = day ? DAY : moon ? MOON.map((one) => one / 2) : null;

@@ -1,4 +1,5 @@
-// The lock of the show look: no pointer, wheel, touch or menu acts on the page. A held Shift+L shows that it is locked.
+// The lock of the show look: the page cancels the browser's own actions on menu, wheel, touch, drag and selection. With
+// #hands the camera still moves by pointer and keys. A held Shift+L shows that the page is locked.
 
 /** The time for which Shift+L is held, and the time for which the tag is shown (ms). */
 const HELD = 1000, SHOWN = 3000;

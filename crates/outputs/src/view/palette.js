@@ -114,12 +114,6 @@ class MeanSpeeds {
   }
 }
 
-/**
- * The scale of the colours for a run: from rest to twice the head's speed, by the difference from that speed. It is
- * logarithmic because most shows have differences of a thousandth for minutes and of a half for seconds. The scale is
- * only widened, so that a colour keeps its meaning within a run. A bench has the colour of its mean speed over one link
- * passage. The scale keeps the speeds of the last moving frame. The crate `drawing` has the same scale.
- */
 /** Returns a power of two that no speed of the handles exceeds, and that rounding of the speeds hardly changes. */
 function boundOf(handles) {
   let most = 0;
@@ -127,6 +121,12 @@ function boundOf(handles) {
   return 2 ** (Math.round(Math.log2(most)) + 1);
 }
 
+/**
+ * The scale of the colours for a run: from rest to twice the head's speed, by the difference from that speed. It is
+ * logarithmic because most shows have differences of a thousandth for minutes and of a half for seconds. The scale is
+ * only widened, so that a colour keeps its meaning within a run. A bench has the colour of its mean speed over one link
+ * passage. The scale keeps the speeds of the last moving frame. The crate `drawing` has the same scale.
+ */
 export class SpeedScale {
   constructor() {
     this.clear();

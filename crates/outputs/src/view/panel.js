@@ -14,14 +14,14 @@ export function put(id, text) {
   if (element(id).textContent !== text) element(id).textContent = text;
 }
 
-/** The last spoken state and countdown mark of each dragon that the header has shown. */
+/** The last spoken state and countdown mark of each publisher that the header has shown. */
 const spokenOf = new Map();
 
 /**
  * The state, the sentence and the countdown of a situation. `trouble` is the reason why nothing comes, or null, and
- * `silent` the seconds without a frame, or null. `stale` is true if the whole picture is stale. `of` is the dragon of
- * the situation, or null for a single dragon. `seconds` are the seconds until the event `ahead` (NaN without a
- * countdown). `stands` is true if the show stands still, and `now` is the present state in words.
+ * `silent` the seconds without a frame, or null. `stale` is true if the whole picture is stale. `of` is the name of
+ * the publisher of the situation, or null for a single publisher. `seconds` are the seconds until the event `ahead`
+ * (NaN without a countdown). `stands` is true if the show stands still, and `now` is the present state in words.
  */
 export function showSituation({ state, alert, trouble, silent, stale, of, seconds, ahead, stands, stage, now }) {
   const { dataset } = document.body, calm = state.severity === "ok" && !state.happened;
@@ -44,7 +44,7 @@ export function showSituation({ state, alert, trouble, silent, stale, of, second
   last.state = trouble ? null : state.name;
 }
 
-/** The last spoken transport state of each dragon that the header has shown. */
+/** The last spoken transport state of each publisher that the header has shown. */
 const spokenTransport = new Map();
 
 /**
@@ -66,8 +66,8 @@ export function showTransport(transport, { now, of, keys }) {
 }
 
 /**
- * Shows the countdown, and speaks it at its marks while the show plays. `last` has this dragon's last spoken words,
- * `own` adds its name to words.
+ * Shows the countdown, and speaks it at its marks while the show plays. `last` has this publisher's last spoken words,
+ * `own` adds the publisher's name to words.
  */
 function countdown({ state, seconds, ahead, stands }, last, own) {
   const counting = seconds > -1, near = counting && (state.severity !== "ok" || seconds < 10);
@@ -92,7 +92,7 @@ function countdown({ state, seconds, ahead, stands }, last, own) {
 /** The time without a status after which a chase counts as dead (ms). A chase sends five statuses a second. */
 const CHASE_SILENCE = 2000;
 
-/** The chase of the dragon of the header, as long as one runs; `of` is its name, or null for a single dragon. */
+/** The chase of the publisher of the header, while one runs; `of` is its name, or null for a single publisher. */
 export function showChase(chase, now, of) {
   const { dataset } = document.body, runs = Boolean(chase) && chase.state !== "ended",
       hasDied = runs && now - chase.at > CHASE_SILENCE;

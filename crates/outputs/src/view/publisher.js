@@ -101,8 +101,8 @@ export class Publisher {
   }
 
   /**
-   * Updates the situation and the dragons. Returns true for another scene, for which earlier choices do not fit.
-   * `struck` is then true if something has just happened.
+   * Updates the situation and the dragons, and sets `struck`: true if something has just happened. Returns true for
+   * another scene, for which earlier choices do not fit.
    */
   update(now) {
     const before = this.state, { playback } = this.stream, { newest, stage } = this;

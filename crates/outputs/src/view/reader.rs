@@ -120,7 +120,6 @@ impl<'a> Reader<'a> {
                 (self.stage, self.proved, self.status, self.unknown) = (None, None, None, None);
                 return true;
             }
-            // The page itself counts the time since the latest frame.
             FeedEvent::Status(status) => {
                 if self.status.replace(*status).is_some_and(|known| known.run_id == status.run_id) {
                     return false;
@@ -139,6 +138,7 @@ impl<'a> Reader<'a> {
                 self.picture.chase = wire::chase(status).into();
                 return true;
             }
+            // The page itself counts the time since the latest frame, so a silent publisher changes no picture.
             FeedEvent::Silent | FeedEvent::Started { .. } => return false,
         }
         self.picture.waiting = Default::default();

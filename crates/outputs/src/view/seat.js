@@ -21,7 +21,10 @@ const HEIGHT = 4.4, DISTANCE = 1.9, LEAST_DISTANCE = 19;
 const OUTGROWN = 1.25, LEAST_FILLED = 0.5;
 /** A board's thickness, m; the lanterns of a board, as shares of half its length. */
 const THICK = 0.06, ON_BODY = [-0.41, 0, 0.41], ON_HEAD = [-0.7, -0.44, -0.18];
-/** Pixels a metre from which lanterns, dancers, boards and reflections are drawn; below they are dots and bars. */
+/**
+ * Pixels a metre from which lanterns, dancers, bars in place of dancers, boards and reflections are drawn. Smaller
+ * lanterns are rectangles; smaller bars, boards and reflections are left out.
+ */
 const LANTERNS_FROM = 10, DANCERS_FROM = 14, BARS_FROM = 7, BOARDS_FROM = 9, WET_FROM = 20;
 /** Steps a second of a dancer, and the distance beside the handle, m. */
 const STEPS = 1.45, BESIDE = 0.2;

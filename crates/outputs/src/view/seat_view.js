@@ -15,7 +15,7 @@ const DISTANCE = [2, 5000], HEIGHT = [0.3, 1000];
 
 const within = ([least, most], one) => Math.min(most, Math.max(least, one));
 
-/** Returns a seat that an eye can have: turns around the stage, from the south, to the left; distance and height, m. */
+/** Returns a seat that an eye can have: turns counter-clockwise from the stage's south; distance and height, m. */
 export function seatOf({ turns, distance, height }) {
   return { turns, distance: within(DISTANCE, distance), height: within(HEIGHT, height) };
 }
@@ -61,7 +61,7 @@ export class SeatView {
     return depth > 0 ? { away, depth } : null;
   }
 
-  /** Returns a circle of light on the floor as seen from the eye: wide as it is, and flat. */
+  /** Returns the ratio of height to width of a circle on the floor, as seen from the eye. */
   flat({ depth }) {
     return Math.min(1, this.eye.z / depth);
   }

@@ -1,5 +1,5 @@
-// The state of one dragon in the show look: the lanterns that burn white, the lit lanterns, the trail, the flash of a
-// contact. In: the pose, the situation. Draws nothing: lanterns.js does.
+// The state of one dragon in the show look: the lanterns that burn white, the lit lanterns, the trail, the flash. A
+// contact, an obstacle, a stall and a lock flash. In: the pose, the situation. Out: figures for lanterns.js, seat.js.
 
 import { STRIDE } from "./hermite.js";
 

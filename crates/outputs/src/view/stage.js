@@ -29,7 +29,7 @@ import { capital, say, setLanguage, translate } from "./words.js";
 
 /** The interval at which figures are updated, ms: short enough, and readable. */
 const FIGURES_INTERVAL = 100;
-/** The seconds by which the countdown of another dragon must end earlier for the header to change to that dragon. */
+/** The seconds by which another publisher's countdown must end earlier for the header to change to that publisher. */
 const HEADER_LEAD = 1;
 /** The part of a pixel by which a plan may be behind the show. */
 const PART = 1 / 16;
@@ -109,7 +109,7 @@ function fitCanvas() {
 /** The publisher of the header. */
 let header = publishers[0];
 /**
- * The most urgent publisher that is present: by the gravest past event, then by the soonest coming event. The header
+ * The most urgent publisher that is present: by the severity of its state, then by the soonest coming event. The header
  * keeps its publisher if another countdown is nearly equal, since the header is read aloud.
  */
 function foremost() {

@@ -6,7 +6,7 @@ import { blank, hash } from "./sprites.js";
 
 /** The side of the paving, which repeats, and the depths between which the paving fades, m. */
 const PAVING = 9.6, FADING = [14, 44];
-/** Houses of the ring, and the village's scale at its usual distance, m. */
+/** The number of houses of the ring, and the distance at which the village has its true scale, m. */
 const HOUSES = 34, USUAL = 38;
 
 const mod = (one, by) => ((one % by) + by) % by;

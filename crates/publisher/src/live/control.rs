@@ -103,7 +103,7 @@ impl CommandQueues {
             let queue = (self.next + turn) % self.ports.len();
             let Ok(Request { ticket, command }) = self.ports[queue].requests.pop() else { continue };
             self.next = queue + 1;
-            // A step before this command has ended by now and is answered first.
+            // A step that has ended by now is answered before this command.
             self.finish_step(source, tick);
             match source.command(tick, command) {
                 Some(outcome) => {

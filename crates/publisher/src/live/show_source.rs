@@ -19,9 +19,10 @@ pub struct FrameMessages {
 }
 
 impl FrameMessages {
-    /// Reserves memory for the alerts of a frame and for the cues of a scene with `cues` of them.
-    pub fn new(cues: usize) -> Self {
-        let alerts = Vec::with_capacity(MOST_PER_FRAME);
+    /// Reserves memory for the alerts and the cues of a frame of a scene with `events` events and `cues` cues.
+    pub fn new(events: usize, cues: usize) -> Self {
+        // With several dragons one frame can announce all events.
+        let alerts = Vec::with_capacity(MOST_PER_FRAME.max(events));
         // One frame can reach each cue twice.
         Self { header: FrameHeader::default(), alerts, cues: Vec::with_capacity(2 * cues) }
     }
@@ -48,7 +49,7 @@ pub struct ShowSource {
 impl ShowSource {
     /// Reserves the memory for a show's messages.
     pub fn new(show: Show) -> Self {
-        let messages = FrameMessages::new(show.cues().len());
+        let messages = FrameMessages::new(show.timeline().events().len(), show.cues().len());
         Self { show, messages }
     }
 

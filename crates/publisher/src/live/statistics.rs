@@ -1,8 +1,8 @@
 //! Statistics of the loop: percentiles of lateness and step cost, the status once a second, the summary at the end.
 //!
-//! In: samples and alerts from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts to the terminal, a
-//! [`Summary`]. Runs on its own thread, so that the loop's thread computes no percentile, reads no file and prints no
-//! line. [`accumulator`] does the arithmetic.
+//! In: samples, alerts and cues from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts and cues to the
+//! caller, a [`Summary`]. Runs on its own thread, so that the loop's thread computes no percentile, reads no file and
+//! prints no line. [`accumulator`] does the arithmetic.
 
 pub mod accumulator;
 #[cfg(test)]
@@ -87,7 +87,8 @@ pub struct Run<'a> {
     pub announce: Box<dyn FnMut(&Announcement) + 'a>,
     /// Called with each sample.
     pub record: Box<dyn FnMut(&Sample) + 'a>,
-    /// Called where the loop has turned since the last call: also between two frames, about ten times a second.
+    /// Called if the loop has turned since the last poll of the queues: 10 to 50 times a second, also between two
+    /// frames.
     pub alive: Box<dyn FnMut() + 'a>,
 }
 
@@ -140,7 +141,7 @@ impl<'a> Collector<'a> {
 pub fn collect<C: Clock>(clock: &C, inbox: Inbox, run: Run, done: &AtomicBool) -> Summary {
     let mut collector = Collector::new(inbox, run, clock.monotonic_ns());
     loop {
-        // Read before the queues are emptied, so that everything pushed before it was set is collected.
+        // `done` is read before the queues are emptied: everything pushed before `done` was set is collected.
         let ending = done.load(Ordering::Acquire);
         collector.take();
         let now_ns = clock.monotonic_ns();

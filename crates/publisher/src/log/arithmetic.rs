@@ -14,7 +14,7 @@ const ELEMENTARY_FUNCTIONS: &str = "libm 0.2.16";
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Arithmetic {
-    /// The processor's architecture, for people: `x86_64`.
+    /// The processor's architecture: `x86_64`. Another architecture counts as another arithmetic.
     pub architecture: String,
     /// The name of the instructions that read the tables ([`Instructions::name`]); with several dragons the name for
     /// each, separated by commas.

@@ -140,7 +140,7 @@ fn a_log_that_was_cut_proves_what_it_holds() {
 
 #[test]
 fn frames_that_the_log_lost_are_named_and_the_others_proved() {
-    // Ten frames fit; the thread sleeps over thirty, and again over a command.
+    // Nine frames fit. The thread sleeps over thirty frames, and again over commands.
     let held_up: fn(u64) -> bool = |tick| (20..50).contains(&tick) || (60..80).contains(&tick);
     let commands = vec![Command::Seek(20.0); 70];
     let run = Setup { held_up, words: 750, commands, ..Setup::new(120) }.run();
@@ -160,7 +160,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
     for tick in 0..40 {
-        // In some periods more is to be recorded than there is room for, though there is room for some of it.
+        // Three commands come in each period. The records of the first of these periods fit exactly.
         if tick >= 10 {
             for _ in 0..3 {
                 let _ = show.command(tick, Command::State);

@@ -1,9 +1,9 @@
 //! `verify`: replays the show of a log, tick by tick, and compares.
 //!
 //! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The code of `run` computes the
-//! show, with the instructions that the log names. If this machine lacks those, or its elementary functions round
-//! differently, different bits prove nothing. Then the handles in the line of each second are compared with those of a
-//! second solver, `newton`.
+//! show, with the instructions that the log names. If this machine lacks these instructions, or has another
+//! architecture or other elementary functions, different bits prove nothing. Then, for each second with other bits, the
+//! handles in its line are compared with those of a second solver ([`reference`]).
 
 mod player;
 pub mod reference;

@@ -1,8 +1,10 @@
-//! iceoryx2: frames, alerts, status and stage in shared memory, for any number of processes on this machine.
+//! iceoryx2: frames, alerts, cues, status, stage and scene in shared memory, for any number of processes on this
+//! machine.
 //!
 //! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made
-//! there, since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/alerts`,
-//! `/status`, `/stage`, `/scene`, the event service `<name>/tick` and, if a scene requests it, `<name>/poses32`.
+//! there, since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/status`,
+//! `/stage`, `/scene`, and the event service `<name>/tick`. If a scene requests them, there are also `/alerts`, `/cues`
+//! and `/poses32`.
 //!
 //! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first. The
 //! library iceoryx2 detects by a lock of the operating system whether the server's process lives. So a killed process
@@ -44,8 +46,8 @@ use frames::{FrameSender, FrameService};
 use held_slice::HeldSlice;
 use queues::{check_room, default_queue};
 
-/// The interval at which the stage, the latest alert and the latest cue are retransmitted to a tunnel. A tunnel keeps
-/// no history for machines that join later.
+/// The interval at which the stage, the scene, the latest alert and the latest cue are retransmitted to a tunnel. A
+/// tunnel keeps no history for machines that join later.
 const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 /// The nodes that may have a service open besides one for each subscriber: the publisher's, and dead nodes that are not
 /// removed yet.
@@ -97,7 +99,7 @@ struct Iceoryx2 {
 /// Creates the transport, for every scene, and starts the thread that removes [`stale_files`]. Opens no service yet.
 ///
 /// # Errors
-/// [`TransportError::BadInput`] for a name that iceoryx2 cannot take.
+/// [`TransportError::IllegalName`] for a name that iceoryx2 cannot take.
 pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
     let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, scene, stage } = *config;
     service_name(name, "poses")?;
@@ -152,7 +154,7 @@ type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
 /// A port, and its service.
 type Opened<Message> = (Sender<Message, ()>, Service<Message, ()>);
 
-/// Publishes frames, alerts and the stage.
+/// Publishes frames, alerts, cues, the stage and the scene.
 pub struct SharedMemoryPublisher {
     poses: FrameSender<HandlePose>,
     poses_32: Option<(FrameSender<HandlePose32>, Decimation)>,
@@ -167,8 +169,8 @@ pub struct SharedMemoryPublisher {
 }
 
 impl SharedMemoryPublisher {
-    /// Opens the services and sends the stage. Must be called on the thread that publishes. The caller ensures that no
-    /// other show has the name: a run calls [`Transport::control`] first.
+    /// Opens the services and sends the stage and the scene. Must be called on the thread that publishes. The caller
+    /// ensures that no other show has the name: a run calls [`Transport::control`] first.
     ///
     /// # Errors
     /// [`OpenError`]: each names the cause and the remedy.
@@ -341,7 +343,7 @@ impl StatusPublisher for StatusSender {
     }
 }
 
-/// Opens a service of event-driven messages, and a port to it. The last message is kept for late subscribers.
+/// Opens a service of single messages, and a port to it. The last message is kept for late subscribers.
 fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
     node: &Node<ipc::Service>,
     name: &str,

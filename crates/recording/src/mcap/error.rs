@@ -54,15 +54,15 @@ pub enum ReadError {
     /// There are no frames.
     #[error("it has no frames")]
     NoFrames,
-    /// A chunk or a message cannot be read.
+    /// The index, a chunk, an attachment or a message cannot be read.
     #[error("it is damaged at byte {at} ({}): mend it with bench-dragon record --recover", printable(.reason))]
     Damaged {
-        /// The start of the chunk, in bytes.
+        /// The start of the chunk, of the attachment or of the footer, in bytes.
         at: u64,
         /// The problem.
         reason: String,
     },
-    /// A frame can be read but not played.
+    /// A frame cannot be read, or cannot be played.
     #[error("it has a frame {0}")]
     Frame(String),
     /// A directory is no bag.

@@ -140,7 +140,7 @@ impl McapFile {
         Ok(Self { writer, disk, channels, limit, pending, chunk_began, chunks: 0, end_bytes, synced })
     }
 
-    /// Returns true if the messages fit into the file's limit. Everything fits into an empty file.
+    /// Returns true if the messages fit into the file's limit. An empty file can be too small as well.
     ///
     /// # Errors
     /// A failed write.

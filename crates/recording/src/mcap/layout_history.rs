@@ -1,11 +1,12 @@
-//! The layouts of earlier versions, found by the fields of a recording's types: a recording names no version.
+//! The layouts of earlier versions, found by the fields of a recording's types: a bag of `ros2 bag record` names no
+//! version of this program.
 //!
 //! In: the type of a topic, as a recording describes it. Out: the name of its layout. Called by the
 //! [`reader`](super::reader), for the sentence that refuses a recording.
 
 use bench_dragon_ros2_messages::settings::Topic;
 
-/// The layouts of a topic's message, the newest first. Each has a field that the layout before it has not.
+/// The layouts of a topic's message, the newest first. Each layout has a field that older layouts do not have.
 const fn history(topic: Topic) -> &'static [(&'static str, &'static str)] {
     match topic {
         Topic::Stage => &[

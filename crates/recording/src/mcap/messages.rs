@@ -102,8 +102,8 @@ impl Messages {
         self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
     }
 
-    /// Fills the messages of a status, with the current stage and alert. The diagnostics compare it with the status
-    /// `before`, by the default limits: the limits of the scene are in no message.
+    /// Fills the messages of a status, with the current stage and alert. The diagnostics compare the status with the
+    /// status `before`, by the default limits: the limits in the text of the scene are not read here.
     pub fn status(
         &mut self,
         sequence: u32,

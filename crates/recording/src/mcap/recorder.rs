@@ -31,7 +31,7 @@ const MOST_EARLY: usize = 256;
 /// The condition for the next file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Split {
-    /// The most bytes of a file, unless one frame has more.
+    /// The most bytes of a file, unless one frame, or the messages before the first frame, have more.
     Bytes(u64),
     /// The nanoseconds of a file, by the publisher's monotonic clock.
     Nanoseconds(u64),
@@ -141,7 +141,9 @@ impl Recorder {
             _ => self.begin(frame)?,
         }
         self.fill_frame(frame, handles);
-        if !self.has_room()? {
+        // A file without frames cannot be played.
+        let is_first = self.run.as_ref().is_some_and(|run| run.file_began_ns == frame.deadline_ns);
+        if !is_first && !self.has_room()? {
             self.next_file(frame)?;
             self.fill_frame(frame, handles);
         }
@@ -396,4 +398,33 @@ fn numbered(path: &Path, number: u64) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let extension = path.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
     path.with_file_name(format!("{stem}-{number}{extension}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_has_a_frame_though_a_frame_is_larger_than_the_limit() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("show.mcap");
+        let split = Some(Split::Bytes(1000));
+        let config =
+            RecorderConfig { name: "show".to_owned(), file, replace: false, topics: vec![Topic::Handles], split };
+        let mut recorder = Recorder::new(config).unwrap();
+        let handles = vec![HandlePose::default(); 224];
+        for sequence in 0..3 {
+            let deadline_ns = 1_000_000 * (1 + sequence);
+            let frame = FrameHeader { run_id: 1, sequence, deadline_ns, handles: 224, ..FrameHeader::default() };
+            recorder.frame(&frame, &handles, 0).unwrap();
+        }
+        recorder.finish().unwrap();
+        let Recorded { files, counts } = recorder.recorded();
+        let frames_of = |file: &PathBuf| {
+            let bytes = std::fs::read(file).unwrap();
+            mcap::MessageStream::new(&bytes).unwrap().count()
+        };
+        assert_eq!(files.iter().map(frames_of).collect::<Vec<_>>(), [1, 1, 1]);
+        assert_eq!(counts.frames, 3);
+    }
 }

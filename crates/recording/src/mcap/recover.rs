@@ -1,8 +1,9 @@
 //! Repairs a recording that was cut by a kill, a full disk or a loss of power, or has damaged bytes.
 //!
-//! In: the bytes of the file. Out: a complete file with exactly the messages of the finished chunks, in order. Records
-//! are read one after another. Behind a damaged length the next record is the next chunk or attachment whose own
-//! lengths and check agree: the repair needs no readable summary. Called by the command `record --recover`.
+//! In: the bytes of the file. Out: a complete file with the messages of the finished chunks, in order, the attachments
+//! and the metadata. A file without chunks keeps its messages. Records are read one after another. Behind a damaged
+//! length the next record is the next chunk or attachment whose own lengths and check agree: the repair needs no
+//! readable summary. Called by the command `record --recover`.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -313,7 +314,8 @@ struct Known {
 }
 
 impl<Output: Write> Mender<Output> {
-    /// Keeps a chunk or an attachment after records of unknown length, of which the last may not have been a message.
+    /// Keeps a chunk or an attachment that a search has found. Drops the held message: that record may have been no
+    /// message, since the bytes behind it were damaged.
     fn keep_found(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
         self.held = None;
         self.keep(opcode, body).map(drop)

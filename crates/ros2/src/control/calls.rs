@@ -118,7 +118,8 @@ impl ServiceAdapter {
     }
 }
 
-/// Returns the response to a call that is not passed on. Returns `None` if the response type cannot express a refusal.
+/// Returns the response to a call that the show has not answered. Returns `None` if the response type cannot express a
+/// refusal.
 pub fn refusal(call: Call, sentence: &str) -> Option<Response> {
     Some(match call {
         Call::GetFeatures => features(),

@@ -155,8 +155,9 @@ pub(super) struct Client {
 }
 
 impl ServiceEndpoint {
-    /// Sends a response to these readers, or to all if there are none. Returns false if RustDDS refuses it, as it does
-    /// after many answers until each new client has acknowledged one: then call this again.
+    /// Sends a response to these readers, or to all readers if the list is empty. Returns false if RustDDS refuses the
+    /// response: then call this function again. After many answers RustDDS refuses until each new client has
+    /// acknowledged one answer.
     pub(super) fn answer(&mut self, client: &Client, readers: &[GUID], response: &Response) -> bool {
         let mut bytes = client.header.clone();
         // The header's 16 bytes do not change the alignment.

@@ -1,8 +1,8 @@
 //! The check of responses against the table of commands: the codes and states that the responses so far allow.
 //!
-//! The check knows no times, except the times that follow from the scene: the [`record`](super::record) compares times
-//! with frames. A step or a cue may change the state between two responses. Every possible state is kept, and each
-//! response removes the states that would have answered otherwise.
+//! The check uses the times of the scene and of the responses. The [`record`](super::record) compares times with
+//! frames. A step or a cue may change the state between two responses. Every possible state is kept, and each response
+//! removes the states that would have answered otherwise.
 //!
 //! The tests' model of a show (`crates/testing/src/model.rs`) cannot check a soak: it needs the period of each command,
 //! which no client knows.

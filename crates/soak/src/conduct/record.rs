@@ -87,7 +87,7 @@ impl Record {
         self.frames.push_back(*header);
     }
 
-    /// Counts frames that contradict the commands.
+    /// Counts a frame or a stage that contradicts the commands or the scene.
     pub fn contradict(&mut self, fault: String) {
         self.conducted.contradicted += 1;
         self.fault(fault);
@@ -103,7 +103,8 @@ impl Record {
             && !self.jumps_at.contains(&frame.tick)
     }
 
-    /// Returns the fault of a frame that passes a cue which pauses, or begins the show again at another time than 0.
+    /// Returns the fault of a frame that passes a cue which pauses. Also returns the fault of an end, or of a new
+    /// beginning, at a wrong time.
     fn fault_of_frame(&self, before: &FrameHeader, frame: &FrameHeader) -> Option<&'static str> {
         let ShowFacts { end, cues } = self.facts.as_ref()?;
         let passed = cues.get(before.cue as usize..cues.len().min(frame.cue as usize)).unwrap_or_default();

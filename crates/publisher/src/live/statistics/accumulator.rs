@@ -107,8 +107,8 @@ impl Durations {
     }
 
     /// Records a sample. A late wake-up counts for each period that it covers, with the lateness that remains there:
-    /// HdrHistogram's correction for coordinated omission. A very late one has neighbouring periods share an entry, so
-    /// that a stop of an hour costs little time here.
+    /// HdrHistogram's correction for coordinated omission. In a very late wake-up, neighbouring periods share an
+    /// entry, so that a stop of an hour costs little time here.
     pub fn record(&mut self, sample: &Sample, period_ns: u64) {
         let values = (sample.lateness_ns / period_ns).max(1);
         let stride = values.div_ceil(MOST_ENTRIES);

@@ -88,7 +88,7 @@ impl std::io::Write for SharedFile {
     }
 }
 
-/// The log's publisher with the thread's work done by the loop, after each frame but while it is to be held up.
+/// The log's publisher. The loop does the work of the log's thread after each frame, except while `held_up` is true.
 pub struct Inline {
     publisher: LogPublisher,
     reader: LogReader,
@@ -232,7 +232,7 @@ pub fn verified(log: &[u8]) -> Result<Verdict, VerifyError> {
     verify(log, "test.jsonl", &mut |_| ())
 }
 
-/// Three seconds with a command, a step and skipped periods in each.
+/// Three seconds: commands and a step in the first, skipped periods in the second.
 pub fn conducted() -> Run {
     let commands = vec![Command::Seek(20.0), Command::Pause, Command::Step(3), Command::Resume, Command::State];
     let mut wakes = vec![Wake::Late(0); 400];

@@ -337,8 +337,8 @@ mod tests {
     use bench_dragon_motion::solve::{Chain, Velocities};
     use bench_dragon_show::solve_at_or_just_before;
 
-    /// Handles of a head that another arithmetic has rounded to the next place, up to the lock, where they run away
-    /// from every rounding.
+    /// The handles of a head that another arithmetic has rounded. They are within the tolerance up to the lock, where
+    /// rounding errors grow without bound.
     #[test]
     fn handles_of_another_rounding_are_close_up_to_the_lock() {
         let text = include_str!("../../../../../config/paper.toml").replace("accuracy = ", "# ");

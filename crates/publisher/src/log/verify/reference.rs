@@ -17,7 +17,7 @@ use bench_dragon_show::solve_at_or_just_before;
 /// Seconds by which two arithmetics may differ in the times of events, at which a show ends or pauses.
 const EVENT_TIME: f64 = 1e-9;
 /// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without
-/// bound at a lock. Near a lock it is about sqrt(eps), 1e6 times eps.
+/// bound at a lock. Near a lock the error itself is about sqrt(eps).
 const MOST_GROWTH: f64 = 1e6;
 
 /// The error of an angle in (-pi, pi] from arctangents and sums, radians.

@@ -12,7 +12,7 @@ use bench_dragon_messages::{ChaseStatus, ControlRequest, ControlResponse};
 
 use super::{SMALL_QUEUE, SPARE_NODES, Sender, sender};
 
-/// Subscribers of the status, as of any publisher's messages.
+/// Subscribers that the service of the status admits. The scene's `publish.subscribers` has no effect on this number.
 const MOST_SUBSCRIBERS: usize = 64;
 
 /// The reason why a chase cannot begin.

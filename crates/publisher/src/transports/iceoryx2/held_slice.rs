@@ -1,4 +1,5 @@
-//! A service of one message with a list: `<name>/stage` and `<name>/scene`, sent once and kept for late subscribers.
+//! A service of one message with a list: `<name>/stage` and `<name>/scene`. The message is sent at the beginning and
+//! kept for late subscribers. While there is a tunnel, the message is sent again once a second.
 //!
 //! In: a header and the elements. Out: one sample. Called by [`SharedMemoryPublisher`](super::SharedMemoryPublisher),
 //! on the loop's thread.

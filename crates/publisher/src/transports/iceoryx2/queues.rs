@@ -5,7 +5,8 @@ use bench_dragon_messages::{FrameHeader, HandlePose, HandlePose32, QUEUE_BYTES, 
 
 use super::{PublisherConfig, held_slice};
 
-/// Returns the default number of frames that a subscriber may fall behind: at most 64 MB for all subscribers together.
+/// Returns the default number of frames that a subscriber may fall behind: 2 to 64. More than 2 frames take at most
+/// 64 MB for all subscribers together.
 pub(super) fn default_queue(config: &PublisherConfig) -> usize {
     (QUEUE_BYTES / frame_bytes(config) / config.subscribers).clamp(2, 64)
 }

@@ -1,4 +1,4 @@
-//! Cases that the service tests over the wire cannot cause: commands of other queues between those of a call.
+//! Cases that the service tests over the wire cannot cause: commands of other clients between those of a call.
 
 use super::*;
 
@@ -44,7 +44,7 @@ fn stopped_is_where_a_reset_has_left_a_paused_show_and_nowhere_else() {
     assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 50.0), state::PAUSED);
     adapter.proceed(Call::Reset(0), Command::Restart, &outcome(Code::Done, PlaybackState::Paused, 50.0));
     assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 50.0), state::STOPPED);
-    // Another queue has moved the show, plays it or holds it, or the show is at its end.
+    // Another client has moved the show, plays it or holds it, or the show is at its end.
     assert_eq!(state_at(&mut adapter, PlaybackState::Paused, 60.0), state::PAUSED);
     assert_eq!(state_at(&mut adapter, PlaybackState::Playing, 50.0), state::PLAYING);
     assert_eq!(state_at(&mut adapter, PlaybackState::Held, 50.0), state::PAUSED);

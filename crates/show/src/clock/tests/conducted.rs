@@ -139,7 +139,8 @@ proptest! {
         }
     }
 
-    /// The time of a show, however long it has run, follows from the present stretch: nothing adds up.
+    /// The time of a show, however long it has run, follows from the present stretch. Only a command can add an error:
+    /// the command rounds the time once.
     #[test]
     fn a_billion_ticks_and_a_thousand_commands_add_no_error(pauses in prop::collection::vec(1u64..2_000_000, 1000)) {
         let playback = Playback {

@@ -122,7 +122,7 @@ impl Checked {
         self.record.conducted().faults.into_iter().next().map_or(Ok(()), Err)
     }
 
-    /// Sends a command, and checks the result by the model.
+    /// Sends a command, and checks the answer against the table and against its frame.
     fn check(&mut self, gap: u64, command: Command) -> Result<(), String> {
         if let (Command::Step(periods), false) = (command, self.stepping) {
             self.sent = Some((periods, self.tick + gap));
