@@ -20,8 +20,8 @@ pub(crate) struct Dancer {
     clearance: Option<ClearanceMonitor>,
     obstacles: Option<ObstacleMonitor>,
     placement: Placement,
-    /// The arguments of the latest solution.
-    solved: Option<(f64, bool)>,
+    /// The own time of the latest solution, and true if the dragon moved then.
+    pub solved: Option<(f64, bool)>,
     /// The name of the solver and the reason for its choice.
     pub reason: String,
     /// Greatest error of a clearance, metres.

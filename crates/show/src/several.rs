@@ -19,8 +19,6 @@ struct Member {
     dragon: Dragon,
     dancer: Dancer,
     handles: Range<usize>,
-    /// The own time solved, and true if the dragon moved then.
-    solved: Option<(f64, bool)>,
     /// The nearest of its boards, by the numbers of the show.
     closest: Closest,
 }
@@ -41,7 +39,6 @@ impl Several {
         let member = |((k, dragon), choice): ((usize, &Dragon), Choice)| Member {
             dancer: Dancer::new(scene, &dragon.motion, choice),
             handles: ensemble.handles_of(k),
-            solved: None,
             closest: Closest { boards: None, any: None },
             dragon: dragon.clone(),
         };
@@ -108,10 +105,9 @@ impl Member {
     ) -> Result<(), NoFollower> {
         let (own_time, dances) = self.dragon.own_time(show_time);
         let state = (own_time, dances && moves);
-        if self.solved == Some(state) {
+        if self.dancer.solved == Some(state) {
             return Ok(());
         }
-        self.solved = None;
         let (first, own_handles) = (self.handles.start, self.handles.len());
         let mut own = chain.range_mut(self.handles.clone());
         let Closest { boards, any } = self.dancer.solve(state.0, state.1, &mut own)?;
@@ -121,7 +117,6 @@ impl Member {
             PairClearance { bench_a: bench_a + first, bench_b, ..pair }
         };
         self.closest = Closest { boards: boards.map(numbered), any: any.map(numbered) };
-        self.solved = Some(state);
         Ok(())
     }
 }

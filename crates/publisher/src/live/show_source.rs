@@ -21,8 +21,8 @@ pub struct FrameMessages {
 impl FrameMessages {
     /// Reserves memory for the alerts and the cues of a frame of a scene with `events` events and `cues` cues.
     pub fn new(events: usize, cues: usize) -> Self {
-        // With several dragons one frame can announce all events.
-        let alerts = Vec::with_capacity(MOST_PER_FRAME.max(events));
+        // With several dragons one frame can announce all events, and a contact that no search had found.
+        let alerts = Vec::with_capacity(MOST_PER_FRAME.max(events + 1));
         // One frame can reach each cue twice.
         Self { header: FrameHeader::default(), alerts, cues: Vec::with_capacity(2 * cues) }
     }
