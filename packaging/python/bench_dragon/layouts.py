@@ -805,7 +805,7 @@ class Stage(Message):
     ]
 
 
-# Every message that is sent as a whole.
+# The payloads and headers of all messages.
 MESSAGES: tuple[type[Message], ...] = (
     HandlePose,
     HandlePose32,
@@ -816,6 +816,7 @@ MESSAGES: tuple[type[Message], ...] = (
     Cue,
     ControlRequest,
     ControlResponse,
+    StageSegment,
     SceneHeader,
     Stage,
 )

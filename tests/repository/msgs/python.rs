@@ -83,12 +83,9 @@ pub fn module(source: &Source) -> String {
     for layout in &source.layouts {
         text += &class(source, layout);
     }
-    let is_part = |name: &str| {
-        // The elements of a list are no message; the segments are the payload of the stage.
-        name == "StageSegment" || source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name))
-    };
+    let is_part = |name: &str| source.layouts.iter().flat_map(|layout| &layout.fields).any(|it| it.kind.holds(name));
     let sent: Vec<_> = names.into_iter().filter(|name| !is_part(name)).collect();
-    text += "\n\n# Every message that is sent as a whole.\nMESSAGES: tuple[type[Message], ...] = (\n";
+    text += "\n\n# The payloads and headers of all messages.\nMESSAGES: tuple[type[Message], ...] = (\n";
     sent.into_iter().for_each(|name| text += &format!("    {name},\n"));
     text + ")\n"
 }
