@@ -253,7 +253,7 @@ pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
     if common.quiet {
         return ProgressBar::hidden();
     }
-    // The template is a constant that a test has parsed.
+    // The template is a constant of known keys: the fallback is never used.
     let style = ProgressStyle::with_template("{spinner} {msg} {wide_bar} {percent} % {elapsed} ({eta})");
     let bar = ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     // A search may stay at one place of the motion for long: the elapsed time still moves.

@@ -164,7 +164,7 @@ fn progress(common: &Common) -> ProgressBar {
     if common.quiet || common.json || !io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    // The template is a constant that a test has parsed; the default bar would do as well.
+    // The template is a constant of known keys: the fallback is never used.
     let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
     ProgressBar::new_spinner().with_style(style).with_message("waiting for a publisher")
 }

@@ -91,14 +91,15 @@ impl Process {
 
     /// Returns the lines of standard output as they come; `output` must not be called afterwards.
     pub fn lines(&mut self) -> Lines {
-        let (sender, lines) = channel();
         let stdout = self.0.stdout.take().unwrap();
-        std::thread::spawn(move || {
-            let lines = BufReader::new(stdout).lines().map_while(Result::ok);
-            lines.take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
-        });
         let errors = self.0.stderr.as_ref().and_then(|errors| errors.as_fd().try_clone_to_owned().ok());
-        Lines { lines, errors, process: self.id() }
+        Lines { lines: sent_lines(stdout), errors, process: self.id() }
+    }
+
+    /// Returns the lines of standard error as they come. The result of `output` then has standard output alone.
+    pub fn error_lines(&mut self) -> Lines {
+        let stderr = self.0.stderr.take().unwrap();
+        Lines { lines: sent_lines(stderr), errors: None, process: self.id() }
     }
 
     /// Returns the first line that the process prints.
@@ -131,6 +132,16 @@ impl Process {
         };
         Output { status, stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() }
     }
+}
+
+/// Returns the lines that a thread reads from `output`.
+fn sent_lines(output: impl Read + Send + 'static) -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        let lines = BufReader::new(output).lines().map_while(Result::ok);
+        lines.take_while(|line| sender.send(line.clone()).is_ok()).for_each(drop);
+    });
+    receiver
 }
 
 /// Lines that a process prints while it runs.

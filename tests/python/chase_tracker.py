@@ -2,9 +2,9 @@
 
     chase_tracker.py --leader NAME --follower NAME --from PORT --to PORT --seconds S --result FILE
 
-The leader's `send psn` sends to the first port, the follower's `chase psn` listens at the second. Packets are passed for
-S seconds from the follower's start. Writes a JSON object with the distances of the follower's head from the leader's
-along the path. The distances begin at least 3 s after the first packet, and at least 1 s after the follower's start.
+The leader's `send psn` sends to the first port, the follower's `chase psn` listens at the second. The leader stands at
+first. Packets are passed until S seconds after the start of both. Writes a JSON object with the distances of the
+follower's head from the leader's along the path, from 4 s after the start of both.
 """
 
 import argparse
@@ -20,8 +20,14 @@ import time
 sys.path.append(str(pathlib.Path(__file__).resolve().parent))
 from chase_sender import Frames, percentile  # noqa: E402
 
-# Seconds within which the follower moves.
-PATIENCE = 300
+# Seconds within which both shows move.
+PATIENCE = 1800
+
+
+def start(frames):
+    """Returns the time of a show's first frame at another simulated time than the first one's, seconds, or None."""
+    moved = (header for header in frames.headers if header[1] != frames.headers[0][1])
+    return next((header[0] * 1e-9 for header in moved), None)
 
 
 def noisy(packet, sigma):
@@ -54,7 +60,7 @@ def main():
     # A busy machine starts the chase late.
     while (now := time.monotonic()) < (ends or started + PATIENCE):
         since = now - started
-        if ends is None and follower.headers and follower.headers[-1][1] != follower.headers[0][1]:
+        if ends is None and start(leader) and start(follower):
             ends = now + arguments.seconds
         # A dropout of half a second every four seconds, and one packet in twenty.
         is_data = struct.unpack_from("<H", packet)[0] == 0x6755
@@ -64,10 +70,9 @@ def main():
     for frames in (leader, follower):
         frames.stop = True
         frames.join()
-    assert ends, f"the follower does not move within {PATIENCE} s"
+    assert ends, f"{start(leader)}, {start(follower)}: both shows do not move within {PATIENCE} s"
     times = [header[0] for header in leader.headers]
-    moves = next(header[0] * 1e-9 for header in follower.headers if header[1] != follower.headers[0][1])
-    begin = max(started + 3, moves + 1)
+    begin = max(start(leader), start(follower)) + 4
     distances, epochs = [], set()
     for deadline_ns, sim_time, _, epoch, _ in follower.headers:
         if not begin <= deadline_ns * 1e-9 < ends:

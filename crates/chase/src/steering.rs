@@ -97,7 +97,7 @@ struct Show {
     /// The state that the latest commands have led to.
     plays: bool,
     epoch: u32,
-    /// The latest command without an answer: the show may still execute this command.
+    /// The latest command without an answer that changes more than the rate: the show may still execute this command.
     unanswered: Option<Command>,
     /// True for a show that was paused or held when it was found, until the show plays or answers a command.
     is_new: bool,
@@ -196,7 +196,7 @@ impl Steering {
         let pending = show.pending.take_if(|pending| pending.sent_ns == sent_ns);
         let Some(Pending { command, .. }) = pending else { return };
         let Some((code, tick)) = answer else {
-            show.unanswered = Some(command);
+            show.give_up(command);
             return;
         };
         show.settled_tick = tick;
@@ -238,7 +238,8 @@ impl Steering {
         let show = self.show.as_mut()?;
         if let Some(Pending { command, sent_ns }) = show.pending {
             if now_ns.saturating_sub(sent_ns) > PATIENCE_NS {
-                (show.pending, show.unanswered) = (None, Some(command));
+                show.pending = None;
+                show.give_up(command);
             }
             return None;
         }
@@ -266,6 +267,14 @@ impl Steering {
 }
 
 impl Show {
+    /// Handles a command whose answer is lost.
+    fn give_up(&mut self, command: Command) {
+        // A late rate is no sign of another client.
+        if !matches!(command, Command::Rate(_)) {
+            self.unanswered = Some(command);
+        }
+    }
+
     fn stand(&self, time: f64, place: Option<f64>) -> Option<Command> {
         if self.plays {
             return Some(Command::Pause);
@@ -327,9 +336,13 @@ mod tests {
         let command = steering.command(Goal::Follow { time: 50.0, rate: 1.0 }, at(2));
         assert!(matches!(command, Some(Command::Seek(_))), "{command:?}");
         steering.answered(at(2), None);
-        steering.frame_came(&playing(3, 1, 50.0), at(3));
+        // Nor after a lost rate.
+        let command = steering.command(Goal::Follow { time: 0.1, rate: 1.0 }, at(12));
+        assert!(matches!(command, Some(Command::Rate(_))), "{command:?}");
+        steering.answered(at(12), None);
+        steering.frame_came(&playing(13, 1, 50.0), at(13));
         assert_eq!(steering.waiting(), None);
-        steering.frame_came(&playing(4, 2, 70.0), at(4));
+        steering.frame_came(&playing(14, 2, 70.0), at(14));
         assert_eq!(steering.waiting(), Some(Waiting::Sought));
     }
 

@@ -168,7 +168,7 @@ const WORDS = {
   out_of_range: ["", "{command}被拒绝：数值超出范围。"],
   too_many: ["", "{command}被拒绝：等待中的命令过多。"],
   not_understood: ["", "发布端不理解命令“{command}”。"],
-  notDelivered: ["", "命令未送达发布端：{reason}"],
+  notAnswered: ["", "发布端未答复：{reason}"],
 
   conductWhom: ["Dragon", "舞龙队"],
   all: ["All", "全部"],
@@ -248,7 +248,7 @@ export function translate(root) {
 /** Returns the reason of a refusal. English sentences are the server's, also for a command that was not sent. */
 export function answerTo({ code, command, playback, sentence }) {
   if (language === 0) return `${capital(sentence)}.`;
-  if (!WORDS[code]) return say("notDelivered", { reason: sentence });
+  if (!WORDS[code]) return say("notAnswered", { reason: sentence });
   return say(code, { command: command === "rate" ? say("rateInForce") : say(command), playback: say(playback) });
 }
 
