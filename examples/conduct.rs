@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let name = std::env::args().nth(1).unwrap_or_else(|| "bench_dragon".to_owned());
     let mut controller = Controller::new(&name)?;
     for command in [Command::Pause, Command::Seek(300.0), Command::Resume] {
-        let answer = controller.send(command, Duration::from_secs(1))?;
+        let answer = controller.send(command, Duration::from_secs(10))?;
         println!(
             "{command:?}: {}, {} at {} x, t = {:.3} s, tick {}",
             answer.result().map_or("unknown", Code::name),

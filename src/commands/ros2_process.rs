@@ -24,7 +24,7 @@ use super::{CommandError, Common};
 /// The interval at which the supervisor tests whether the process still runs.
 const TEST_INTERVAL: Duration = Duration::from_millis(20);
 /// The time in which the process must end after a signal; a longer-lived one is killed.
-const LONGEST_END: Duration = Duration::from_secs(5);
+const LONGEST_END: Duration = Duration::from_secs(30);
 /// The lifetime after which a process is restarted at once.
 const LIFETIME: Duration = Duration::from_secs(5);
 /// The first and the longest time before the restart of a process with a shorter lifetime. The time doubles with each

@@ -14,7 +14,7 @@ use super::parent::Parent;
 use super::{CommandError, Common, stop_on_signals};
 
 /// Longest wait for an answer of the publisher.
-const TIMEOUT: Duration = Duration::from_secs(10);
+const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Arguments of `soak-load-generator`.
 #[derive(Debug, clap::Args)]

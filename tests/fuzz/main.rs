@@ -14,6 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Once, mpsc};
+use std::time::Duration;
 
 use fastrand::Rng;
 use targets::{TARGETS, Target};
@@ -22,6 +23,9 @@ use targets::{TARGETS, Target};
 const KEPT: u32 = 64;
 /// Changed inputs per initial input that are kept as starts of later cases.
 const CHANGES_KEPT: usize = 3;
+
+/// The time after which a case counts as hung: the slowest takes a second, and a busy machine may leave it none for long.
+const HUNG: Duration = Duration::from_secs(300);
 
 /// The name of the threads that run cases.
 const CASES: &str = "cases";
@@ -109,10 +113,10 @@ fn fuzz(name: &str) {
     let worker = worker.unwrap();
     let run = |input: &[u8]| {
         next.send(input.to_vec()).unwrap();
-        match results.recv_timeout(target.hung) {
+        match results.recv_timeout(HUNG) {
             Ok(Ok(got_in)) => got_in,
             Ok(Err(why)) => panic!("{name}: {} fails: {why}", written(target, input).display()),
-            Err(_) => panic!("{name}: {} fails: no end within {:?}", written(target, input).display(), target.hung),
+            Err(_) => panic!("{name}: {} fails: no end within {:?}", written(target, input).display(), HUNG),
         }
     };
     for input in corpus.iter().chain(&seeds) {

@@ -51,13 +51,16 @@ def main():
 
     participant = DomainParticipant(0)
     topic = Topic(participant, f"rt/{arguments.name}/{arguments.topic}", TOPICS[arguments.topic])
-    reader = DataReader(participant, topic, qos=quality(arguments.reliability, "volatile"))
+    reader = DataReader(participant, topic, qos=quality(arguments.reliability, "volatile", depth=3000))
     # Only now: earlier messages over shared memory have no counterpart.
     shared = SharedMemory(arguments.name)
     frames = {}
     messages = {}
-    end = time.monotonic() + arguments.seconds
-    while time.monotonic() < end:
+    end = None
+    # S seconds from the first message, however late the publisher is discovered.
+    while end is None or time.monotonic() < end:
+        if end is None and messages:
+            end = time.monotonic() + arguments.seconds
         frames.update(shared.take())
         for raw, _ in ddspy_take(reader._ref, ANY, 100):
             sec, nanosec = STAMP.unpack_from(raw)

@@ -224,7 +224,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--name", required=True)
     parser.add_argument("--domain", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=20.0, help="greatest wait for a response")
+    parser.add_argument("--seconds", type=float, default=300.0, help="greatest wait for a response")
     parser.add_argument("--calls-of-input", action="store_true")
     parser.add_argument("--fresh", type=int, default=0)
     parser.add_argument("--flood", type=int, default=0)
@@ -242,7 +242,7 @@ def main():
         def first_call(_):
             client = Client(DomainParticipant(arguments.domain), arguments.name, arguments.calls[0])
             clients.append(client)
-            if not client.ready(60):
+            if not client.ready(300):
                 return {"response": "no service"}
             sent = time.monotonic()
             return {"response": client.call("", arguments.seconds), "seconds": time.monotonic() - sent}
@@ -258,7 +258,7 @@ def main():
         return
     if arguments.flood:
         client = Client(participant, arguments.name, arguments.calls[0])
-        client.ready(60)
+        client.ready(300)
         for _ in range(arguments.flood):
             client.send("")
         print(json.dumps(client.sequence), flush=True)
@@ -270,7 +270,7 @@ def main():
         service, _, text = call.partition("=")
         if service not in clients:
             clients[service] = Client(participant, arguments.name, service)
-            if not clients[service].ready(60):
+            if not clients[service].ready(300):
                 sys.exit(f"no server for {service}")
         print(json.dumps({"call": call, "response": clients[service].call(text, arguments.seconds)}), flush=True)
 

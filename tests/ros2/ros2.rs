@@ -55,8 +55,11 @@ fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
         return;
     }
     let seconds = if long() { 60 } else { 10 };
-    let publisher = Process::start(program("content").args(["run", "--ros2", "--json", "--start", "300"]));
-    let publisher = answering(publisher, || program("content"));
+    // The queues hold all frames by which a subscriber falls behind.
+    let scene = scene_file("content", &[("[publish]", "[publish]\nqueue = 3000\nsubscribers = 4")]);
+    let mut run = program("content");
+    run.arg("--scene").arg(scene).args(["run", "--ros2", "--json", "--start", "300"]);
+    let publisher = answering(Process::start(&mut run), || program("content"));
     let length = seconds.to_string();
     let reliable = Process::start(&mut content("content", "handles", "reliable", &length));
     let best_effort = Process::start(&mut content("content", "poses", "best_effort", &length));
@@ -87,8 +90,10 @@ fn late_subscribers_get_the_contact_and_the_stage_and_every_type_is_that_of_msgs
     // In a domain of its own: the diagnostics of other shows would count as those of this one.
     run.env("ROS_DOMAIN_ID", "15").args(["--scene", scene.to_str().unwrap(), "run", "--json", "--start", "412"]);
     let publisher = Process::start(&mut run);
-    // The contact is half a second after the start; ten seconds later a subscriber joins.
-    wait(10.5);
+    // The contact is half a second after the start; ten seconds after the end a subscriber joins.
+    let state = || text(&program("late").args(["control", "state"]).output().unwrap().stdout);
+    wait_until("the show has ended", || state().contains("ended"));
+    wait(10.0);
     let topics = [
         "alerts:reliable:transient_local",
         "stage:reliable:transient_local",

@@ -62,7 +62,7 @@ fn a_cyclone_client_conducts_by_every_service() {
         return;
     }
     let name = "services";
-    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "6000"]);
     let state = |expected: u64, response: &Value| {
         assert_eq!((response["state"]["state"].as_u64(), result(response)), (Some(expected), (1, false)), "{response}");
     };
@@ -157,7 +157,7 @@ fn a_hold_is_latched_against_every_other_call() {
         return;
     }
     let name = "held";
-    let publisher = publisher(name, &["--ros2-control", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--start", "50", "--duration", "6000"]);
     let calls = ["hold", "hold", "get_simulation_state", "is_paused", "get_rate", "get_simulator_features"];
     let held = call(name, &calls);
     assert!(held[..2].iter().all(|response| response["success"] == true), "{held:?}");
@@ -206,9 +206,9 @@ fn without_the_flag_there_is_no_service_and_with_it_those_of_the_standards() {
     }
     let (without, with) = ("no_services", "all_services");
     let publishers =
-        [publisher(without, &["--duration", "300"]), publisher(with, &["--ros2-control", "--duration", "300"])];
+        [publisher(without, &["--duration", "6000"]), publisher(with, &["--ros2-control", "--duration", "6000"])];
     let endpoints = |name: &str, topics: &str| {
-        let output = Process::start(&mut peer(name, &["--seconds", "30", "--topics", topics])).output();
+        let output = Process::start(&mut peer(name, &["--topics", topics])).output();
         let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
         ["read", "written"].map(|what| found[what].as_object().unwrap().clone())
     };
@@ -285,7 +285,7 @@ fn a_flood_of_calls_is_refused_and_others_are_answered() {
         return;
     }
     let name = "flooded";
-    let publisher = publisher(name, &["--ros2-control", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--duration", "6000"]);
     let mut flood = Process::start(&mut peer(name, &["--flood", "5000", "--seconds", "300", "get_rate"]));
     let flooded = flood.lines();
     let others = call(name, &["get_rate", "get_simulation_state", "pause", "get_simulation_state"]);
@@ -304,7 +304,7 @@ fn a_flood_of_calls_is_refused_and_others_are_answered() {
 #[test]
 fn a_fast_dds_client_conducts_by_every_service() {
     let name = "enhanced";
-    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "6000"]);
     let here = || control(name, &["state"]).1;
     let done = || Outcome { result: 1, error_message: String::new() };
     let simulation = |service: &str, kind: &'static str, request: u8| -> Outcome {

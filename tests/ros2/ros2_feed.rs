@@ -84,7 +84,7 @@ fn a_running_show_gets_its_scenes_topics_late_and_loses_them_again() {
     let settings = scene_file(name, &[]);
     std::fs::write(&settings, format!("{}\n{topics}", std::fs::read_to_string(&settings).unwrap())).unwrap();
     // The queues hold all frames by which a subscriber falls behind on a busy machine.
-    let scene = scene_file("attached_run", &[("[publish]", "[publish]\nqueue = 960\nsubscribers = 4")]);
+    let scene = scene_file("attached_run", &[("[publish]", "[publish]\nqueue = 3000\nsubscribers = 4")]);
     let mut publisher = program(name);
     let publisher = Process::start(publisher.arg("--scene").arg(&scene).args(["run", "--json", "--start", "300"]));
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
@@ -130,15 +130,14 @@ fn a_running_show_gets_its_scenes_topics_late_and_loses_them_again() {
     // The show has noticed nothing.
     assert_eq!(control(name, &["state"]).1["playback"], "playing");
     watch.signal(SIGINT);
-    let missed = missed(&seconds.rest());
-    assert_eq!(missed, 0);
+    assert_eq!(number_of(&seconds.rest(), "missed"), 0);
     assert!(stopped(publisher).get("ros2").is_none());
 }
 
-/// Returns the frames that a `watch --json` has missed.
-fn missed(lines: &[String]) -> u64 {
+/// Returns the frames that a `watch --json` has received or missed.
+fn number_of(lines: &[String], field: &str) -> u64 {
     let lines = lines.iter().map(|line| serde_json::from_str::<Value>(line).unwrap());
-    lines.filter(|line| line["type"] == "second").map(|line| line["missed"].as_u64().unwrap()).sum()
+    lines.filter(|line| line["type"] == "second").map(|line| line[field].as_u64().unwrap()).sum()
 }
 
 #[test]
@@ -147,7 +146,7 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
         return;
     }
     let name = "killed_child";
-    let scene = scene_file(name, &[("[publish]", "[publish]\nqueue = 500")]);
+    let scene = scene_file(name, &[("[publish]", "[publish]\nqueue = 3000\nsubscribers = 4")]);
     let mut run = program(name);
     let publisher = Process::start(run.arg("--scene").arg(&scene).args(["run", "--ros2", "--json", "--start", "300"]));
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
@@ -174,8 +173,9 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
     println!("topics were back within {longest:.2} s");
     watch.signal(SIGINT);
     let lines = seconds.rest();
-    assert!(lines.len() > 15, "{} seconds", lines.len());
-    assert_eq!(missed(&lines), 0);
+    let received = number_of(&lines, "received");
+    assert!(received > 900, "{received} frames");
+    assert_eq!(number_of(&lines, "missed"), 0);
     subscriber.signal(SIGKILL);
     publisher.signal(SIGINT);
     let output = publisher.output();
@@ -187,20 +187,32 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
 #[test]
 fn a_process_of_ros_2_that_dies_early_is_restarted_after_a_time_that_doubles() {
     let name = "early_deaths";
-    let publisher = Process::start(program(name).args(["run", "--ros2", "--json"]));
-    for _ in 0..3 {
-        let child = ros2_of(&publisher);
-        kill(Pid::from_raw(child as i32), SIGKILL).unwrap();
-        wait_until("there is another one", || child_of(publisher.id()).is_some_and(|next| next != child));
+    for _ in 0..10 {
+        let (mut latest, mut longest) = (Instant::now(), Duration::ZERO);
+        let publisher = Process::start(program(name).args(["run", "--ros2", "--json"]));
+        for _ in 0..3 {
+            let child = ros2_of(&publisher);
+            kill(Pid::from_raw(child as i32), SIGKILL).unwrap();
+            // No process has lived for longer than the time since the kill of the one before.
+            longest = longest.max(latest.elapsed());
+            latest = Instant::now();
+            wait_until("there is another one", || child_of(publisher.id()).is_some_and(|next| next != child));
+        }
+        let publisher = answering(publisher, || program(name));
+        publisher.signal(SIGINT);
+        let output = publisher.output();
+        assert!(output.status.success());
+        // A process that a busy machine lets live for 5 s is restarted at once.
+        if longest >= Duration::from_secs(5) {
+            continue;
+        }
+        let log = text(&output.stderr);
+        let delays: Vec<&str> =
+            log.lines().filter_map(|line| line.split_once("restarted in ")?.1.split(" s;").next()).collect();
+        assert_eq!(delays, ["0.25", "0.5", "1"], "{log}");
+        return;
     }
-    let publisher = answering(publisher, || program(name));
-    publisher.signal(SIGINT);
-    let output = publisher.output();
-    assert!(output.status.success());
-    let log = text(&output.stderr);
-    let delays: Vec<&str> =
-        log.lines().filter_map(|line| line.split_once("restarted in ")?.1.split(" s;").next()).collect();
-    assert_eq!(delays, ["0.25", "0.5", "1"], "{log}");
+    panic!("the machine let a process live for 5 s in each of ten attempts");
 }
 
 /// Returns the open files of a process that belong to a node of iceoryx2.
@@ -241,7 +253,8 @@ fn one_process_publishes_two_shows_and_follows_each_through_its_death() {
     }
     let [gold, silver] = ["two_gold", "two_silver"];
     // The queues hold all frames by which the process falls behind while it opens the topics of the other show.
-    let scenes = [gold, silver].map(|name| (name, scene_file(name, &[("[publish]", "[publish]\nqueue = 480")])));
+    let scenes = [gold, silver]
+        .map(|name| (name, scene_file(name, &[("[publish]", "[publish]\nqueue = 3000\nsubscribers = 4")])));
     let start = |name: &str| {
         let scene = &scenes.iter().find(|(of, _)| *of == name).unwrap().1;
         Process::start(program(name).arg("--scene").arg(scene).args(["run", "--json", "--start", "300"]))
@@ -263,7 +276,7 @@ fn one_process_publishes_two_shows_and_follows_each_through_its_death() {
     while of_frames == gold_run || of_stage != of_frames {
         let line: Value = serde_json::from_str(&gold_lines.until("\"topic\"")).unwrap();
         let run = run_of(&line["message"]);
-        assert!(restarted.elapsed().as_secs() < 30, "no frames and stage of another run within 30 s");
+        assert!(restarted.elapsed() < harness::patience(), "no frames and stage of another run");
         if line["topic"] == stage { of_stage = run } else { of_frames = run }
     }
     let tick = control(silver, &["state"]).1["tick"].as_u64().unwrap();

@@ -9,7 +9,7 @@ use std::process::Command;
 use harness::{Process, can_run, program, python, python_modules, stopped, text, unique, wait_for_bytes};
 use serde_json::Value;
 
-const DOMAIN: &str = "23";
+const DOMAIN: &str = "16";
 /// The dragons of `config/coil.toml`: names and handles, of which the last one names no bench.
 const DRAGONS: [(&str, usize, usize); 2] = [("gold", 0, 60), ("jade", 61, 121)];
 /// The start of either spiral, metres from the origin: eight turns of 1.7 m.

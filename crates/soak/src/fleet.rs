@@ -22,7 +22,7 @@ const FLAKY_LIFETIME: Duration = Duration::from_secs(5);
 /// The time limit of a subscriber's first frame.
 const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// The time limit of the publisher's end after a signal, and then of the subscribers'.
-const END_TIMEOUT: Duration = Duration::from_secs(15);
+const END_TIMEOUT: Duration = Duration::from_secs(30);
 /// The exit code of a program for an invalid request.
 const REFUSED: i32 = 2;
 /// The time after the start from which the publisher's memory should no longer grow.

@@ -38,7 +38,7 @@ class Controller:
         self._client = opened.client_builder().create()
         self._sent = 0
 
-    def send(self, command: str | int, value: float = 0.0, timeout: float = 5.0) -> ControlResponse:
+    def send(self, command: str | int, value: float = 0.0, timeout: float = 10.0) -> ControlResponse:
         """Sends a command by name or number and returns the response, in its own memory.
 
         `value`: simulated seconds per second for `rate`, simulated seconds for `seek`, periods for `step`, else 0.
@@ -48,14 +48,17 @@ class Controller:
             raise ValueError(f'no command is called "{command}": expected one of {", ".join(COMMANDS)}')
         pending = self.request(command, value)
         end = time.monotonic() + timeout
-        while time.monotonic() < end:
+        while True:
+            # An answer that came while this process did not run is there after the end.
+            is_last = time.monotonic() >= end
             response = pending.receive()
             if response is not None:
                 answer = ControlResponse.from_buffer_copy(response.payload().contents)
                 response.delete()
                 return answer
+            if is_last:
+                raise TimeoutError(f"no answer to {command} within {timeout} s")
             time.sleep(POLL_INTERVAL)
-        raise TimeoutError(f"no answer to {command} within {timeout} s")
 
     def request(self, command: str | int, value: float = 0.0) -> Any:
         """Sends a command and returns iceoryx2's pending response, without waiting."""

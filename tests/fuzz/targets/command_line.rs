@@ -6,7 +6,6 @@ mod program;
 
 use std::ffi::OsString;
 use std::sync::OnceLock;
-use std::time::Duration;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
@@ -16,8 +15,7 @@ use program::CommandLine;
 use super::Target;
 use super::bytes::{NUMBERS, changed, one, renumbered};
 
-pub const TARGET: Target =
-    Target { name: "command_line", run, seeds, mutate, cases: 4000, hung: Duration::from_secs(15) };
+pub const TARGET: Target = Target { name: "command_line", run, seeds, mutate, cases: 4000 };
 
 /// Most arguments of a case.
 const MOST_ARGUMENTS: usize = 40;

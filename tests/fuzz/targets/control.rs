@@ -4,7 +4,6 @@
 //! the number of periods until the request arrives.
 
 use std::sync::OnceLock;
-use std::time::Duration;
 
 use bench_dragon::messages::control::{Code, Command};
 use bench_dragon::messages::state::PlaybackState;
@@ -21,7 +20,7 @@ use fastrand::Rng;
 use super::Target;
 use super::bytes::{NUMBERS, changed, one};
 
-pub const TARGET: Target = Target { name: "control", run, seeds, mutate, cases: 20_000, hung: Duration::from_secs(10) };
+pub const TARGET: Target = Target { name: "control", run, seeds, mutate, cases: 20_000 };
 
 /// Bytes of a request, and of a request with its periods.
 const REQUEST: usize = size_of::<ControlRequest>();

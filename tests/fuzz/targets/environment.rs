@@ -1,8 +1,6 @@
 //! Environment variables, a line each (`ROS_DOMAIN_ID=7`), and names: applied, or refused with a sentence that names
 //! them.
 
-use std::time::Duration;
-
 use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::ros2::environment::{Network, Range, check_name, other_distribution};
 use fastrand::Rng;
@@ -10,8 +8,7 @@ use fastrand::Rng;
 use super::Target;
 use super::bytes::{changed, one, renumbered};
 
-pub const TARGET: Target =
-    Target { name: "environment", run, seeds, mutate, cases: 100_000, hung: Duration::from_secs(15) };
+pub const TARGET: Target = Target { name: "environment", run, seeds, mutate, cases: 100_000 };
 
 const VARIABLES: [&str; 5] =
     ["ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_DISTRO"];

@@ -23,8 +23,6 @@ mod changes;
 #[path = "../../commands/certify/truth.rs"]
 mod truth;
 
-use std::time::Duration;
-
 use fastrand::Rng;
 
 /// A target.
@@ -39,8 +37,6 @@ pub struct Target {
     pub mutate: fn(&[u8], &mut Rng) -> Vec<u8>,
     /// Number of cases, some seconds of work at most.
     pub cases: u64,
-    /// Time after which a case counts as hung: some hundred times the slowest case, for a busy machine.
-    pub hung: Duration,
 }
 
 /// All targets.

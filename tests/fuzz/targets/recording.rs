@@ -24,7 +24,7 @@ use super::mcap_records::{
     ATTACHMENT, CHANNEL, CHUNK, Known, MESSAGE, MESSAGE_INDEX, Record, SCHEMA, Wrong, messages, parsed, written,
 };
 
-pub const TARGET: Target = Target { name: "recording", run, seeds, mutate, cases: 3000, hung: Duration::from_secs(30) };
+pub const TARGET: Target = Target { name: "recording", run, seeds, mutate, cases: 3000 };
 
 /// The recording from which the smaller ones are made.
 const RECORDED: &[u8] = include_bytes!("../corpus/recording/small.mcap");

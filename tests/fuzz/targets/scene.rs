@@ -1,7 +1,5 @@
 //! A scene as text: it is refused with a sentence, or it is played and every frame is as promised.
 
-use std::time::Duration;
-
 use bench_dragon::messages::sentence::{Figures, alert_sentence};
 use bench_dragon::motion::Method;
 use bench_dragon::motion::model::curve::Side;
@@ -14,7 +12,7 @@ use fastrand::Rng;
 use super::Target;
 use super::bytes::{changed, one, renumbered};
 
-pub const TARGET: Target = Target { name: "scene", run, seeds, mutate, cases: 5000, hung: Duration::from_secs(45) };
+pub const TARGET: Target = Target { name: "scene", run, seeds, mutate, cases: 5000 };
 
 /// Most benches of a played team, and most links along a path: larger scenes take long.
 const MOST_BENCHES: usize = 30;

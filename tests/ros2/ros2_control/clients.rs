@@ -10,7 +10,7 @@ fn a_hundred_new_clients_of_each_kind_get_the_answer_to_their_first_call() {
         return;
     }
     let name = "fresh";
-    let publisher = publisher(name, &["--ros2-control", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--duration", "6000"]);
     // One process for each client of Cyclone DDS, as users have them; most of the time is starting them.
     let calls = if long() { 100 } else { 12 };
     std::thread::scope(|threads| {
@@ -45,7 +45,7 @@ fn clients_of_both_implementations_conduct_one_show_in_turn() {
         return;
     }
     let name = "both";
-    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "6000"]);
     let here = || control(name, &["state"]).1;
     let (mut cyclone, mut input) = Process::start_with_input(&mut peer(name, &["--calls-of-input"]));
     let answers = cyclone.lines();
@@ -90,7 +90,7 @@ fn clients_of_both_implementations_conduct_one_show_in_turn() {
 #[test]
 fn a_request_of_another_length_is_refused_and_nothing_happens() {
     let name = "misfit";
-    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "300"]);
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "6000"]);
     let kind = ("simulation_interfaces", "StepSimulation");
     let twelve = (7_u64, 7_u32);
     assert_eq!(first_call::<_, Outcome>(name, "step_simulation", kind, twelve, 1), None);
@@ -107,7 +107,7 @@ fn the_parameter_services_of_a_node_without_services_answer_at_once() {
         return;
     }
     let name = "parameters";
-    let publisher = publisher(name, &["--duration", "300"]);
+    let publisher = publisher(name, &["--duration", "6000"]);
     let calls = [
         "list_parameters",
         "get_parameters=use_sim_time",

@@ -119,5 +119,5 @@ where
     Request: Serialize + DeserializeOwned + Clone + 'static,
     Response: Serialize + DeserializeOwned + 'static,
 {
-    first_call(name, service, kind, request, 20).unwrap_or_else(|| panic!("{service}: no answer"))
+    first_call(name, service, kind, request, 300).unwrap_or_else(|| panic!("{service}: no answer"))
 }

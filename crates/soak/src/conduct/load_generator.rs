@@ -19,9 +19,9 @@ use bench_dragon_messages::ControlResponse;
 use bench_dragon_messages::control::{Code, Command};
 
 /// The time limit of an answer.
-const TIMEOUT: Duration = Duration::from_secs(10);
+const TIMEOUT: Duration = Duration::from_secs(30);
 /// The time limit of the publisher's start.
-const START_TIMEOUT: Duration = Duration::from_secs(30);
+const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// The interval at which frames are read.
 const READ_INTERVAL: Duration = Duration::from_millis(1);
 /// The interval at which the state is requested until a step has begun.
