@@ -5,7 +5,6 @@
 
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock};
-use std::time::Duration;
 
 use bench_dragon::messages::control::{Command, CommandRecord};
 use bench_dragon::motion::timeline::Timeline;
