@@ -24,7 +24,8 @@ const KEPT: u32 = 64;
 /// Changed inputs per initial input that are kept as starts of later cases.
 const CHANGES_KEPT: usize = 3;
 
-/// The time after which a case counts as hung: the slowest takes a second, and a busy machine may leave it none for long.
+/// The time after which a case counts as hung. The slowest case takes a second, and a busy machine may leave a case no
+/// time for long.
 const HUNG: Duration = Duration::from_secs(300);
 
 /// The name of the threads that run cases.

@@ -334,7 +334,7 @@ fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
     publish_until(first + 3_000_000_000);
     let joins = if long() { 50 } else { 12 };
     // On a busy machine an alert may be in flight for seconds. A fault would show in every join.
-    let few = |late: Vec<String>, joins: u32| assert!(late.len() <= joins as usize / 3, "{late:?}");
+    let expect_few = |late: Vec<String>, joins: u32| assert!(late.len() <= joins as usize / 3, "{late:?}");
     let mut late = Vec::new();
     for (made, alerts) in joined("countdown", joins, &[]) {
         let published = publish_until(made.max(alerts[0]));
@@ -343,7 +343,7 @@ fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
             late.push(format!("{} ms old", (current - alerts[0]) / 1_000_000));
         }
     }
-    few(late, joins);
+    expect_few(late, joins);
     // A subscriber that does not request earlier messages gets none of them.
     let mut late = Vec::new();
     for (made, alerts) in joined("countdown", joins / 4, &["--volatile"]) {
@@ -351,7 +351,7 @@ fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
             late.push(format!("{alerts:?} of before {made}"));
         }
     }
-    few(late, joins / 4);
+    expect_few(late, joins / 4);
     let mut late = Vec::new();
     for (made, alerts) in joined("countdown", joins / 4, &["--beside"]) {
         assert!(alerts.is_sorted(), "{alerts:?}");
@@ -361,5 +361,5 @@ fn a_late_subscriber_gets_the_current_alert_and_none_before_it() {
             late.push(format!("{alerts:?} end before {current}"));
         }
     }
-    few(late, joins / 4);
+    expect_few(late, joins / 4);
 }
