@@ -4,20 +4,21 @@
 //! In: the feed of a show and the process's environment. Out: a [`bridge`]. Called by `send ros2`, which `run` and
 //! `replay` start as a child process; both call [`describe`] first.
 
-mod acknowledgements;
 pub mod bridge;
 mod commands;
 mod control;
+mod copies;
+mod departures;
 pub mod environment;
-mod gaps;
-mod heartbeats;
 mod matching;
 mod node;
 mod rate;
+mod readers;
 mod relief;
-mod retransmission;
+mod repeated;
 pub mod rosout;
 mod topic_writer;
+mod wire;
 
 use std::net::{IpAddr, Ipv4Addr};
 

@@ -1,20 +1,27 @@
 //! The remote endpoints that RustDDS has matched with the program's own: the endpoints that a message reaches.
 //!
-//! RustDDS reports each match once, in the events of its participant, which only this file reads. Called by the topics,
-//! which hold a message until there is a subscriber, and by the services. A response is lost if it is written before
-//! the client's reply reader is matched.
+//! In: the events of the participant, in which RustDDS reports each match once, and which only this file reads. Out: the
+//! readers of each writer; for the services, whether a response has a receiver, since a response is lost if it is
+//! written before the client's reply reader is matched.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use ros2_client::Context;
 use rustdds::policy::Durability;
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented};
+use rustdds::{
+    DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, RTPSEntity, StatusEvented,
+};
 
-use super::acknowledgements::send_to_own;
-use super::gaps::{OldMessages, send_gap};
-use super::heartbeats::send_heartbeat;
-use super::retransmission::FirstMessages;
+use super::departures::{Departures, is_local};
+use super::readers::Owed;
+use super::repeated::Repeated;
+use super::wire::{self, Prefix, prefix};
+
+/// The prefix of the topics of requests.
+const REQUEST_PREFIX: &str = "rq/";
 
 /// The matches of one participant, shared by its threads.
 #[derive(Clone)]
@@ -31,10 +38,17 @@ struct Ends {
     writers: BTreeSet<(GUID, GUID)>,
     /// The requests of the remote readers.
     requests: BTreeMap<GUID, Requests>,
-    /// New writers whose first messages are requested.
-    first_messages: Vec<FirstMessages>,
-    /// New readers from which older messages are withheld.
-    old_messages: Vec<OldMessages>,
+    /// The remote writers of requests.
+    clients: BTreeSet<GUID>,
+    /// The addresses of remote endpoints, of writers only those of requests.
+    addresses: BTreeMap<GUID, Vec<SocketAddr>>,
+    /// The addresses of readers of Fast DDS on this machine.
+    neighbours: BTreeMap<GUID, SocketAddr>,
+    /// Datagrams for new endpoints.
+    repeated: Vec<Repeated>,
+    departures: Departures,
+    /// Acknowledgements that have been sent.
+    acknowledged: u32,
 }
 
 /// The requests of a remote reader.
@@ -50,18 +64,27 @@ impl Matches {
     /// Observes the matches of a context from now on.
     pub(super) fn new(context: &Context) -> Self {
         let participant = context.domain_participant();
-        let events = participant.status_listener();
-        let [readers, writers] = [BTreeSet::new(), BTreeSet::new()];
-        let (requests, first_messages, old_messages) = (BTreeMap::new(), Vec::new(), Vec::new());
-        let ends = Ends { participant, events, readers, writers, requests, first_messages, old_messages };
+        let ends = Ends {
+            events: participant.status_listener(),
+            participant,
+            readers: BTreeSet::new(),
+            writers: BTreeSet::new(),
+            requests: BTreeMap::new(),
+            clients: BTreeSet::new(),
+            addresses: BTreeMap::new(),
+            neighbours: BTreeMap::new(),
+            repeated: Vec::new(),
+            departures: Departures::default(),
+            acknowledged: 0,
+        };
         Self { ends: Arc::new(Mutex::new(ends)) }
     }
 
-    /// Reads the current state.
-    fn with<T>(&self, read: impl FnOnce(&Ends) -> T) -> T {
+    /// Reads or changes the current state.
+    fn with<T>(&self, act: impl FnOnce(&mut Ends) -> T) -> T {
         let mut ends = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
         ends.update();
-        read(&ends)
+        act(&mut ends)
     }
 
     /// Processes pending discovery events. RustDDS buffers 2,048 and drops the rest, so call it often.
@@ -77,33 +100,48 @@ impl Matches {
         })
     }
 
-    /// Forgets a local writer that is gone: RustDDS reports no end of its matches.
-    pub(super) fn forget(&self, writer: GUID) {
-        let mut ends = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
-        ends.update();
-        ends.readers.retain(|(here, _)| *here != writer);
+    /// Returns the subscribers of Fast DDS of a local writer on this machine, with their addresses.
+    pub(super) fn neighbours(&self, writer: GUID) -> Vec<(GUID, SocketAddr)> {
+        self.with(|ends| {
+            let readers = ends.readers.iter().filter(|(here, _)| *here == writer);
+            readers.filter_map(|(_, reader)| Some((*reader, *ends.neighbours.get(reader)?))).collect()
+        })
     }
 
-    /// Withholds the first `last` messages of a local writer from a new subscriber.
-    pub(super) fn withhold(&self, writer: GUID, reader: GUID, last: u32) {
-        let mut ends = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
-        let old = OldMessages::of(&ends.participant, writer, reader, last);
-        ends.old_messages.extend(old);
+    /// Forgets a local writer that is gone: RustDDS reports no end of its matches.
+    pub(super) fn forget(&self, writer: GUID) {
+        self.with(|ends| ends.readers.retain(|(here, _)| *here != writer));
+    }
+
+    /// Sends what a local writer owes its readers.
+    pub(super) fn settle(&self, writer: GUID, owed: Owed) {
+        let Owed { acknowledgements, withheld } = owed;
+        if acknowledgements.is_empty() && withheld.is_empty() {
+            return;
+        }
+        self.with(|ends| {
+            for (reader, last) in acknowledgements {
+                ends.acknowledged = ends.acknowledged.wrapping_add(1);
+                let datagram = wire::acknowledgement(reader, writer, last, ends.acknowledged);
+                wire::send_to_own(&ends.participant, &datagram);
+            }
+            ends.repeated.extend(withheld.into_iter().map(|(reader, last)| Repeated::withheld(writer, reader, last)));
+            ends.serve_repeated();
+        });
     }
 
     /// Notifies a remote reader that a local writer has written `written` messages until now.
+    ///
+    /// Cyclone DDS takes the messages that the first heartbeat of a writer names for old ones, and acknowledges them
+    /// without delivery to a volatile reader. RustDDS sends a heartbeat when it matches a reader, but the reader may not
+    /// know the writer yet. The next heartbeat may name an answer that RustDDS has not sent: it counts a message from
+    /// the call that writes it, and answers an ACKNACK before it sends (`Writer::handle_ack_nack`). The client would
+    /// then wait without end. So this heartbeat, just before an answer is written, names the earlier answers.
     pub(super) fn announce(&self, writer: GUID, reader: GUID, written: u32) {
-        self.with(|ends| send_heartbeat(&ends.participant, writer, reader, written));
-    }
-
-    /// Notifies a remote reader that the first `last` messages of a local writer are not for it.
-    pub(super) fn send_gap(&self, writer: GUID, reader: GUID, last: u64) {
-        self.with(|ends| send_gap(&ends.participant, writer, reader, last));
-    }
-
-    /// Sends RustDDS the datagram of an acknowledgement.
-    pub(super) fn acknowledge(&self, datagram: &[u8]) {
-        self.with(|ends| send_to_own(&ends.participant, datagram));
+        self.with(|ends| {
+            let addresses = ends.addresses.get(&reader).into_iter().flatten().copied();
+            wire::send(&wire::heartbeat(writer, reader, written), addresses);
+        });
     }
 
     /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to
@@ -123,9 +161,7 @@ impl Matches {
             of_client(&ends.readers, responses) >= writers
         })
     }
-}
 
-impl Matches {
     /// Returns true if `client`, the writer of requests to the local reader `requests`, is still there.
     pub(super) fn is_present(&self, requests: GUID, client: GUID) -> bool {
         self.with(|ends| ends.writers.contains(&(requests, client)))
@@ -143,42 +179,88 @@ impl Matches {
 impl Ends {
     fn update(&mut self) {
         use DomainParticipantStatusEvent as Event;
+        let (mut has_come, mut detected) = (false, BTreeSet::new());
         while let Some(event) = self.events.try_recv_status() {
             match event {
+                Event::ParticipantDiscovered { .. } => has_come = true,
                 Event::RemoteReaderMatched { local_writer, remote_reader } => {
                     self.readers.insert((local_writer, remote_reader));
                 }
                 Event::RemoteWriterMatched { local_reader, remote_writer } => {
                     self.writers.insert((local_reader, remote_writer));
-                    self.first_messages.extend(FirstMessages::of(local_reader, remote_writer));
+                    if self.clients.contains(&remote_writer) {
+                        self.repeated.extend(Repeated::first_requests(local_reader, remote_writer));
+                    }
                 }
                 // RustDDS sends this before the matches of that reader.
                 Event::ReaderDetected { reader } => {
                     let transient_local = reader.qos.durability().is_some_and(|of| of != Durability::Volatile);
                     let reliable = reader.qos.is_reliable();
                     self.requests.insert(reader.guid, Requests { transient_local, reliable });
+                    detected.insert(reader.guid);
                 }
-                Event::ReaderLost { guid, .. } => {
-                    self.readers.retain(|(_, reader)| *reader != guid);
-                    self.requests.remove(&guid);
-                    self.old_messages.retain(|of| of.reader() != guid);
+                Event::WriterDetected { writer } if writer.topic_name.starts_with(REQUEST_PREFIX) => {
+                    self.clients.insert(writer.guid);
+                    detected.insert(writer.guid);
                 }
-                Event::WriterLost { guid, .. } => {
-                    self.writers.retain(|(_, writer)| *writer != guid);
-                    self.first_messages.retain(|of| of.writer() != guid);
-                }
+                Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => self.retain(|of| of != guid),
                 Event::ParticipantLost { id, .. } => {
-                    self.readers.retain(|(_, reader)| reader.prefix != id);
-                    self.requests.retain(|reader, _| reader.prefix != id);
-                    self.old_messages.retain(|of| of.reader().prefix != id);
-                    self.writers.retain(|(_, writer)| writer.prefix != id);
-                    self.first_messages.retain(|of| of.writer().prefix != id);
+                    Prefix::try_from(id.as_ref()).iter().for_each(|left| self.departures.forget(&[*left]));
+                    self.retain(|of| of.prefix != id);
                 }
                 _ => {}
             }
         }
-        let participant = &self.participant;
-        self.first_messages.retain_mut(|of| of.serve(participant));
-        self.old_messages.retain_mut(OldMessages::serve);
+        let mut dead = self.departures.gone(has_come, Instant::now());
+        if !detected.is_empty() {
+            dead.extend(self.note_addresses(&detected));
+        }
+        for participant in dead {
+            log::debug!("ROS 2: participant {participant:02x?} has died: it leaves the network");
+            // Its loss is then an event of RustDDS.
+            wire::send_to_own(&self.participant, &wire::farewell(participant));
+        }
+        self.serve_repeated();
+    }
+
+    /// Keeps the remote endpoints that `stays` admits.
+    fn retain(&mut self, stays: impl Fn(GUID) -> bool) {
+        self.readers.retain(|(_, reader)| stays(*reader));
+        self.writers.retain(|(_, writer)| stays(*writer));
+        self.requests.retain(|reader, _| stays(*reader));
+        self.clients.retain(|writer| stays(*writer));
+        self.addresses.retain(|end, _| stays(*end));
+        self.neighbours.retain(|reader, _| stays(*reader));
+        self.repeated.retain(|of| stays(of.remote()));
+    }
+
+    /// Reads the addresses of endpoints that have been detected. Returns the participants that had them before.
+    fn note_addresses(&mut self, detected: &BTreeSet<GUID>) -> Vec<Prefix> {
+        let readers = self.participant.discovered_readers().into_iter();
+        let readers =
+            readers.map(|data| (data.reader_proxy.remote_reader_guid, data.reader_proxy.unicast_locator_list));
+        let writers = self.participant.discovered_writers().into_iter();
+        let writers =
+            writers.map(|data| (data.writer_proxy.remote_writer_guid, data.writer_proxy.unicast_locator_list));
+        let own = self.participant.guid().prefix;
+        let remote = readers.chain(writers).filter(|(guid, _)| detected.contains(guid) && guid.prefix != own);
+        let found: Vec<(GUID, Vec<SocketAddr>)> = remote
+            .map(|(guid, locators)| {
+                let locators = locators.into_iter().filter(|locator| locator.is_udp());
+                (guid, locators.map(SocketAddr::from).collect())
+            })
+            .collect();
+        let dead = self.departures.note(found.iter().map(|(guid, addresses)| (prefix(*guid), addresses.clone())));
+        let of_fast_dds = found.iter().filter(|(guid, _)| wire::is_fast_dds(*guid));
+        self.neighbours.extend(of_fast_dds.filter_map(|(guid, addresses)| {
+            Some((*guid, addresses.iter().copied().find(|address| is_local(*address))?))
+        }));
+        self.addresses.extend(found);
+        dead
+    }
+
+    fn serve_repeated(&mut self) {
+        let (addresses, now) = (&self.addresses, Instant::now());
+        self.repeated.retain_mut(|of| of.serve(addresses.get(&of.remote()).map_or(&[][..], Vec::as_slice), now));
     }
 }

@@ -77,7 +77,7 @@ pub(super) fn open(context: &Context, name: &str) -> Result<Node, Ros2Error> {
 impl Topics {
     pub(super) fn open(context: Context, node: Node, matches: Matches, config: Ros2Config) -> Result<Self, Ros2Error> {
         let Ros2Config { ref stage, handles, .. } = config;
-        let mut maker = WriterFactory { context, node, config: &config };
+        let mut maker = WriterFactory { context, node, config: &config, matches: matches.clone() };
         let rosout = Rosout::open(&maker.context, &mut maker.node, &config.name)?;
         // Stage and path hold at any simulated time.
         let stamps = config.settings.stamps;

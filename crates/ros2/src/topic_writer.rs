@@ -4,7 +4,7 @@
 //! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first. With
 //! Fast DDS so would a volatile subscriber, since RustDDS does not read the durability of a subscriber. So a message
 //! without subscribers is held here and not written, and a writer of events is replaced after its last subscriber has
-//! left. A GAP of our own ([`gaps`](super::gaps)) withholds older messages from a subscriber that joins others. RustDDS
+//! left. A GAP of our own ([`readers`](super::readers)) withholds older messages from a subscriber that joins others. RustDDS
 //! sends a GAP only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber matches
 //! both, and a transient-local one would report the second as incompatible. Messages to single readers are no remedy
 //! either: RustDDS repairs them for every later subscriber.
@@ -14,19 +14,20 @@
 //! longer than a new subscriber takes is replaced.
 //!
 //! A volatile writer is relieved by a second one before it has written many messages ([`relief`](super::relief)), and
-//! keeps the messages of some seconds only ([`acknowledgements`](super::acknowledgements)).
+//! keeps the messages of some seconds only ([`readers`](super::readers)).
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node, Publisher};
+use rustdds::no_key::SerializerAdapter;
 use rustdds::policy::{self, ResourceLimits};
-use rustdds::{GUID, QosPolicies, QosPolicyBuilder, TopicKind};
+use rustdds::{CDRSerializerAdapter, QosPolicies, QosPolicyBuilder, TopicKind};
 use serde::Serialize;
 
-use super::acknowledgements::Acknowledgements;
+use super::copies::Copies;
 use super::matching::Matches;
+use super::readers::{Kind, Readers};
 use super::relief::Relief;
 use super::{Ros2Config, Ros2Error, UNACKNOWLEDGED_MESSAGES};
 use bench_dragon_messages::{MOST_CUES, MOST_DRAGONS, MOST_OBSTACLES, QUEUE_BYTES, Stage};
@@ -35,6 +36,8 @@ use bench_dragon_ros2_messages::{HasStamp, MessageType, Time};
 
 /// The longest time for which a writer may refuse: a new subscriber takes milliseconds to acknowledge.
 const REFUSAL_PATIENCE: Duration = Duration::from_millis(500);
+/// The interval at which the subscribers of a volatile topic are read.
+const READ_INTERVAL: Duration = Duration::from_millis(50);
 /// The time in which RustDDS matches a new publisher with the subscribers that it knows.
 const MATCHING_TIME: Duration = Duration::from_millis(100);
 /// An upper bound of a message's bytes besides its handles.
@@ -58,7 +61,11 @@ pub(super) struct TopicWriter<Message: Serialize> {
     /// The held message of a transient-local topic.
     latched: Option<Latched<Message>>,
     relief: Relief<Publisher<Arc<Message>>>,
-    acknowledgements: Acknowledgements,
+    readers: Readers,
+    /// The time at which the subscribers were read.
+    read: Option<Instant>,
+    /// The second copies of large messages, with the matches that name their readers.
+    copies: Option<(Copies, Matches)>,
 }
 
 /// A message that RustDDS has refused, with the time of the first refusal.
@@ -72,12 +79,6 @@ struct Latched<Message> {
     latest: Option<Arc<Message>>,
     /// True if the latest message has been written.
     is_written: bool,
-    /// Messages that the publisher has written.
-    written: u32,
-    /// True if there is a subscriber.
-    has_reader: bool,
-    /// The subscribers from which older messages have been withheld.
-    known: BTreeSet<GUID>,
     /// True if the message never changes.
     is_constant: bool,
 }
@@ -94,7 +95,7 @@ impl<Message: Serialize> TopicWriter<Message> {
         if let Some(latched) = &mut self.latched {
             latched.latest = Some(Arc::clone(&message));
             latched.is_written = false;
-            if !latched.has_reader {
+            if self.readers.is_empty() {
                 return;
             }
         }
@@ -132,16 +133,27 @@ impl<Message: Serialize> TopicWriter<Message> {
     }
 
     fn write(&mut self, message: Arc<Message>) -> bool {
-        let is_written = self.publisher.publish(message).is_ok();
+        let is_written = self.publisher.publish(Arc::clone(&message)).is_ok();
         if is_written {
             self.relief.count();
-            self.acknowledgements.count();
-            if let Some(latched) = &mut self.latched {
-                latched.written += 1;
-                latched.is_written = true;
-            }
+            self.readers.count();
+            self.copy(&message);
+            self.latched.iter_mut().for_each(|latched| latched.is_written = true);
         }
         is_written
+    }
+
+    /// Sends a second copy of a large message that has been written.
+    fn copy(&self, message: &Message) {
+        let Some((copies, matches)) = &self.copies else { return };
+        let writer = self.publisher.guid();
+        let readers = matches.neighbours(writer);
+        if readers.is_empty() {
+            return;
+        }
+        if let Ok(payload) = CDRSerializerAdapter::<Message>::to_bytes(message) {
+            copies.send(writer, self.readers.written(), payload.to_vec(), readers);
+        }
     }
 
     /// Replaces the publisher by one without history.
@@ -151,11 +163,9 @@ impl<Message: Serialize> TopicWriter<Message> {
             Ok(publisher) => self.publisher = publisher,
             Err(error) => log::warn!("ROS 2 topic {}: late subscribers get old messages first: {error}", self.topic),
         }
-        if let Some(latched) = &mut self.latched {
-            (latched.written, latched.is_written) = (0, false);
-        }
+        self.latched.iter_mut().for_each(|latched| latched.is_written = false);
         self.relief = Relief::default();
-        self.acknowledgements.restart();
+        self.readers.restart();
     }
 
     /// Relieves a volatile publisher when it is due, and acknowledges its old messages.
@@ -172,14 +182,20 @@ impl<Message: Serialize> TopicWriter<Message> {
             let matched = matches.subscribers(second.guid());
             matches.subscribers(first.guid()).keys().all(|reader| matched.contains_key(reader))
         };
-        let (writer, now) = (self.publisher.guid(), Instant::now());
+        let now = Instant::now();
+        if self.read.is_some_and(|read| now.duration_since(read) < READ_INTERVAL) {
+            return;
+        }
+        self.read = Some(now);
+        let writer = self.publisher.guid();
         if let Some(ended) = self.relief.serve(&mut self.publisher, now, create, is_matched) {
             matches.forget(ended.guid());
         }
         if self.publisher.guid() != writer {
-            self.acknowledgements.restart();
+            self.readers.restart();
         }
-        self.acknowledgements.serve(matches, self.publisher.guid(), now);
+        let writer = self.publisher.guid();
+        matches.settle(writer, self.readers.update(&matches.subscribers(writer), now));
     }
 }
 
@@ -201,29 +217,22 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
         if subscribers.is_empty() && self.replaced.is_some_and(|replaced| replaced.elapsed() < MATCHING_TIME) {
             return;
         }
-        latched.has_reader = !subscribers.is_empty();
-        if !latched.has_reader {
+        matches.settle(writer, self.readers.update(&subscribers, Instant::now()));
+        if subscribers.is_empty() {
             // The messages that RustDDS keeps are out of date for the next subscriber.
-            if latched.written > 0 && !latched.is_constant {
-                latched.known.clear();
+            if self.readers.written() > 0 && !latched.is_constant {
                 self.replace(node);
             }
             return;
         }
-        for (reader, requests) in &subscribers {
-            if latched.known.insert(*reader) {
-                let last = latched.written.saturating_sub(u32::from(requests.transient_local));
-                matches.withhold(writer, *reader, last);
-            }
-        }
-        if latched.is_written || !subscribers.values().any(|requests| requests.transient_local) {
+        let (one_requests_history, all_request_history) = self.readers.request_history();
+        if latched.is_written || !one_requests_history {
             return;
         }
         let Some(latest) = latched.latest.clone() else { return };
         // A volatile subscriber would take the held message for a new one. As a message of a new publisher, it is
         // withheld from that subscriber.
-        if !subscribers.values().all(|requests| requests.transient_local) {
-            latched.known.clear();
+        if !all_request_history {
             self.replace(node);
         }
         // A subscriber that matches this publisher later requests the message then.
@@ -265,6 +274,7 @@ pub(super) struct WriterFactory<'a> {
     pub(super) context: Context,
     pub(super) node: Node,
     pub(super) config: &'a Ros2Config,
+    pub(super) matches: Matches,
 }
 
 impl WriterFactory<'_> {
@@ -297,15 +307,11 @@ impl WriterFactory<'_> {
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
         let is_constant = matches!(topic, Topic::Stage | Topic::Path);
-        let nothing = Latched {
-            latest: None,
-            is_written: false,
-            written: 0,
-            has_reader: false,
-            known: BTreeSet::new(),
-            is_constant,
+        let nothing = Latched { latest: None, is_written: false, is_constant };
+        let (kind, latched) = match qos.durability {
+            Durability::TransientLocal => (Kind::TransientLocal, Some(nothing)),
+            Durability::Volatile => (Kind::Volatile(qos.depth.into()), None),
         };
-        let latched = (qos.durability == Durability::TransientLocal).then_some(nothing);
         Ok(Some(TopicWriter {
             publisher,
             dds,
@@ -315,7 +321,9 @@ impl WriterFactory<'_> {
             replaced: None,
             latched,
             relief: Relief::default(),
-            acknowledgements: Acknowledgements::new(qos.depth.into()),
+            readers: Readers::new(kind),
+            read: None,
+            copies: Copies::of(bytes).map(|copies| (copies, self.matches.clone())),
         }))
     }
 }

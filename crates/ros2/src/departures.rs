@@ -1,0 +1,167 @@
+//! Participants that have died without a farewell.
+//!
+//! RustDDS 0.15.1 sends to a killed participant until its lease ends (Fast DDS: 20 s). Meanwhile another participant may
+//! have taken its UDP port. That one gets messages which are not meant for it (`Writer::send_message_to_readers`, and
+//! `Writer::handle_repair_frags_send_worker`, which names no participant), and parts of a message that a GAP then
+//! withdraws make a reader of Fast DDS 2.14 hang ([`gap`](super::wire::gap)). Its readers also hold up the others until
+//! the lease ends, and RustDDS never forgets the endpoints of a participant whose lease has ended
+//! (`DiscoveryDB::remove_participant`). So this file finds out who has died, and the matches say farewell in its name.
+//!
+//! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants that have
+//! died: on this machine those whose sockets are gone, elsewhere those whose address belongs to a newer participant.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::{SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+
+use super::wire::Prefix;
+
+/// The interval at which sockets are read while no participant comes. Reading takes a fraction of a millisecond.
+const INTERVAL: Duration = Duration::from_secs(1);
+/// The UDP sockets of this network namespace. A system without this file only has the rule of the newer participant.
+const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
+
+/// The sockets of each port, by their inodes. No two sockets that exist at one time share an inode.
+type Sockets = BTreeMap<u16, BTreeSet<u64>>;
+
+/// The remote participants of a network.
+#[derive(Default)]
+pub(super) struct Departures {
+    participants: BTreeMap<Prefix, Addresses>,
+    checked: Option<Instant>,
+}
+
+/// The addresses of a participant. One of this machine has the sockets that its port had when it was discovered.
+type Addresses = BTreeMap<SocketAddr, Option<BTreeSet<u64>>>;
+
+impl Departures {
+    /// Notes the addresses of remote endpoints. Returns the older participants that had one of these addresses.
+    pub(super) fn note(&mut self, endpoints: impl IntoIterator<Item = (Prefix, Vec<SocketAddr>)>) -> Vec<Prefix> {
+        let mut sockets = None;
+        let mut died = Vec::new();
+        for (prefix, addresses) in endpoints {
+            for address in addresses {
+                let known = self.participants.entry(prefix).or_default();
+                if known.contains_key(&address) {
+                    continue;
+                }
+                let sockets = sockets.get_or_insert_with(read_sockets);
+                let of_port = sockets.get(&address.port()).filter(|_| is_local(address));
+                known.insert(address, of_port.cloned());
+                let others = self.participants.iter().filter(|(other, _)| **other != prefix);
+                died.extend(others.filter(|(_, known)| known.contains_key(&address)).map(|(other, _)| *other));
+            }
+        }
+        self.forget(&died);
+        died
+    }
+
+    /// Returns the participants of this machine whose sockets are gone. Looks at them if a participant has come or some
+    /// time has passed.
+    pub(super) fn gone(&mut self, has_come: bool, now: Instant) -> Vec<Prefix> {
+        let is_due = has_come || self.checked.is_none_or(|checked| now.duration_since(checked) >= INTERVAL);
+        if !is_due || self.participants.is_empty() {
+            return Vec::new();
+        }
+        self.checked = Some(now);
+        self.gone_from(&read_sockets())
+    }
+
+    fn gone_from(&mut self, sockets: &Sockets) -> Vec<Prefix> {
+        let is_gone = |(address, before): (&SocketAddr, &Option<BTreeSet<u64>>)| {
+            let now = sockets.get(&address.port());
+            before.as_ref().is_some_and(|before| now.is_none_or(|now| now.is_disjoint(before)))
+        };
+        let gone: Vec<Prefix> = self
+            .participants
+            .iter()
+            .filter(|(_, known)| known.iter().any(is_gone))
+            .map(|(prefix, _)| *prefix)
+            .collect();
+        self.forget(&gone);
+        gone
+    }
+
+    /// Forgets participants that have left.
+    pub(super) fn forget(&mut self, participants: &[Prefix]) {
+        participants.iter().for_each(|prefix| drop(self.participants.remove(prefix)));
+    }
+}
+
+/// Returns true for an address of this machine: sockets can be bound to it.
+pub(super) fn is_local(address: SocketAddr) -> bool {
+    UdpSocket::bind((address.ip(), 0)).is_ok()
+}
+
+fn read_sockets() -> Sockets {
+    let tables = TABLES.map(|table| std::fs::read_to_string(table).unwrap_or_default());
+    sockets(&tables.concat())
+}
+
+/// Reads a table of sockets: a line for each, with the local address as `ADDRESS:PORT`, in hexadecimal digits, in the
+/// second column and the inode in the tenth.
+fn sockets(table: &str) -> Sockets {
+    let mut sockets = Sockets::new();
+    for line in table.lines() {
+        let columns: Vec<&str> = line.split_whitespace().collect();
+        let [_, local, _, _, _, _, _, _, _, inode, ..] = columns[..] else { continue };
+        let port = local.rsplit_once(':').and_then(|(_, port)| u16::from_str_radix(port, 16).ok());
+        if let (Some(port), Ok(inode)) = (port, inode.parse()) {
+            sockets.entry(port).or_default().insert(inode);
+        }
+    }
+    sockets
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OLD: Prefix = [1; 12];
+    const NEW: Prefix = [2; 12];
+
+    fn note(departures: &mut Departures, prefix: Prefix, address: SocketAddr) -> Vec<Prefix> {
+        departures.note([(prefix, vec![address])])
+    }
+
+    #[test]
+    fn a_participant_whose_socket_is_closed_is_gone_at_once() {
+        let mut departures = Departures::default();
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = socket.local_addr().unwrap();
+        let now = Instant::now();
+        assert_eq!(note(&mut departures, OLD, address), [[0; 12]; 0]);
+        assert_eq!(departures.gone(true, now), [[0; 12]; 0]);
+        drop(socket);
+        assert_eq!(departures.gone(false, now), [[0; 12]; 0], "looked at a moment ago");
+        // The port may have been taken again.
+        let _other = UdpSocket::bind(address);
+        assert_eq!(departures.gone(true, now), [OLD]);
+        assert_eq!(departures.gone(true, now), [[0; 12]; 0], "once");
+    }
+
+    #[test]
+    fn a_participant_elsewhere_is_gone_when_a_newer_one_has_its_address() {
+        let mut departures = Departures::default();
+        // Documentation addresses (RFC 5737).
+        let [one, other] = ["198.51.100.1:7411", "198.51.100.2:7411"].map(|address| address.parse().unwrap());
+        assert_eq!(note(&mut departures, OLD, one), [[0; 12]; 0]);
+        assert_eq!(note(&mut departures, OLD, one), [[0; 12]; 0]);
+        assert_eq!(note(&mut departures, NEW, other), [[0; 12]; 0], "another machine");
+        assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
+        assert_eq!(note(&mut departures, NEW, one), [OLD]);
+    }
+
+    /// Lines of Linux 6.1.
+    #[test]
+    fn a_table_has_ports_and_inodes() {
+        let table = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode ref pointer drops\n\
+             \x20 123: 00000000:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4026 2 0000000000000000 0\n\
+             \x20 124: 0100007F:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4027 2 0000000000000000 9\n\
+             \x20 200: 00000000000000000000000000000000:1CE8 00000000000000000000000000000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 77 2 0000000000000000 0\n";
+        assert_eq!(
+            sockets(table),
+            BTreeMap::from([(7411, BTreeSet::from([4026, 4027])), (7400, BTreeSet::from([77]))])
+        );
+    }
+}
