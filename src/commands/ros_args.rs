@@ -4,18 +4,18 @@
 //! In: the arguments of the process. Out: the program's own arguments, and the names of the node. Called by `main`
 //! before the command line is parsed, and by the commands that publish over ROS 2.
 
+mod parameters;
+
+use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fs::File;
-use std::io::Read;
 
 use bench_dragon::ros2_messages::settings::{Ros2Settings, StampClock, Topic};
 
 use super::CommandError;
+use parameters::{Parameter, Parameters, Value};
 
 /// The start of these arguments.
 const BEGIN: &str = "--ros-args";
-/// The most bytes of a file of parameters.
-const MOST_BYTES: u64 = 1 << 16;
 /// The commands that understand these arguments.
 const COMMANDS: [&str; 2] = ["run", "replay"];
 
@@ -39,14 +39,15 @@ impl NodeNames {
     }
 }
 
-/// Translates the arguments after `--ros-args`, up to `--` or the end, to the program's own.
+/// Translates the arguments after `--ros-args`, up to `--` or the end, to the program's own. As in rcl, the first of
+/// two rules for a name counts, the last of two values of a parameter, and the last of two levels of the log.
 ///
 /// # Errors
 /// Bad input: an argument that is not understood, or a command that understands none.
 pub fn translated(arguments: impl IntoIterator<Item = OsString>) -> Result<(Vec<OsString>, NodeNames), CommandError> {
-    let (mut own, mut names): (Vec<OsString>, _) = (Vec::new(), NodeNames::default());
-    // Files of parameters, and the place of their options: a file is about nodes, whose names may follow it.
-    let (mut files, mut place) = (Vec::new(), 0);
+    let (mut own, mut node): (Vec<OsString>, _) = (Vec::new(), NodeArguments::default());
+    // The place of the options, which are known once the node's name is.
+    let mut place = 0;
     let mut arguments = arguments.into_iter();
     while let Some(argument) = arguments.next() {
         // The arguments after this one belong to no option.
@@ -73,29 +74,17 @@ pub fn translated(arguments: impl IntoIterator<Item = OsString>) -> Result<(Vec<
             let Some(value) = value.map(|value| value.to_string_lossy().into_owned()) else {
                 return Err(not_understood(&flag));
             };
-            if flag == "--params-file" {
-                files.push(value);
-            } else {
-                own.extend(translate(&flag, &value, &mut names)?.map(OsString::from));
-            }
+            node.read(&flag, &value)?;
         }
         place = own.len();
     }
     own.extend(arguments);
-    let node = format!("/{}", names.applied_to(&name_option(&own)));
-    for file in files {
-        for (line, parameter) in parameters(&file, &node)? {
-            let option = translate("-p", &parameter, &mut names).map_err(|_| {
-                let sentence =
-                    format!("{file}, line {line}: {parameter} is not understood, expected rate, scene or use_sim_time");
-                CommandError::BadInput(sentence)
-            })?;
-            if let Some(option) = option {
-                own.insert(place, OsString::from(option));
-                place += 1;
-            }
-        }
-    }
+    let NodeArguments { names, parameters, log_level } = node;
+    let name = format!("/{}", names.applied_to(&name_option(&own)));
+    let parameters: BTreeMap<_, _> =
+        parameters.of(&name).map(|parameter| (parameter.name.clone(), parameter)).collect();
+    let options = parameters.values().map(option).collect::<Result<Vec<_>, _>>()?;
+    own.splice(place..place, options.into_iter().chain(log_level).map(OsString::from));
     Ok((own, names))
 }
 
@@ -107,90 +96,65 @@ fn name_option(own: &[OsString]) -> String {
     joined.or_else(next).unwrap_or("bench_dragon").to_owned()
 }
 
-/// Returns the parameters of a node in a file as launch_ros writes it, each with its line, as `NAME:=VALUE`.
-///
-/// # Errors
-/// Bad input: no file, another form of YAML. As in rclcpp, a file for other nodes is none.
-fn parameters(file: &str, node: &str) -> Result<Vec<(usize, String)>, CommandError> {
-    let bad = |sentence: String| CommandError::BadInput(format!("{BEGIN} --params-file: {file}{sentence}"));
-    let text = read(file).map_err(|error| bad(format!(": {error}, expected a file of parameters (YAML)")))?;
-    let (mut depth, mut found) = (0, Vec::new());
-    for (line, content) in text.lines().enumerate().map(|(at, content)| (at + 1, content.trim_end())) {
-        let entry = content.trim_start();
-        if entry.is_empty() || entry.starts_with('#') || content == "---" {
-            continue;
-        }
-        let indent = content.len() - entry.len();
-        let (key, value) = entry.split_once(':').unwrap_or(("", ""));
-        let (key, value) = (unquoted(key), unquoted(value.trim()));
-        depth = match (indent, depth, value) {
-            (0, _, "") if !key.is_empty() => {
-                let is_own = key == "/**" || format!("/{}", key.trim_start_matches('/')) == node;
-                if is_own { 1 } else { 3 }
-            }
-            (1.., 1, "") if key == "ros__parameters" => 2,
-            (1.., 2, value) if !key.is_empty() && !value.is_empty() => {
-                found.push((line, format!("{key}:={value}")));
-                2
-            }
-            // The parameters of another node.
-            (1.., 3, _) => 3,
-            _ => {
-                let sentence = "expected NODE, ros__parameters and NAME: VALUE, a line each";
-                return Err(bad(format!(", line {line}, {sentence}")));
-            }
-        };
-    }
-    Ok(found)
+/// The arguments of a node.
+#[derive(Default)]
+struct NodeArguments {
+    names: NodeNames,
+    parameters: Parameters,
+    /// The program's own option for the level of the log.
+    log_level: Option<String>,
 }
 
-/// Reads a regular file of [`MOST_BYTES`] at most.
-fn read(path: &str) -> std::io::Result<String> {
-    let mut text = String::new();
-    let file = File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(std::io::Error::other("this is no regular file"));
-    }
-    if file.take(MOST_BYTES + 1).read_to_string(&mut text)? as u64 > MOST_BYTES {
-        return Err(std::io::Error::other(format!("it has more than {MOST_BYTES} bytes")));
-    }
-    Ok(text)
-}
-
-/// Returns a scalar of YAML without its quotes.
-fn unquoted(text: &str) -> &str {
-    let inner = |quote| text.strip_prefix(quote)?.strip_suffix(quote);
-    inner('"').or_else(|| inner('\'')).unwrap_or(text)
-}
-
-/// Returns the program's own option for a flag and its value, or sets a name of the node.
-fn translate(flag: &str, value: &str, names: &mut NodeNames) -> Result<Option<String>, CommandError> {
-    let refused = || not_understood(&format!("{flag} {value}"));
-    let option = match (flag, value.split_once(":=")) {
-        ("-r" | "--remap", Some(("__ns", namespace))) if namespace.starts_with('/') => {
-            names.namespace = Some(namespace.to_owned());
-            None
-        }
-        ("-r" | "--remap", Some(("__node" | "__name", node))) if !node.is_empty() && !node.contains('/') => {
-            names.node = Some(node.to_owned());
-            None
-        }
-        ("-p" | "--param", Some((name @ ("rate" | "scene"), value))) => Some(format!("--{name}={value}")),
-        ("-p" | "--param", Some(("use_sim_time", value))) => {
-            let value = value.to_lowercase();
-            value.parse::<bool>().map_err(|_| refused())?;
-            Some(format!("--use-sim-time={value}"))
-        }
-        ("--log-level", None) => match &*value.to_lowercase() {
-            "debug" => Some("-vv".to_owned()),
-            "info" => Some("-v".to_owned()),
-            "warn" => None,
-            "error" | "fatal" => Some("--quiet".to_owned()),
+impl NodeArguments {
+    /// Reads a flag and its value.
+    fn read(&mut self, flag: &str, value: &str) -> Result<(), CommandError> {
+        let refused = || not_understood(&format!("{flag} {value}"));
+        match (flag, value.split_once(":=")) {
+            ("-r" | "--remap", Some(("__ns", namespace))) if namespace.starts_with('/') => {
+                self.names.namespace.get_or_insert_with(|| namespace.to_owned());
+            }
+            ("-r" | "--remap", Some(("__node" | "__name", node))) if !node.is_empty() && !node.contains('/') => {
+                self.names.node.get_or_insert_with(|| node.to_owned());
+            }
+            ("-p" | "--param", _) => self.parameters.add_rule(value).ok_or_else(refused)?,
+            ("--params-file", _) => {
+                let bad = |sentence| CommandError::BadInput(format!("{BEGIN} --params-file: {sentence}"));
+                self.parameters.add_file(value).map_err(bad)?;
+            }
+            ("--log-level", None) => {
+                let option = match &*value.to_lowercase() {
+                    "debug" => Some("-vv"),
+                    "info" => Some("-v"),
+                    "warn" => None,
+                    "error" | "fatal" => Some("--quiet"),
+                    _ => return Err(refused()),
+                };
+                self.log_level = option.map(str::to_owned);
+            }
             _ => return Err(refused()),
-        },
-        _ => return Err(refused()),
+        }
+        Ok(())
+    }
+}
+
+/// Returns the program's own option for a parameter.
+fn option(parameter: &Parameter) -> Result<String, CommandError> {
+    let Parameter { name, value, place } = parameter;
+    let expected = match (&**name, value) {
+        ("rate", Value::Number(rate)) => return Ok(format!("--rate={rate}")),
+        ("use_sim_time", Value::Bool(is_sim)) => return Ok(format!("--use-sim-time={is_sim}")),
+        ("scene", Value::Text(file)) if !file.contains("$(") => return Ok(format!("--scene={file}")),
+        ("rate", _) => "a number",
+        ("use_sim_time", _) => "true or false",
+        ("scene", Value::Text(_)) => "a file: ROS 2 replaces a substitution only in launch files",
+        ("scene", _) => "a file as a text",
+        _ => {
+            let sentence = "is not understood, expected the parameters rate, scene and use_sim_time";
+            return Err(CommandError::BadInput(format!("{BEGIN}: {place} {sentence}")));
+        }
     };
-    Ok(option)
+    let described = value.described();
+    Err(CommandError::BadInput(format!("{BEGIN}: {place} is {described}, expected {expected}")))
 }
 
 fn not_understood(argument: &str) -> CommandError {
@@ -254,7 +218,7 @@ mod tests {
         let (own, names) = of("p run --ros2 --ros-args -r __node:=gold -r __ns:=/hall/left --ros-args -p rate:=50 \
                                --param use_sim_time:=True --log-level INFO -p scene:=a=b.toml -- --quiet")
         .unwrap();
-        assert_eq!(own, "p run --ros2 --rate=50 --use-sim-time=true -v --scene=a=b.toml --quiet");
+        assert_eq!(own, "p run --ros2 --rate=50 --scene=a=b.toml --use-sim-time=true -v --quiet");
         assert_eq!(names.applied_to("bench_dragon"), "hall/left/gold");
         // Launch files append them to every node.
         let (own, names) = of("p run --ros-args").unwrap();
@@ -267,7 +231,18 @@ mod tests {
         assert_eq!(of("p check -- --ros-args").unwrap().0, "p check -- --ros-args");
     }
 
-    /// A file as launch_ros 0.26 writes it.
+    /// As rcl: the first rule for a name, the last value of a parameter, the last level of the log.
+    #[test]
+    fn of_two_rules_the_first_counts_and_of_two_values_the_last() {
+        let (own, names) = of("p run --ros-args -r __ns:=/a -r __node:=b --ros-args -r __ns:=/c -r __name:=d \
+                               -p rate:=20 -p rate:=30.5 --log-level debug --log-level error")
+        .unwrap();
+        assert_eq!((&*own, names.applied_to("x")), ("p run --rate=30.5 --quiet", "a/b".to_owned()));
+        let (own, _) = of("p run --ros-args -p bench_dragon:rate:=20 -p other:rate:=30").unwrap();
+        assert_eq!(own, "p run --rate=20");
+    }
+
+    /// Files as launch_ros 0.26 and people write them. What rcl reads in each was read from its sources (9.2.0).
     #[test]
     fn a_file_of_parameters_is_that_of_its_node() {
         let folder = tempfile::tempdir().unwrap();
@@ -280,26 +255,106 @@ mod tests {
         let text = "/hall/gold:\n  ros__parameters:\n    rate: 20.0\n    scene: 'a: b.toml'\n    use_sim_time: false\n";
         let own = "p run --rate=20.0 --scene=a: b.toml --use-sim-time=false --quiet";
         assert_eq!(of_file(text, launched).unwrap(), own);
-        // The names may follow, comments and other nodes stand in the file, and a later parameter counts last.
+        // The names may follow, comments and other nodes stand in the file.
         let text =
             "# Both.\n---\nother:\n  ros__parameters:\n    depth: {x: 1}\n/**:\n  ros__parameters:\n\n    rate: 30\n";
         assert_eq!(of_file(text, "p run --ros-args --params-file FILE").unwrap(), "p run --rate=30");
         let text = "b:\n  ros__parameters:\n    rate: 7\n";
         assert_eq!(of_file(text, "p run --name b --ros-args --params-file FILE").unwrap(), "p run --name b --rate=7");
-        for text in ["", "other:\n  ros__parameters:\n    rate: 1\n"] {
+        for text in ["", "# nothing\n", "---\n", "other:\n  ros__parameters:\n    rate: 1\n"] {
             assert_eq!(of_file(text, launched).unwrap(), "p run --quiet");
         }
-        for (text, expected) in [
-            ("/**:\n  ros__parameters:\n    colour: red\n", "line 3: colour:=red is not understood"),
-            ("/**:\n  ros__parameters:\n    rate: [1,\n      2]\n", "line 4, expected NODE, ros__parameters"),
-            ("/**: {ros__parameters: {rate: 1}}\n", "line 1, expected NODE"),
-            ("  rate: 1\n", "line 1, expected NODE"),
-            ("/**:\n  rate: 1\n", "line 2, expected NODE"),
-            ("/**:\n  ros__parameters:\n    rate:\n", "line 3, expected NODE"),
-            ("rate\n", "line 1, expected NODE"),
-            (&"#".repeat(70_000), "more than 65536 bytes"),
+        // The section's full name is the node's, or a pattern that matches it.
+        let rate = "ros__parameters:\n";
+        for (section, is_own) in [
+            ("/hall/gold", true),
+            ("hall/gold", true),
+            ("hall:\n  gold", true),
+            ("/hall:\n  gold", true),
+            ("/:\n  hall/gold", true),
+            ("/**", true),
+            ("/**/gold", true),
+            ("/hall/**", true),
+            ("/*/gold", true),
+            ("/hall/*", true),
+            ("/hall/gold/**", true),
+            ("/**/**/gold/**", true),
+            ("gold", false),
+            ("/gold", false),
+            ("/*", false),
+            ("/*/*/gold", false),
+            ("/**/jade", false),
+            ("stage:\n  gold", false),
+            ("hall:\n  jade", false),
         ] {
-            let sentence = of_file(text, launched).unwrap_err();
+            let levels = section.lines().count() * 2;
+            let text = format!("{section}:\n{:levels$}{rate}{:levels$}  rate: 20.0\n", "", "");
+            let expected = if is_own { "p run --rate=20.0 --quiet" } else { "p run --quiet" };
+            assert_eq!(of_file(&text, launched).unwrap(), expected, "{text}");
+        }
+        // Two nodes in one namespace.
+        let text = "hall:\n  jade:\n    ros__parameters: {rate: 1}\n  gold: {ros__parameters: {rate: 20, \
+                    use_sim_time: no}}\n";
+        assert_eq!(of_file(text, launched).unwrap(), "p run --rate=20 --use-sim-time=false --quiet");
+    }
+
+    /// `Node(parameters=["p.yaml", {"rate": 30}])` becomes two files.
+    #[test]
+    fn a_parameter_of_a_later_file_or_rule_counts() {
+        let folder = tempfile::tempdir().unwrap();
+        let [own, general, all] = ["p.yaml", "launch_params_1", "all.yaml"].map(|name| folder.path().join(name));
+        std::fs::write(&own, "/gold:\n  ros__parameters:\n    rate: 20.0\n    scene: a.toml\n").unwrap();
+        std::fs::write(&general, "/**:\n  ros__parameters:\n    rate: 30\n").unwrap();
+        std::fs::write(&all, "/**:\n  ros__parameters:\n    rate: 10\ngold:\n  ros__parameters:\n    rate: 20\n")
+            .unwrap();
+        let [own, general, all] = [own, general, all].map(|path| path.display().to_string());
+        let rate = |arguments: String| of(&format!("p run --ros-args -r __node:=gold {arguments}")).unwrap().0;
+        let given = rate(format!("--params-file {own} --params-file {general}"));
+        assert_eq!(given, "p run --rate=30 --scene=a.toml");
+        assert_eq!(rate(format!("--params-file {own} -p rate:=40")), "p run --rate=40 --scene=a.toml");
+        assert_eq!(rate(format!("--params-file {general} --params-file {own}")), "p run --rate=20.0 --scene=a.toml");
+        // As in rcl, `-p` joins the section `/**`, which stands where it first stood.
+        assert_eq!(rate(format!("--params-file {all} -p rate:=40")), "p run --rate=20");
+        assert_eq!(rate(format!("--params-file {all} -p gold:rate:=40")), "p run --rate=40");
+    }
+
+    #[test]
+    fn a_file_that_is_not_understood_is_refused_with_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("launch_params_1").display().to_string();
+        let deep = |levels: usize| format!("{}{}", "{a: ".repeat(levels), "}".repeat(levels));
+        let of_parameters = |text: &str| format!("/**:\n  ros__parameters:\n    {text}\n");
+        for (text, expected) in [
+            (of_parameters("colour: red"), "line 3: colour is not understood, expected the parameters rate, scene and"),
+            (of_parameters("loop: {rate: 1}"), "line 3: loop.rate is not understood"),
+            (of_parameters("rate: [1,\n      2]"), "line 3: rate is a list, expected a number"),
+            (of_parameters("rate: '30'"), "line 3: rate is the text \"30\", expected a number"),
+            (of_parameters("rate: fast"), "line 3: rate is the text \"fast\", expected a number"),
+            (of_parameters("rate: 017"), "line 3: rate is the text \"017\", expected a number"),
+            (of_parameters("rate: !!str 30"), "line 3: rate is the text \"30\", expected a number"),
+            (of_parameters("rate: yes"), "line 3: rate is true, expected a number"),
+            (of_parameters("rate: $(var rate)"), "rate is the text \"$(var rate)\", expected a number"),
+            (of_parameters("scene: 5"), "line 3: scene is the number 5, expected a file as a text"),
+            (of_parameters("scene: $(find-pkg-share x)/a.toml"), "only in launch files"),
+            (of_parameters("use_sim_time: 1"), "line 3: use_sim_time is the number 1, expected true or false"),
+            (of_parameters("use_sim_time: 'true'"), "line 3: use_sim_time is the text \"true\", expected true or"),
+            (of_parameters("rate:"), "expected names of nodes"),
+            (of_parameters("rate: [[1]]"), "line 3, expected names of nodes"),
+            (of_parameters("rate: &a 30\n    scene: *a"), "line 4, expected names of nodes"),
+            (of_parameters("rate: \"30"), "line "),
+            ("  rate: 1\n".to_owned(), "line 1, expected names of nodes"),
+            ("/**:\n  rate: 1\n".to_owned(), "line 2, expected names of nodes"),
+            ("ros__parameters:\n  rate: 1\n".to_owned(), "line 2, expected names of nodes"),
+            ("rate\n".to_owned(), "line 1, expected names of nodes"),
+            ("- rate\n".to_owned(), "line 1, expected names of nodes"),
+            ("/gold*:\n  ros__parameters:\n    rate: 1\n".to_owned(), "\"gold*\" in \"/gold*\" is no name of a node"),
+            ("hall:\n  /gold:\n    ros__parameters:\n      rate: 1\n".to_owned(), "in \"hall//gold\" is no name"),
+            (deep(40), "line 1, expected names of nodes"),
+            (deep(10_000), "line 1"),
+            ("#".repeat(70_000), "more than 65536 bytes"),
+        ] {
+            std::fs::write(&file, &text).unwrap();
+            let sentence = of(&format!("p run --ros-args --params-file {file}")).unwrap_err();
             assert!(sentence.contains(expected) && sentence.contains("launch_params_1"), "{expected}: {sentence}");
         }
         assert!(of("p run --ros-args --params-file /nowhere").unwrap_err().contains("/nowhere: No such file"));
@@ -313,15 +368,22 @@ mod tests {
             ("-r poses:=/other", "-r poses:=/other"),
             ("-r __ns:=hall", "-r __ns:=hall"),
             ("-r __node:=a/b", "-r __node:=a/b"),
-            ("-p speed:=2", "-p speed:=2"),
-            ("-p use_sim_time:=maybe", "use_sim_time:=maybe"),
             ("-p rate", "-p rate"),
+            ("-p rate:=", "-p rate:="),
             ("--log-level loud", "--log-level loud"),
             ("--log-level rcl:=debug", "rcl:=debug"),
             ("--enclave /x", "--enclave"),
         ] {
             let sentence = of(&format!("p run --ros-args {text}")).unwrap_err();
             assert!(sentence.contains(named) && sentence.contains("-r __node:=NAME"), "{sentence}");
+        }
+        for (text, expected) in [
+            ("-p speed:=2", "-p speed:=2 is not understood, expected the parameters rate, scene and use_sim_time"),
+            ("-p use_sim_time:=maybe", "use_sim_time:=maybe is the text \"maybe\", expected true or false"),
+            ("-p rate:='30'", "-p rate:='30' is the text \"30\", expected a number"),
+        ] {
+            let sentence = of(&format!("p run --ros-args {text}")).unwrap_err();
+            assert!(sentence.contains(expected), "{sentence}");
         }
         assert!(of("p watch --ros-args -r __node:=a").unwrap_err().contains("run and replay"));
     }
