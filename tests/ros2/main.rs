@@ -5,6 +5,7 @@ mod fast_dds;
 mod harness;
 mod ros2;
 mod ros2_control;
+mod ros2_examples;
 mod ros2_feed;
 mod ros2_several;
 mod ros2_topics;

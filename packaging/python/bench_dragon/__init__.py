@@ -6,11 +6,13 @@
         x = frame.handles["x"]                   # metres, a numpy array in the publisher's own memory
 
 `subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands. `HermiteReader`
-gives the handles between two frames. All messages have the layouts of the program of the same version.
+gives the handles between two frames, `name_in` the names of benches and obstacles. All messages have the layouts of the
+program of the same version.
 """
 
-from bench_dragon.control import CODES, COMMANDS, Controller, described
-from bench_dragon.feed import Feed, Frame, subscribe
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from bench_dragon.frames import HANDLE_POSE, HANDLE_POSE_32, Handles, handles_of, indices_of
 from bench_dragon.hermite import HermiteReader
 from bench_dragon.layouts import (
@@ -40,7 +42,27 @@ from bench_dragon.layouts import (
     StageObstacle,
     StageSegment,
 )
-from bench_dragon.services import LayoutError
+from bench_dragon.names import name_in
+
+if TYPE_CHECKING:
+    from bench_dragon.control import CODES, COMMANDS, Controller, described
+    from bench_dragon.feed import Feed, Frame, subscribe
+    from bench_dragon.services import LayoutError
+
+# The names of modules that need iceoryx2, which a subscriber over ROS 2 may lack: they are imported when first used.
+_IN_MODULES = {
+    "control": ("CODES", "COMMANDS", "Controller", "described"),
+    "feed": ("Feed", "Frame", "subscribe"),
+    "services": ("LayoutError",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _IN_MODULES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "CODES",
@@ -81,5 +103,6 @@ __all__ = [
     "described",
     "handles_of",
     "indices_of",
+    "name_in",
     "subscribe",
 ]
