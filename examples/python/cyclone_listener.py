@@ -2,7 +2,8 @@
 
     python3 examples/python/cyclone_listener.py [--name bench_dragon] [--seconds 10]
 
-Start a publisher first: `cargo run --release -- run --ros2`.
+Start a publisher first: `cargo run --release -- run --ros2`. With ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST for both they
+meet on this machine's loopback interface.
 """
 
 import argparse
@@ -18,6 +19,13 @@ from cyclonedds.idl.types import float64, int32, sequence, uint32
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
+
+
+# The settings of Cyclone DDS for the range LOCALHOST: a publisher of that range is on the loopback interface alone.
+LOOPBACK = (
+    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General></Domain>'
+    "</CycloneDDS>"
+)
 
 
 @final
@@ -70,6 +78,9 @@ def main():
     parser.add_argument("--name", default="bench_dragon")
     parser.add_argument("--seconds", type=float, default=10.0)
     arguments = parser.parse_args()
+    is_local = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
+    if is_local or os.environ.get("ROS_LOCALHOST_ONLY") == "1":
+        os.environ.setdefault("CYCLONEDDS_URI", LOOPBACK)
     participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID") or 0))
     topic = Topic(participant, f"rt/{arguments.name}/poses", PoseArray)
     kept = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(10))

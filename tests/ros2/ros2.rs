@@ -248,7 +248,6 @@ fn what_ros_2_cannot_do_is_refused_in_a_sentence() {
         ("ROS_DOMAIN_ID", "300", "0 to 232"),
         ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "LOCALHOST"),
         ("ROS_LOCALHOST_ONLY", "maybe", "0 or 1"),
-        ("ROS_STATIC_PEERS", "10.0.0.1", "multicast"),
     ] {
         let output =
             Process::start(program("refused").env(variable, value).args(["run", "--ros2", "--duration", "1"])).output();
@@ -261,6 +260,27 @@ fn what_ros_2_cannot_do_is_refused_in_a_sentence() {
     let output = Process::start(run.args(["run", "--ros2", "--name", "2nd dragon"])).output();
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("2nd dragon"));
+}
+
+#[test]
+fn what_ros_2_honours_and_rustdds_does_not_is_named_in_a_warning() {
+    let variables = [
+        ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"),
+        ("ROS_DISCOVERY_SERVER", "10.0.0.1:11811"),
+        ("CYCLONEDDS_URI", "file:///nowhere.xml"),
+        ("ROS_STATIC_PEERS", "10.0.0.1"),
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
+    ];
+    // With ROS_LOCALHOST_ONLY, range and peers have no effect (ros2/rcl#1069).
+    let mut run = program("warned");
+    run.env("ROS_LOCALHOST_ONLY", "1").args(["run", "--ros2", "--duration", "3"]);
+    let output = Process::start(run.envs(variables)).output();
+    let printed = text(&output.stderr);
+    assert!(output.status.success(), "{printed}");
+    for (variable, _) in variables {
+        let warned = printed.lines().filter(|line| line.contains("WARN") && line.contains(variable)).count();
+        assert_eq!(warned, 1, "{variable}: {printed}");
+    }
 }
 
 #[test]
@@ -392,11 +412,16 @@ fn the_example_that_needs_no_ros_prints_the_frames() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
-    let publisher = Process::start(program("example").args(["run", "--ros2", "--json"]));
-    let mut example = python();
-    example.args(["examples/python/cyclone_listener.py", "--name", &unique("example"), "--seconds", "300"]);
-    let mut example = Process::start(&mut example);
-    let printed = example.lines();
-    (0..3).for_each(|_| drop(printed.until("224 handles, head (")));
-    stopped(publisher);
+    // A domain each: no listener may hear the publisher of another range.
+    for (domain, range) in [("22", None), ("23", Some("LOCALHOST"))] {
+        let environment = [Some(("ROS_DOMAIN_ID", domain)), range.map(|of| ("ROS_AUTOMATIC_DISCOVERY_RANGE", of))];
+        let environment: Vec<(&str, &str)> = environment.into_iter().flatten().collect();
+        let publisher = Process::start(program("example").envs(environment.clone()).args(["run", "--ros2", "--json"]));
+        let mut example = python();
+        example.args(["examples/python/cyclone_listener.py", "--name", &unique("example"), "--seconds", "300"]);
+        let mut example = Process::start(example.envs(environment));
+        let printed = example.lines();
+        (0..3).for_each(|_| drop(printed.until("224 handles, head (")));
+        stopped(publisher);
+    }
 }

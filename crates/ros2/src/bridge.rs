@@ -19,7 +19,7 @@ use bench_dragon_show::scene::Scene;
 
 use crate::commands::ShowCommands;
 use crate::control::{ControlThread, Endpoints};
-use crate::environment::{Network, check_name, other_distribution};
+use crate::environment::{Network, check_name, warnings};
 use crate::matching::Matches;
 use crate::node::{self, EndedTopics, Topics};
 use crate::rate::RateDivider;
@@ -134,9 +134,7 @@ impl<'a> Bridge<'a> {
         names.iter().try_for_each(|name| check_name(name))?;
         let variable = |name: &str| std::env::var(name).ok();
         let network = Network::of(variable)?;
-        if let Some(warning) = other_distribution(variable) {
-            log::warn!("{warning}");
-        }
+        warnings(variable).iter().for_each(|sentence| log::warn!("{sentence}"));
         let context = context(network)?;
         let matches = Matches::new(&context);
         let show = |name| ShowBridge::new(name, settings.clone());

@@ -2,7 +2,7 @@
 //! them.
 
 use bench_dragon::client::shared_memory::service_name;
-use bench_dragon::ros2::environment::{Network, Range, check_name, other_distribution};
+use bench_dragon::ros2::environment::{Network, Range, check_name, warnings};
 use fastrand::Rng;
 
 use super::Target;
@@ -10,9 +10,16 @@ use super::bytes::{changed, one, renumbered};
 
 pub const TARGET: Target = Target { name: "environment", run, seeds, mutate, cases: 100_000 };
 
-const VARIABLES: [&str; 5] =
-    ["ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_DISTRO"];
-const VALUES: [&str; 21] = [
+const VARIABLES: [&str; 7] = [
+    "ROS_DOMAIN_ID",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_LOCALHOST_ONLY",
+    "ROS_STATIC_PEERS",
+    "ROS_DISTRO",
+    "RMW_IMPLEMENTATION",
+    "CYCLONEDDS_URI",
+];
+const VALUES: [&str; 22] = [
     "stage/left",
     "1st",
     "_x/a_",
@@ -33,6 +40,7 @@ const VALUES: [&str; 21] = [
     "SYSTEM_DEFAULT",
     "humble",
     "jazzy",
+    "rmw_cyclonedds_cpp",
     "\u{9f99}",
 ];
 
@@ -45,7 +53,7 @@ fn run(data: &[u8]) -> bool {
         Ok(network) => {
             let domain = set("ROS_DOMAIN_ID").map_or(Ok(0), |text| text.trim().parse::<i128>());
             assert_eq!(domain, Ok(i128::from(network.domain)));
-            assert!(network.domain <= 232 && set("ROS_STATIC_PEERS").is_none(), "{network:?}");
+            assert!(network.domain <= 232, "{network:?}");
             // A setting for this machine alone allows no other range.
             let alone = set("ROS_LOCALHOST_ONLY").is_some_and(|value| value.trim() == "1");
             assert!(!alone || network.range == Range::Localhost, "{network:?}");
@@ -56,7 +64,14 @@ fn run(data: &[u8]) -> bool {
             assert!(VARIABLES.iter().any(|name| sentence.contains(name) && set(name).is_some()), "{sentence}");
         }
     }
-    assert!(other_distribution(variable).is_none_or(|text| text.contains("ROS_DISTRO")));
+    let sentences = warnings(variable);
+    let names_one = |text: &String| VARIABLES.iter().any(|name| text.starts_with(name) && set(name).is_some());
+    assert!(sentences.iter().all(names_one), "{sentences:?}");
+    // What names other peers or another implementation is followed nowhere, so it has a warning.
+    let is_own = |value: String| value.trim().ends_with("cyclonedds_cpp");
+    let is_warned = |name| sentences.iter().any(|text| text.starts_with(name));
+    assert!(set("ROS_STATIC_PEERS").is_none() || is_warned("ROS_STATIC_PEERS"), "{sentences:?}");
+    assert!(set("RMW_IMPLEMENTATION").is_none_or(is_own) || is_warned("RMW_IMPLEMENTATION"), "{sentences:?}");
     // The rest of each line is used as a name.
     for (_, name) in lines {
         if check_name(name).is_ok() {
