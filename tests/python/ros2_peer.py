@@ -245,7 +245,8 @@ def main():
                 counts[wanted] += 1
                 if counts[wanted] == 1:
                     print(json.dumps({"type": "offered", "by": kind, **offered(reader, participants)}), flush=True)
-                line = {"type": "message", "topic": wanted, "message": shortened(kind, sample)}
+                sent_ns = sample.sample_info.source_timestamp
+                line = {"type": "message", "topic": wanted, "sent_ns": sent_ns, "message": shortened(kind, sample)}
                 print(json.dumps(line), flush=True)
                 if arguments.until_each and counts[wanted] == 1 and all(counts.values()):
                     end = min(end, time.monotonic() + 1.0)

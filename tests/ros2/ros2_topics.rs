@@ -3,11 +3,13 @@
 
 use crate::harness;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 use bench_dragon::soak::resources::child_of;
-use harness::{Process, can_run, json_lines, long, program, python, python_modules, scene_file, summary, text, unique};
+use harness::{
+    Process, can_run, json_lines, long, program, python, python_modules, scene_file, stopped, summary, text, unique,
+};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
@@ -52,13 +54,15 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
             lines.push(serde_json::from_str(&printed.until("")).unwrap());
         }
     };
-    until(&mut lines, &|lines| topics[..4].iter().all(|topic| !messages(lines, topic).is_empty()));
+    // A transform is sent when its stamp changes, so that there is none yet.
+    let paused = [topics[0], topics[1], topics[3]];
+    until(&mut lines, &|lines| paused.iter().all(|topic| !messages(lines, topic).is_empty()));
     let go = program("shown").args(["control", "go"]).output().unwrap();
     assert!(go.status.success(), "{}", text(&go.stderr));
     let latest = |lines: &[Value]| messages(lines, topics[4]).last().is_some_and(|cue| cue["number"] == 3);
     until(&mut lines, &latest);
-    let so_far = messages(&lines, "clock").len();
-    until(&mut lines, &|lines| messages(lines, "clock").len() > so_far + 2 && messages(lines, "tf").len() > so_far + 2);
+    let so_far = ["clock", "tf"].map(|topic| (topic, messages(&lines, topic).len()));
+    until(&mut lines, &|lines| so_far.iter().all(|(topic, count)| messages(lines, topic).len() > count + 3));
     // A late subscriber gets the latest cue and the path, once.
     let late = Process::start(peer("shown", "300", &topics[3..]).args(["--domain", "9", "--until-each"])).output();
     let late = json_lines(&late);
@@ -135,6 +139,54 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
 /// Returns a stamp in nanoseconds.
 fn nanoseconds(stamp: &Value) -> u64 {
     stamp["sec"].as_u64().unwrap() * 1_000_000_000 + stamp["nanosec"].as_u64().unwrap()
+}
+
+/// A node with `use_sim_time` takes a frame that comes before its clock for one of its future. tf2 reports a transform
+/// with the stamp of the one before as an error, or keeps both.
+#[test]
+fn the_clock_comes_before_its_frame_and_no_transform_has_the_stamp_of_the_one_before() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "clock_first";
+    let mut run = program(name);
+    run.args(["--scene", "config/ros2.toml", "run", "--json", "--start", "50", "--duration", "300"]);
+    let publisher = Process::start(run.env("ROS_DOMAIN_ID", "21"));
+    let mut subscriber = Process::start(peer(name, "300", &["handles", "clock", "tf"]).args(["--domain", "21"]));
+    let printed = subscriber.lines();
+    let mut lines: Vec<Value> = Vec::new();
+    let mut until = |enough: &dyn Fn(&[Value]) -> bool| {
+        while !enough(&lines) {
+            lines.push(serde_json::from_str(&printed.until("")).unwrap());
+        }
+        messages(&lines, "tf").len()
+    };
+    let control = |command: &str| {
+        let done = program(name).args(["control", command]).output().unwrap();
+        assert!(done.status.success(), "{}", text(&done.stderr));
+    };
+    until(&|lines| messages(lines, "tf").len() > 60);
+    control("pause");
+    let is_paused = |message: &&Value| message["playback"] == 1;
+    let before = until(&|lines| messages(lines, "handles").into_iter().filter(is_paused).count() > 60);
+    control("resume");
+    until(&|lines| messages(lines, "tf").len() > before + 60);
+    stopped(publisher);
+
+    let of_tf = |message: &Value| nanoseconds(&message["transforms"][0]["header"]["stamp"]);
+    let stamps: Vec<u64> = messages(&lines, "tf").into_iter().map(of_tf).collect();
+    assert!(stamps.windows(2).all(|pair| pair[0] < pair[1]), "{stamps:?}");
+    let sent = |topic: &str, stamp: &dyn Fn(&Value) -> u64| -> BTreeMap<u64, i64> {
+        let of_topic = lines.iter().filter(|line| line["topic"] == topic);
+        let of_topic = of_topic.filter(|line| !is_paused(&&line["message"]));
+        of_topic.map(|line| (stamp(&line["message"]), line["sent_ns"].as_i64().unwrap())).collect()
+    };
+    let clock = sent("clock", &|message| nanoseconds(&message["clock"]));
+    let handles = sent("handles", &|message| nanoseconds(&message["header"]["stamp"]));
+    let pairs: Vec<(i64, i64)> = handles.iter().filter_map(|(stamp, sent)| Some((*clock.get(stamp)?, *sent))).collect();
+    // A message that comes again counts as sent then.
+    let late = pairs.iter().filter(|(clock, frame)| clock > frame).count();
+    assert!(pairs.len() > 60 && late * 10 < pairs.len(), "{late} of {} frames come before their clock", pairs.len());
 }
 
 /// Returns true if `poses`, `tf` and, where stamps are on it, `clock` have the stamp of a message of `handles`.

@@ -20,7 +20,7 @@ use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
 use bench_dragon_ros2_messages::settings::{DiagnosticLimits, StampClock, Topic};
 use bench_dragon_ros2_messages::transforms::TfMessage;
-use bench_dragon_ros2_messages::{Clock, HandlePoses, HasStamp, PoseArray, Stamped};
+use bench_dragon_ros2_messages::{Clock, HandlePoses, HasStamp, PoseArray, Stamped, Time};
 
 /// An upper bound of the bytes of a point of the path.
 const PATH_POSE_BYTES: usize = 88;
@@ -47,6 +47,8 @@ pub(super) struct Topics {
     path: Option<TopicWriter<Path>>,
     rosout: Rosout,
     stamps: StampClock,
+    /// The stamp of the latest transforms.
+    transformed: Option<Time>,
     latest_alert: Option<CollisionAlert>,
     latest_chase: Option<ChaseStatus>,
     /// Simulated seconds per second, of the latest frame.
@@ -103,6 +105,7 @@ impl Topics {
             path: maker.port(Topic::Path, path_bytes)?,
             rosout,
             stamps,
+            transformed: None,
             latest_alert: None,
             latest_chase: None,
             time_scale: 1.0,
@@ -148,17 +151,20 @@ impl Topics {
         self.time_scale = header.time_scale;
         let stamp = self.stamps.at(header.stamp_ns, header.sim_time);
         let discarded = &mut self.discarded;
+        // First: a node with use_sim_time would take the frame for one of its future.
+        if let Some(port) = &mut self.clock {
+            port.send(Arc::new(Clock::of(header)), discarded);
+        }
         if let Some(stream) = &mut self.handles {
             stream.publish(discarded, stamp, |message| message.update(header, handles));
         }
         if let Some(stream) = &mut self.poses {
             stream.publish(discarded, stamp, |message| message.update(header, handles));
         }
-        if let Some(port) = &mut self.clock {
-            port.send(Arc::new(Clock::of(header)), discarded);
-        }
-        if let Some(stream) = &mut self.transforms {
+        // tf2 reports a transform with the stamp of the one before as an error, or keeps both.
+        if let Some(stream) = self.transforms.as_mut().filter(|_| self.transformed != Some(stamp)) {
             stream.publish(discarded, stamp, |message| message.update(header, handles));
+            self.transformed = Some(stamp);
         }
         if let Some(stream) = &mut self.markers {
             let (stage, alert) = (&self.stage, self.latest_alert.as_ref());
