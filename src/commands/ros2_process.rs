@@ -52,6 +52,8 @@ pub enum Ros2Line {
         /// The name.
         name: String,
     },
+    /// The counters so far, once a second: a process that is killed prints no summary.
+    Counters(TransportCounters),
     /// The counters, at the end.
     Summary(TransportCounters),
 }
@@ -151,7 +153,8 @@ impl Ros2Process {
         &self.connected
     }
 
-    /// Ends the process after it has sent the remaining frames. Returns its counters, unless it was killed.
+    /// Ends the process after it has sent the remaining frames. Returns the counters of all processes; of a process that
+    /// was killed, without its last second.
     pub fn finish(mut self) -> Option<TransportCounters> {
         self.end()
     }
@@ -177,15 +180,20 @@ struct Supervisor {
 }
 
 impl Supervisor {
-    /// Keeps the process running until the show ends. Returns the counters of the last process.
+    /// Keeps the process running until the show ends. Returns the counters of all processes.
     fn serve(&self) -> Option<TransportCounters> {
         let (shortest, longest) = DELAYS;
-        let mut delay = Duration::ZERO;
+        let (mut delay, mut sum) = (Duration::ZERO, None);
         loop {
             let began = Instant::now();
             let ended = self.run_once();
+            if let Ok((_, Some(TransportCounters { frames, skipped, discarded }))) = ended {
+                let of: &mut TransportCounters = sum.get_or_insert_default();
+                (of.frames, of.skipped) = (of.frames + frames, of.skipped + skipped);
+                of.discarded += discarded;
+            }
             if self.must_stop() {
-                return ended.ok().and_then(|(_, counters)| counters);
+                return sum;
             }
             delay = if began.elapsed() >= LIFETIME { Duration::ZERO } else { (2 * delay).clamp(shortest, longest) };
             let reason = ended.map_or_else(|error| error.to_string(), |(status, _)| status.to_string());
@@ -242,14 +250,14 @@ impl Supervisor {
     }
 }
 
-/// Reads the lines of the process until it ends. Returns its counters, if it has printed them.
+/// Reads the lines of the process until it ends. Returns the latest counters that it has printed.
 fn read_lines(output: Option<ChildStdout>, connected: &AtomicBool) -> Option<TransportCounters> {
     let lines = output.into_iter().flat_map(|output| BufReader::new(output).lines().map_while(Result::ok));
     let mut counters = None;
     for line in lines {
         match serde_json::from_str(&line) {
             Ok(Ros2Line::Connected { .. }) => connected.store(true, Ordering::Release),
-            Ok(Ros2Line::Summary(of)) => counters = Some(of),
+            Ok(Ros2Line::Counters(of) | Ros2Line::Summary(of)) => counters = Some(of),
             // A killed process can leave half a line.
             _ => (),
         }

@@ -153,7 +153,7 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
     let seconds = watch.lines();
     let (subscriber, lines) = peer(name, &["handles"]);
     let run = run_of(&next(&lines, "handles"));
-    let mut longest = 0.0_f64;
+    let (mut longest, mut heard) = (0.0_f64, 0);
     for _ in 0..3 {
         let child = ros2_of(&publisher);
         kill(Pid::from_raw(child as i32), SIGKILL).unwrap();
@@ -168,6 +168,7 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
         let restarted = Instant::now();
         while restarted.elapsed().as_secs_f64() < 5.5 {
             assert_eq!(run_of(&next(&lines, "handles")), run);
+            heard += 1;
         }
     }
     println!("topics were back within {longest:.2} s");
@@ -181,6 +182,9 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
     let output = publisher.output();
     let summary = harness::summary(&output);
     assert_eq!(summary["ros2"]["skipped"], 0, "{summary}");
+    // The frames of all processes, but those of the last second of each that was killed.
+    let sent = summary["ros2"]["frames"].as_u64().unwrap();
+    assert!(sent + 2 * 61 >= heard, "{sent} sent, at least {heard} received: {summary}");
     assert_eq!(text(&output.stderr).matches("restarted").count(), 3, "{}", text(&output.stderr));
 }
 

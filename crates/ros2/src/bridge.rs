@@ -28,6 +28,9 @@ use crate::{Ros2Config, Ros2Error, context, topic_names};
 /// The longest wait for the scene after the first frame: a publisher detects a new subscriber within a second.
 const SCENE_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// The interval of the counters.
+const COUNTERS_INTERVAL: Duration = Duration::from_secs(1);
+
 /// The settings of a bridge.
 #[derive(Debug, Clone)]
 pub struct BridgeConfig {
@@ -64,6 +67,8 @@ pub enum Notice {
     },
     /// The show has ended, and its topics are closed.
     Gone,
+    /// The counters of all shows, once a second.
+    Counted(BridgeCounters),
 }
 
 /// Publishes the shows of some names.
@@ -73,6 +78,8 @@ pub struct Bridge<'a> {
     stop: &'a AtomicBool,
     failure: Option<Ros2Error>,
     notify: &'a mut dyn FnMut(usize, Notice),
+    /// The time of the latest counters.
+    counted: Instant,
 }
 
 /// The participant of this process.
@@ -139,7 +146,8 @@ impl<'a> Bridge<'a> {
         let matches = Matches::new(&context);
         let show = |name| ShowBridge::new(name, settings.clone());
         let shows = names.into_iter().map(show).collect();
-        Ok(Self { shows, network: DdsNetwork { context, matches, control, stamps }, stop, failure: None, notify })
+        let network = DdsNetwork { context, matches, control, stamps };
+        Ok(Self { shows, network, stop, failure: None, notify, counted: Instant::now() })
     }
 
     /// Closes all topics and leaves the network when subscribers have had time to get the last messages. Returns the
@@ -153,22 +161,28 @@ impl<'a> Bridge<'a> {
         if let Some(until) = until {
             std::thread::sleep(until.saturating_duration_since(Instant::now()));
         }
+        let counters = self.counters();
+        self.failure.map_or(Ok(counters), Err)
+    }
+
+    /// Returns the counters of all shows.
+    fn counters(&self) -> BridgeCounters {
         let sum = |sum: BridgeCounters, of: &ShowBridge| {
             let BridgeCounters { frames, skipped, discarded } = of.counters;
+            let open = of.open.as_ref().map_or(0, |open| open.topics.discarded());
             BridgeCounters {
                 frames: sum.frames + frames,
                 skipped: sum.skipped + skipped,
-                discarded: sum.discarded + discarded,
+                discarded: sum.discarded + discarded + open,
             }
         };
-        let counters = self.shows.iter().fold(BridgeCounters::default(), sum);
-        self.failure.map_or(Ok(counters), Err)
+        self.shows.iter().fold(BridgeCounters::default(), sum)
     }
 }
 
 impl Handler for Bridge<'_> {
     fn handle(&mut self, publisher: usize, event: FeedEvent<'_>) {
-        let Self { shows, network, stop, failure, notify } = self;
+        let Self { shows, network, stop, failure, notify, counted: _ } = self;
         match shows[publisher].handle(event, network) {
             Ok(None) => (),
             Ok(Some(notice)) => notify(publisher, notice),
@@ -190,6 +204,11 @@ impl Handler for Bridge<'_> {
         for show in &mut self.shows {
             show.open.iter_mut().for_each(|open| open.topics.service());
             show.ended.take_if(|ended| ended.until <= now);
+        }
+        if now.duration_since(self.counted) >= COUNTERS_INTERVAL {
+            self.counted = now;
+            let counters = self.counters();
+            (self.notify)(0, Notice::Counted(counters));
         }
     }
 }

@@ -41,12 +41,13 @@ pub(super) fn ros2(common: &Common, arguments: &Ros2Arguments) -> Result<(), Com
         eprintln!("Publishing {} on ROS 2; Ctrl-C ends.", common.quoted_names());
     }
     poll_until(&stop, &common.names, Delivery::All, &mut bridge)?;
-    let BridgeCounters { frames, skipped, discarded } = bridge.finish()?;
+    let counters = bridge.finish()?;
     printed?;
     let mut output = Output::standard();
     if common.json {
-        output.json(&Ros2Line::Summary(TransportCounters { frames, skipped, discarded }))?;
+        output.json(&Ros2Line::Summary(of_transport(counters)))?;
     } else {
+        let BridgeCounters { frames, skipped, discarded } = counters;
         output.line(&format!("{frames} frames sent, {skipped} skipped, {discarded} messages discarded"))?;
     }
     output.finish()
@@ -61,15 +62,21 @@ fn print(common: &Common, name: &str, notice: Notice) -> Result<(), CommandError
             Notice::Connected => Ros2Line::Connected { name },
             Notice::Opened { topics } => Ros2Line::Opened { name, topics },
             Notice::Gone => Ros2Line::Gone { name },
+            Notice::Counted(counters) => Ros2Line::Counters(of_transport(counters)),
         })?;
     } else {
         match notice {
-            Notice::Connected => return Ok(()),
+            Notice::Connected | Notice::Counted(_) => return Ok(()),
             Notice::Opened { topics } => output.line(&format!("\"{name}\" runs: {}", topics.join(", ")))?,
             Notice::Gone => output.line(&format!("\"{name}\" has ended: its topics are closed"))?,
         }
     }
     output.finish()
+}
+
+fn of_transport(counters: BridgeCounters) -> TransportCounters {
+    let BridgeCounters { frames, skipped, discarded } = counters;
+    TransportCounters { frames, skipped, discarded }
 }
 
 impl From<Ros2Error> for CommandError {
