@@ -102,6 +102,30 @@ impl Process {
         Lines { lines: sent_lines(stderr), errors: None, process: self.id() }
     }
 
+    /// Waits until the process has printed a line with `what` on standard error. What follows the line stays there.
+    pub fn until_error(&mut self, what: &str) {
+        let mut stderr = self.0.stderr.take().unwrap();
+        let (sender, receiver) = channel();
+        let wanted = what.to_owned();
+        std::thread::spawn(move || {
+            let (mut printed, mut byte) = (Vec::new(), [0]);
+            while !(printed.ends_with(b"\n") && text(&printed).contains(&wanted))
+                && stderr.read_exact(&mut byte).is_ok()
+            {
+                printed.push(byte[0]);
+            }
+            let _ = sender.send((stderr, printed));
+        });
+        let (stderr, printed) = receiver.recv_timeout(patience()).unwrap();
+        assert!(text(&printed).contains(what), "the process ended without \"{what}\": {}", text(&printed));
+        self.0.stderr = Some(stderr);
+    }
+
+    /// Returns true if the process has ended.
+    pub fn has_ended(&mut self) -> bool {
+        self.0.try_wait().unwrap().is_some()
+    }
+
     /// Returns the first line that the process prints.
     pub fn first_line(&mut self) -> String {
         let mut output = BufReader::new(self.0.stdout.take().unwrap());
@@ -385,13 +409,8 @@ pub fn stopped(process: Process) -> Value {
 
 /// Waits until a file has `bytes` bytes.
 pub fn wait_for_bytes(file: &Path, bytes: u64) {
-    for _ in 0..3000 {
-        if std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes) {
-            return;
-        }
-        wait(0.02);
-    }
-    panic!("{} has no {bytes} bytes", file.display());
+    let what = format!("{bytes} bytes in {}", file.display());
+    wait_until(&what, || std::fs::metadata(file).is_ok_and(|data| data.len() >= bytes));
 }
 
 /// Returns the answer of a server of this machine, header and body, or nothing if it does not answer.

@@ -25,12 +25,12 @@ fn chunks(file: &Path) -> Vec<(usize, Vec<Entry>)> {
 }
 
 /// Returns the bytes at which the records of a file begin.
-fn record_starts(bytes: &[u8]) -> Vec<usize> {
+pub fn record_starts(bytes: &[u8]) -> Vec<usize> {
     let next = |at: &usize| {
-        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
-        Some(at + 9 + length as usize).filter(|next| *next < bytes.len() - 8)
+        let length = u64::from_le_bytes(bytes.get(at + 1..at + 9)?.try_into().unwrap());
+        Some(at + 9 + length as usize).filter(|next| *next + 8 < bytes.len())
     };
-    std::iter::successors(Some(8), next).collect()
+    std::iter::successors((bytes.len() > 16).then_some(8), next).collect()
 }
 
 fn recovered(bytes: &[u8]) -> Result<(Recovered, Vec<u8>), RecoverError> {
