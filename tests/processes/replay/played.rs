@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use nix::sys::signal::Signal;
 
-use crate::harness::{Process, program, wait};
-use crate::harness::{stopped, wait_for_bytes};
+use crate::control::done;
+use crate::harness::{Process, program, stopped, wait_for_bytes, wait_until};
 use crate::replay::files::{Bytes, Kept, read};
 use crate::replay::{assert_same, recorded_replay, recorder, scene};
 
@@ -14,7 +14,14 @@ const RATE: f64 = 40.0;
 
 /// Returns a recording of some seconds of a small team.
 pub fn small_recording(name: &str, folder: &Path) -> PathBuf {
-    recording(name, folder, 3000, |_| wait(2.5))
+    recording(name, folder, 3000, |_| wait_for_ticks(name, 100))
+}
+
+/// Waits until a show has played a number of further periods.
+fn wait_for_ticks(name: &str, further: u64) {
+    let tick = || done(name, &["state"])["tick"].as_u64().unwrap();
+    let from = tick();
+    wait_until("further periods", || tick() >= from + further);
 }
 
 /// Returns a recording of a small team, during which `meanwhile` is called with the recorder.
@@ -57,9 +64,9 @@ fn options_change_when_frames_go_out_and_never_what_they_hold() {
     // Frames that overflow a queue of eight while the recorder is stopped are not in the file.
     let file = recording("replay_gap", folder.path(), 8, |recorder| {
         recorder.stop();
-        wait(1.5);
+        wait_for_ticks("replay_gap", 60);
         recorder.signal(Signal::SIGCONT);
-        wait(1.5);
+        wait_for_ticks("replay_gap", 60);
     });
     let recorded = read(&file);
     let frames = &recorded.frames;
