@@ -10,12 +10,12 @@ use serde_json::Value;
 use crate::harness::{
     Process, can_run, json_lines, program, python, python_modules, scene_file, summary, text, unique,
 };
-use crate::send::{NEWTON, free_port, heard};
+use crate::send::{NEWTON, end_desk, free_port, heard, until_equal};
 
 const ORIGIN: [f64; 2] = [12.5, -40.25];
 const TURNS: f64 = 0.3;
 const PLACED: &str =
-    "[placement]\norigin = [12.5, -40.25]\nrotation_turns = 0.3\nmirror = true\n\n[publish]\nqueue = 64";
+    "[placement]\norigin = [12.5, -40.25]\nrotation_turns = 0.3\nmirror = true\n\n[publish]\nqueue = 300";
 
 /// The scene without its placement, solved at one time.
 fn home(time: f64) -> Chain {
@@ -94,22 +94,26 @@ fn a_placed_show_is_sent_where_it_stands_and_its_log_verifies() {
     let [psn_port, osc_port] = [free_port().to_string(), free_port().to_string()];
     let mut psn_peer = python();
     psn_peer.args(["tests/python/psn_peer.py", "--name", &unique(name), "--port", &psn_port, "--samples"]);
+    psn_peer.arg("--progress");
     let mut psn_peer = Process::start(&mut psn_peer);
     let mut osc_peer = Process::start(python().args(["tests/python/osc_peer.py", "--port", &osc_port]));
     let (psn_lines, osc_lines) = (psn_peer.lines(), osc_peer.lines());
     psn_lines.until("listening");
     osc_lines.until("listening");
     let mut send = program(name);
-    send.args(["send", "psn", "--json", "--interface", "127.0.0.1", "--to", &format!("127.0.0.1:{psn_port}")]);
+    let desk = format!("127.0.0.1:{psn_port}");
+    send.args(["send", "psn", "--json", "--interface", "127.0.0.1", "--to", &desk]);
     let psn = Process::start(&mut send);
     let osc = Process::start(program(name).args(["send", "osc", "--json", "--to", &format!("127.0.0.1:{osc_port}")]));
     // Heads of three seconds.
     let lines: Vec<String> = (0..90).flat_map(|_| osc_lines.all_until("/head\"")).collect();
+    until_equal(&psn_lines, 60);
     let messages: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
     for sender in [psn, osc] {
         sender.signal(Signal::SIGTERM);
         summary(&sender.output());
     }
+    end_desk(&desk);
     heads_are_placed(&messages, name);
     let last = psn_lines.rest().pop();
     let output = psn_peer.output();

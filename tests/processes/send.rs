@@ -1,6 +1,7 @@
 //! Network output, as independent receivers decode it: PosiStageNet by pypsn (and npm's decoder in the long run), OSC
 //! by python-osc. No receiver, killed or stopped, costs the publisher or another subscriber a frame.
 
+use crate::control::done;
 use crate::harness;
 
 use std::net::UdpSocket;
@@ -10,15 +11,19 @@ use bench_dragon::motion::Method;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::show::scene::Scene;
 use harness::{
-    Lines, Process, can_run, long, program, python, python_modules, scene_file, summary, text, unique, wait, wait_until,
+    Lines, Process, can_run, long, program, python, python_modules, scene_file, stopped, summary, text, unique, wait,
+    wait_until,
 };
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 
 /// A solver with which the publisher starts at once, even if the program is not optimised.
 pub const NEWTON: (&str, &str) = ("accuracy = 1e-9", "solver = \"newton\"");
+/// Frames by which a subscriber may fall behind: five seconds.
+const QUEUE: u64 = 300;
+
 fn publisher(name: &str, arguments: &[&str]) -> Process {
-    let scene = scene_file(name, &[NEWTON, ("[publish]", "[publish]\nqueue = 64")]);
+    let scene = scene_file(name, &[NEWTON, ("[publish]", &format!("[publish]\nqueue = {QUEUE}"))]);
     Process::start(program(name).arg("--scene").arg(scene).args(["run", "--json"]).args(arguments))
 }
 
@@ -45,10 +50,10 @@ fn end(process: Process) -> Value {
     summary(&process.output())
 }
 
-/// A sender's output and its duration.
+/// A sender's output, and the frames until it ends.
 struct Sending<'a> {
     name: &'a str,
-    seconds: f64,
+    frames: u64,
     group: Option<&'a str>,
     axes: &'a str,
     first_id: u64,
@@ -58,7 +63,7 @@ struct Sending<'a> {
 
 impl Default for Sending<'_> {
     fn default() -> Self {
-        Self { name: "psn", seconds: 2.0, group: None, axes: "x,up,y", first_id: 1, npm: None }
+        Self { name: "psn", frames: 120, group: None, axes: "x,up,y", first_id: 1, npm: None }
     }
 }
 
@@ -66,20 +71,21 @@ impl Sending<'_> {
     /// Asserts that pypsn decodes the paper's team: every tracker of every frame equals the shared memory.
     fn of_the_paper(&self) {
         let publish = || publisher(self.name, &["--start", "250", "--time-scale", "2", "--duration", "600"]);
-        self.is_heard(publish, 224, 30);
+        self.is_heard(publish, 224);
     }
 
-    /// Asserts that pypsn decodes a publisher of `handles` handles, with at least `least` frames that are equal.
-    fn is_heard(&self, publish: impl FnOnce() -> Process, handles: u64, least: u64) {
+    /// Asserts that pypsn decodes a publisher of `handles` handles.
+    fn is_heard(&self, publish: impl FnOnce() -> Process, handles: u64) {
         if !can_run(python_modules(&["iceoryx2", "numpy", "pypsn"])) {
             return;
         }
-        let Sending { name, seconds, group, axes, first_id, npm } = *self;
+        let Sending { name, frames, group, axes, first_id, npm } = *self;
         let _publisher = publish();
         let (port, first) = (free_port().to_string(), first_id.to_string());
         let mut peer = python();
         peer.args(["tests/python/psn_peer.py", "--name", &unique(name), "--port", &port, &format!("--axes={axes}")]);
-        peer.args(["--first-id", &first]).args(group.map(|group| ["--group", group]).into_iter().flatten());
+        peer.args(["--progress", "--first-id", &first])
+            .args(group.map(|group| ["--group", group]).into_iter().flatten());
         let mut peer = Process::start(peer.args(npm.map(|folder| ["--npm", folder]).into_iter().flatten()));
         let lines = peer.lines();
         lines.until("listening");
@@ -88,15 +94,16 @@ impl Sending<'_> {
         send.args(["send", "psn", "--json", "--to", &to, "--interface", "127.0.0.1"]);
         send.args([&format!("--axes={axes}"), "--first-id", &first, "--system-name", "The dragon"]);
         let sender = Process::start(&mut send);
-        wait(seconds);
+        until_equal(&lines, frames);
         let sent = end(sender);
+        end_desk(&to);
         let last = lines.rest().pop();
         let output = peer.output();
         assert!(output.status.success(), "{}", text(&output.stderr));
         let heard: Value = serde_json::from_str(&last.unwrap()).unwrap();
         let number = |of: &Value, field: &str| of[field].as_u64().unwrap_or_else(|| panic!("no {field} in {of}"));
         println!("sent {sent}, heard {}, {} equal", heard["frames"], heard["equal"]);
-        assert!(number(&heard, "equal") > least, "{}", heard["publishers"]);
+        assert!(number(&heard, "equal") >= frames, "{}", heard["publishers"]);
         assert!(number(&heard, "unknown") <= number(&heard, "memory_missed"), "{}", heard["publishers"]);
         assert_eq!(number(&heard, "equal") + number(&heard, "unknown"), number(&sent, "frames"));
         assert_eq!((number(&heard, "stopped"), number(&sent, "stopped_frames")), (1, 1), "the sender reports its end");
@@ -111,10 +118,24 @@ impl Sending<'_> {
     }
 }
 
+/// Waits until `psn_peer.py --progress` has found a number of frames of its first publisher equal.
+pub fn until_equal(lines: &Lines, frames: u64) {
+    let is_enough = |line: &str| {
+        let line: Value = serde_json::from_str(line).unwrap();
+        line["equal"][0].as_u64() >= Some(frames)
+    };
+    lines.all_until_one(is_enough, "equal frames");
+}
+
+/// Ends `psn_peer.py` after all that was sent to its address: an empty packet.
+pub fn end_desk(to: &str) {
+    UdpSocket::bind("127.0.0.1:0").unwrap().send_to(&[], to).unwrap();
+}
+
 #[test]
 fn pypsn_hears_every_tracker_of_every_frame_by_multicast() {
-    let seconds = if long() { 60.0 } else { 3.0 };
-    Sending { name: "psn_multicast", seconds, group: Some("236.10.10.10"), ..Sending::default() }.of_the_paper();
+    let frames = if long() { 3600 } else { 180 };
+    Sending { name: "psn_multicast", frames, group: Some("236.10.10.10"), ..Sending::default() }.of_the_paper();
 }
 
 #[test]
@@ -125,13 +146,13 @@ fn one_desk_hears_them_in_axes_and_numbers_of_its_own() {
 #[test]
 fn pypsn_hears_every_one_of_five_thousand() {
     let name = "psn_5001";
-    let seconds = if long() { 60.0 } else { 4.0 };
+    let frames = if long() { 300 } else { 10 };
     let publish = || {
         let mut run = program(name);
         run.args(["--scene", "config/long.toml", "run", "--json", "--rate", "5", "--duration", "600"]);
         Process::start(&mut run)
     };
-    Sending { name, seconds, ..Sending::default() }.is_heard(publish, 5001, 5);
+    Sending { name, frames, ..Sending::default() }.is_heard(publish, 5001);
 }
 
 /// Needs node and npm, which fetches the decoder.
@@ -148,7 +169,7 @@ fn a_second_decoder_sees_the_same() {
         installed.and_then(|output| if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) });
     if can_run(installed) {
         let package = folder.path().join("node_modules/@jwetzell/posistagenet");
-        Sending { name: "psn_npm", seconds: 10.0, npm: package.to_str(), ..Sending::default() }.of_the_paper();
+        Sending { name: "psn_npm", frames: 600, npm: package.to_str(), ..Sending::default() }.of_the_paper();
     }
 }
 
@@ -228,19 +249,29 @@ fn python_osc_hears_every_alert_and_cue_once_and_in_order() {
     let sender = Process::start(program(name).args(["send", "osc", "--json", "--to", &to[0], &to[1]]));
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
     let watched = watch.lines();
-    watched.until("waiting");
     let mut run = program(name);
-    run.arg("--scene").arg(scene).args(["run", "--json", "--start", "407", "--duration", "7"]);
-    summary(&Process::start(&mut run).output());
+    run.arg("--scene").arg(scene).args(["run", "--json", "--start", "407", "--paused"]);
+    let publisher = Process::start(&mut run);
+    // The show moves when both have frames, and ends half a second or more after the contact.
+    let mut seen = watched.all_until("\"state\":\"approaching\"");
+    let mut printed = lines.all_until("\"paused\"");
+    done(name, &["resume"]);
+    printed.extend(lines.all_until("\"playing\""));
+    let began = printed.len() - 1;
+    printed.extend(lines.all_until("\"ended\""));
+    printed.extend((0..30).flat_map(|_| lines.all_until("/sim_time\"")));
+    stopped(publisher);
+    printed.extend(lines.rest());
     let parsed =
         |lines: Vec<String>| Vec::from_iter(lines.iter().map(|line| serde_json::from_str::<Value>(line).unwrap()));
-    let mut messages = parsed(lines.rest());
+    let mut messages = parsed(printed);
     for message in &mut messages {
         let address = message["address"].as_str().unwrap().strip_prefix(&format!("/{}/", unique(name)));
         message["address"] = json!(address.unwrap());
     }
     watch.signal(Signal::SIGTERM);
-    let watched = parsed(watched.rest());
+    seen.extend(watched.rest());
+    let watched = parsed(seen);
     let sent = end(sender);
 
     let of_type = |name: &str| Vec::from_iter(watched.iter().filter(|line| line["type"] == name));
@@ -264,8 +295,9 @@ fn python_osc_hears_every_alert_and_cue_once_and_in_order() {
         assert_eq!((&cue[0], &cue[1]), (&expected["number"], &expected["name"]));
         assert!(is_near(&cue[2], &expected["sim_time"]));
     }
-    countdown_and_head_are_true(&messages);
-    let states = Vec::from_iter(heard(&messages, "state").cloned());
+    let messages = &messages[began..];
+    countdown_and_head_are_true(messages);
+    let states = Vec::from_iter(heard(messages, "state").cloned());
     assert_eq!(states[0], json!(["approaching", 1, "playing", 0]));
     assert_eq!(states.last(), Some(&json!(["stopped", -1, "stopped", -1])));
     assert!(states.contains(&json!(["contact", 2, "ended", 3])), "{states:?}");
@@ -356,13 +388,13 @@ fn a_sender_that_is_killed_or_stopped_costs_nobody_a_frame() {
     let mut watch = Process::start(program(name).args(["watch", "--json"]));
     let watched = watch.lines();
     further_frames(&watched, 1);
-    for round in 0..if long() { 100 } else { 5 } {
+    for round in 0..if long() { 100 } else { 3 } {
         let senders = senders(name);
         for sender in &senders {
             sender.stop();
         }
-        // The loop waits for none of them: twice as many frames as their queues hold.
-        assert_eq!(further_frames(&watched, 2 * 64), 0, "round {round}");
+        // The loop waits for none of them: more frames than their queues hold.
+        assert_eq!(further_frames(&watched, QUEUE + 64), 0, "round {round}");
         // Some are killed while they are stopped, some after they have continued.
         if round % 2 == 0 {
             senders.iter().for_each(|sender| sender.signal(Signal::SIGCONT));
