@@ -5,14 +5,14 @@ use crate::harness;
 
 use bench_dragon::client::shared_memory::{node, service_name};
 use bench_dragon::messages::{FrameHeader, HandlePose32, LoopStatus};
-use harness::{Process, can_run, program, python, python_modules, scene_file, summary, text, unique, wait};
+use harness::{Process, can_run, program, python, python_modules, scene_file, stopped, text, unique, wait_until};
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use nix::sys::signal::Signal::SIGINT;
 use serde_json::Value;
 
 /// Returns a scene whose queues hold all frames by which a subscriber falls behind.
 fn scene(name: &str, publish: &str) -> std::path::PathBuf {
-    scene_file(name, &[("[publish]", &format!("[publish]\nqueue = 480\n{publish}"))])
+    scene_file(name, &[("[publish]", &format!("[publish]\nqueue = 1500\n{publish}"))])
 }
 
 /// Returns the output of `check` for a scene, or of `run` when it starts.
@@ -35,8 +35,10 @@ fn every_frame_is_the_whole_one_rounded(every: usize, velocities: bool, expected
     let printed = peer.lines();
     printed.until("ready");
     let mut run = program(&name);
-    run.arg("--scene").arg(&scene).args(["run", "--json", "--rate", "50", "--start", "409", "--duration", "5"]);
-    let frames = summary(&Process::start(&mut run).output())["frames"].as_u64().unwrap();
+    run.arg("--scene").arg(&scene).args(["run", "--json", "--rate", "50", "--start", "409"]);
+    let publisher = Process::start(&mut run);
+    printed.until("enough");
+    let frames = stopped(publisher)["frames"].as_u64().unwrap();
     let last = printed.rest().pop().unwrap_or_default();
     let output = peer.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -74,7 +76,7 @@ fn of_two_dragons_both_ends_of_each_remain() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("two.toml");
     let crossing = include_str!("../../config/crossing.toml");
-    let light = "[publish]\nqueue = 480\nprecision = \"f32\"\nevery = 7";
+    let light = "[publish]\nqueue = 1500\nprecision = \"f32\"\nevery = 7";
     std::fs::write(&file, crossing.replace("[publish]", light)).unwrap();
     let mut peer = python();
     peer.args(["tests/python/light_peer.py", "--name", &unique(name), "--teams", "21", "13"]);
@@ -82,8 +84,10 @@ fn of_two_dragons_both_ends_of_each_remain() {
     let printed = peer.lines();
     printed.until("ready");
     let mut run = program(name);
-    run.arg("--scene").arg(&file).args(["run", "--json", "--rate", "50", "--start", "52", "--duration", "5"]);
-    let frames = summary(&Process::start(&mut run).output())["frames"].as_u64().unwrap();
+    run.arg("--scene").arg(&file).args(["run", "--json", "--rate", "50", "--start", "52"]);
+    let publisher = Process::start(&mut run);
+    printed.until("enough");
+    let frames = stopped(publisher)["frames"].as_u64().unwrap();
     let last = printed.rest().pop().unwrap_or_default();
     let output = peer.output();
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -103,13 +107,7 @@ fn nothing_is_there_unasked() {
     let status = service_name(&unique(name), "status").unwrap();
     let is_there = || node.service_builder(&status).publish_subscribe::<LoopStatus>().open().is_ok();
     // The publisher creates this service last.
-    assert!(
-        (0..600).any(|_| is_there() || {
-            wait(0.1);
-            false
-        }),
-        "a minute has passed without a publisher"
-    );
+    wait_until("a publisher", is_there);
     let poses32 = service_name(&unique(name), "poses32").unwrap();
     let opened =
         node.service_builder(&poses32).publish_subscribe::<[HandlePose32]>().user_header::<FrameHeader>().open();

@@ -3,6 +3,7 @@
 //! The terminal is a pseudo-terminal, and an emulator if its rows matter. The checks in the emulator are in
 //! `tests/python/watch_terminal.py` and `watch_keys.py`. No test asserts a speed.
 
+use crate::control::done;
 use crate::harness;
 
 use harness::{Process, program, python, scene_file, text, unique};
@@ -58,10 +59,14 @@ fn cues_are_printed_as_they_are_announced() {
     std::fs::write(&scene, format!("{}\n{cues}", std::fs::read_to_string(&scene).unwrap())).unwrap();
     let mut publisher = program("cue_lines");
     publisher.args(["--scene", scene.to_str().unwrap(), "run", "--quiet", "--rate", "50", "--time-scale", "0.2"]);
+    let _publisher = Process::start(publisher.arg("--paused"));
     let mut json = Process::start(program("cue_lines").args(["watch", "--json"]));
     let mut people = Process::start(program("cue_lines").arg("watch"));
-    let _publisher = Process::start(&mut publisher);
     let (lines, json) = (people.lines(), json.lines());
+    // The show moves when both have frames.
+    json.until("\"tick\":1");
+    lines.until("(paused)");
+    done("cue_lines", &["resume"]);
     assert!(lines.until("cue 1").ends_with(" s  cue 1 \"lamps\""));
     assert!(lines.until("cue 2").ends_with(" s  cue 2 \"coil\": waiting for go"));
     let cues = [(); 2].map(|()| serde_json::from_str::<Value>(&json.until("\"type\":\"cue\"")).unwrap());

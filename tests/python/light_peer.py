@@ -2,8 +2,8 @@
 
     light_peer.py --name NAME [--teams HANDLES...]
 
-Prints "ready" once it looks for the publisher and, at the end, a JSON line with the counts. Ends with an error if a
-frame is not its counterpart rounded.
+Prints "ready" once it looks for the publisher, "enough" when it has five seconds of frames at 50 Hz and, at the end, a
+JSON line with the counts. Ends with an error if a frame is not its counterpart rounded.
 """
 
 import argparse
@@ -48,9 +48,12 @@ def main():
     print("ready")
     services = [open_service(node, f"{name}/poses", HandlePose), open_service(node, f"{name}/poses32", HandlePose32)]
     ports = [service.subscriber_builder().create() for service in services]
-    frames = [{}, {}]
+    frames, is_enough = [{}, {}], False
     while not frames[0] or services[0].dynamic_config.number_of_publishers > 0:
         list(map(take, ports, frames))
+        if not is_enough and min(map(len, frames)) >= 250:
+            is_enough = True
+            print("enough")
         time.sleep(0.01)
     list(map(take, ports, frames))
 
