@@ -16,7 +16,7 @@ use bench_dragon::show::convert::stage;
 use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 use harness::{Process, program, summary, unique, wait};
-use nix::sys::signal::Signal::SIGKILL;
+use nix::sys::signal::Signal::{SIGINT, SIGKILL};
 
 /// Events handed over by a feed, in order: frames by their run and sequence, and the number missed before each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,15 +109,28 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     const RATE: u64 = 100;
     let mut feed = Feed::new(&unique("again"), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All }).unwrap();
     let mut seen = Vec::new();
-    // The queue holds all frames of a publisher, however late this machine runs the test.
+    // The queue holds 30 s of frames, however late this machine runs the test.
     let scene = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
-    let text = include_str!("../scenes/noalerts.toml").to_owned() + "[publish]\nqueue = 250\n";
+    let text = include_str!("../scenes/noalerts.toml").to_owned() + "[publish]\nqueue = 3000\n";
     std::fs::write(scene.path(), text).unwrap();
     let delays = [0, 40, 80, 120, 160, 200, 250, 400].map(Duration::from_millis);
-    for delay in delays {
+    for (number, delay) in delays.into_iter().enumerate() {
         let mut run = program("again");
-        run.args(["run", "--json", "--rate", &RATE.to_string(), "--duration", "2", "--scene"]).arg(scene.path());
+        run.args(["run", "--json", "--rate", &RATE.to_string(), "--scene"]).arg(scene.path());
         let publisher = Process::start(&mut run);
+        let mut polls = Vec::new();
+        while runs(&seen).len() == number {
+            polls.push(Instant::now());
+            poll(&mut feed, &mut seen);
+        }
+        let (first, ..) = span(&seen, runs(&seen)[number]);
+        // An earlier version ignored frames for seconds. Here the machine may not run the feed for seconds: then it is
+        // not polled.
+        let beside = polls.iter().filter(|at| at.elapsed() < Duration::from_millis(first * 1000 / RATE)).count();
+        assert!(first < RATE || beside < 40, "{first} frames before the feed had one, in {beside} polls");
+        let of_run = seen.len();
+        poll_until(&mut feed, &mut seen, |seen| seen.len() >= of_run + 100);
+        publisher.signal(SIGINT);
         let ending = std::thread::spawn(move || publisher.output());
         while !ending.is_finished() {
             poll(&mut feed, &mut seen);
@@ -133,9 +146,6 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     for run in runs(&seen) {
         let (first, last, received, missed) = span(&seen, run);
         assert_eq!((received, missed), (last - first + 1, 0), "{seen:?}");
-        // At least half of the frames arrive, however slowly the publisher began; an earlier version ignored it for
-        // seconds.
-        assert!(first < RATE, "{first}: {seen:?}");
     }
     let of_frame = |one: &Seen| if let Seen::Frame { run_id, .. } = one { Some(*run_id) } else { None };
     for (at, _) in seen.iter().enumerate().filter(|(_, one)| **one == Seen::Gone) {
@@ -144,25 +154,34 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
     }
 }
 
-/// A publisher gives the subscribers that wait for it time to connect, at whichever moment they try. A busy machine can
-/// delay this test for longer, so that two of ten shows may lack their first frame.
+/// A publisher gives the subscribers that wait for it 100 ms to connect, at whichever moment they try. A busy machine
+/// can delay the opening of a service for longer, so that two of ten shows may lack their first frame. A show counts if
+/// the machine ran this test throughout.
 #[test]
 fn a_feed_that_waits_for_a_show_gets_the_first_frame() {
     let mut feed = Feed::new(&unique("first"), FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
     let mut seen = Vec::new();
-    let mut complete = 0;
-    for _ in 0..10 {
+    let deadline = Instant::now() + Duration::from_secs(300);
+    let (mut shows, mut complete) = (0, 0);
+    while shows < 10 {
         seen.clear();
         let publisher = publisher("first", &["--rate", "50", "--duration", "0.3"]);
         let ending = std::thread::spawn(move || publisher.output());
+        let (mut polled, mut longest) = (Instant::now(), Duration::ZERO);
         while !ending.is_finished() {
             poll(&mut feed, &mut seen);
+            longest = longest.max(polled.elapsed());
+            polled = Instant::now();
         }
         let published = summary(&ending.join().unwrap())["frames"].as_u64().unwrap();
         let ended = Instant::now();
         while seen.last() != Some(&Seen::Gone) && ended.elapsed() < Duration::from_secs(5) {
             poll(&mut feed, &mut seen);
         }
+        if longest > Duration::from_millis(80) && Instant::now() < deadline {
+            continue;
+        }
+        shows += 1;
         if let [run] = runs(&seen)[..] {
             let (first, last, received, missed) = span(&seen, run);
             complete += u32::from((first, last + 1, received + missed) == (0, published, published));
