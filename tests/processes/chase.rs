@@ -148,6 +148,7 @@ fn a_second_chase_is_refused_and_holds_and_deaths_are_told() {
     state(&lines, "sought");
     watched.until("\"state\":\"sought\"");
     control(name, &["pause"]);
+    state(&lines, "paused");
     control(name, &["resume"]);
     state(&lines, "locked");
     // The publisher dies and comes back: the same chase follows the next run.

@@ -4,7 +4,8 @@
 
 `--port`: ArtTimeCode over UDP, this file's own bytes by the table of Art-Net 4, with jitter, skew, loss and a stall.
 `--mtc`: quarter frames by the library mido, to standard output. `--ltc`: sound by Debian's libltc, to standard output.
-Writes a JSON object with the errors of the published simulated time, from 3 s after the beginning.
+It begins when frames come and a chase reports its state. Writes a JSON object with the errors of the published
+simulated time, from 3 s after the beginning.
 """
 
 import argparse
@@ -20,7 +21,24 @@ import time
 
 import iceoryx2 as iox2
 
-from bench_dragon import FrameHeader, HandlePose
+from bench_dragon import ChaseStatus, FrameHeader, HandlePose
+
+
+# Samples a second.
+SOUND_RATE = 48_000
+
+
+def wait_for_chase(name):
+    """Returns when a chase of a show has opened its service."""
+    node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+    while True:
+        try:
+            service = node.service_builder(iox2.ServiceName.new(f"{name}/chase")).publish_subscribe(ChaseStatus).open()
+            if service.dynamic_config.number_of_publishers > 0:
+                return
+        except iox2.PublishSubscribeOpenError:
+            pass
+        time.sleep(0.02)
 
 
 class Frames(threading.Thread):
@@ -111,12 +129,9 @@ def send_ltc(arguments, started, jump_at):
     libltc = ctypes.CDLL("libltc.so.11")
     libltc.ltc_encoder_create.restype = ctypes.c_void_p
     libltc.ltc_encoder_create.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_int, ctypes.c_int]
-    rate, fps = 48_000, arguments.fps
+    rate, fps = SOUND_RATE, arguments.fps
     encoder = ctypes.c_void_p(libltc.ltc_encoder_create(rate, fps, {24: 3, 25: 1, 30: 0}[fps], 0))
     out = sys.stdout.buffer
-    # As arecord writes it into a pipe: the length is not known.
-    sound = struct.pack("<IHHIIHH", 16, 1, 1, rate, rate, 1, 8)
-    out.write(b"RIFF\xff\xff\xff\xffWAVEfmt " + sound + b"data\xff\xff\xff\xff")
     buffer, sound, k, sent = ctypes.create_string_buffer(8192), b"", 0, 0
     while (now := time.monotonic()) < started + arguments.seconds:
         while len(sound) < rate // 50:
@@ -154,6 +169,12 @@ def main():
     frames.start()
     while not frames.headers:
         time.sleep(0.01)
+    if arguments.ltc:
+        # As arecord writes it into a pipe: the length is not known. The chase begins with it.
+        sound = struct.pack("<IHHIIHH", 16, 1, 1, SOUND_RATE, SOUND_RATE, 1, 8)
+        sys.stdout.buffer.write(b"RIFF\xff\xff\xff\xffWAVEfmt " + sound + b"data\xff\xff\xff\xff")
+        sys.stdout.buffer.flush()
+    wait_for_chase(arguments.name)
     started = time.monotonic() + 0.1
     jump_at = arguments.seconds / 2 if arguments.jump else float("inf")
 
