@@ -71,9 +71,13 @@ fn both_kinds_of_subscriber_get_the_frames_of_the_shared_memory() {
         assert!(line["compared"].as_u64().unwrap() > 20 * seconds, "{line}");
         assert!(may_lose || line["missing"] == 0, "{line}");
     }
-    let summary = stopped(publisher);
-    let number = |value: &Value| value.as_u64().unwrap();
-    assert_eq!(number(&summary["ros2"]["frames"]) + number(&summary["ros2"]["skipped"]), number(&summary["frames"]));
+    publisher.signal(nix::sys::signal::Signal::SIGINT);
+    let output = publisher.output();
+    let (summary, number) = (harness::summary(&output), |value: &Value| value.as_u64().unwrap());
+    let handled = number(&summary["ros2"]["frames"]) + number(&summary["ros2"]["skipped"]);
+    // A show does not wait for the process of ROS 2 for longer than 5 s, which a busy machine can take to start it.
+    let is_late = text(&output.stderr).contains("has not connected in 5 s");
+    assert!(handled == number(&summary["frames"]) || is_late && handled > 0, "{summary}");
     assert_eq!(summary["ros2"]["discarded"], 0);
 }
 

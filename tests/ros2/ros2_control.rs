@@ -10,7 +10,9 @@ use crate::harness;
 use std::process::Command;
 
 use enhanced::{Empty, Features, Outcome, State, Time, Trigger, enhanced, first_call};
-use harness::{Process, answering, can_run, json_lines, long, program, python, python_modules, summary, text, unique};
+use harness::{
+    Process, answering, can_run, json_lines, long, program, python, python_modules, summary, text, unique, wait_until,
+};
 use serde_json::{Value, json};
 
 /// Returns a ROS 2 domain that other processes of this machine do not use meanwhile.
