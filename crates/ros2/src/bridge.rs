@@ -120,6 +120,7 @@ struct ShowScene {
 
 /// The node of one run.
 struct OpenShow {
+    run_id: u64,
     // Dropped before the topics: the services may answer until then.
     control: ControlThread,
     topics: Topics,
@@ -234,8 +235,13 @@ impl ShowBridge {
         match event {
             FeedEvent::Stage { stage, segments } => {
                 self.stage = Some(StageMessage { stage: *stage, segments: segments.to_vec() });
+                return self.open_described(network);
             }
-            FeedEvent::Scene { header, text } => self.scene = Some(ShowScene::of(header.run_id, text)),
+            FeedEvent::Scene { header, text } => {
+                self.scene = Some(ShowScene::of(header.run_id, text));
+                return self.open_described(network);
+            }
+            FeedEvent::Started { run_id } if self.open.as_ref().is_some_and(|open| open.run_id == run_id) => (),
             FeedEvent::Started { run_id } => {
                 self.close();
                 self.forget_other_runs(run_id);
@@ -276,8 +282,17 @@ impl ShowBridge {
         self.waiting_since = None;
     }
 
-    /// Sends a frame if it is due. A frame opens the topics once stage and scene have come. After a time limit a frame
-    /// opens the topics without a scene.
+    /// Opens the topics of a run once its stage and its scene have come, before the first frame: subscribers that are
+    /// there need some time to discover the topics.
+    fn open_described(&mut self, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
+        let run_id = self.stage.as_ref().map(|message| message.stage.run_id);
+        match self.scene.take_if(|scene| Some(scene.run_id) == run_id) {
+            Some(scene) => self.open(scene, network),
+            None => Ok(None),
+        }
+    }
+
+    /// Sends a frame if it is due. If no scene has come, a frame opens the topics without a scene after a time limit.
     fn frame(
         &mut self,
         header: &FrameHeader,
@@ -285,8 +300,8 @@ impl ShowBridge {
         missed: u64,
         network: &DdsNetwork,
     ) -> Result<Option<Notice>, Ros2Error> {
-        let notice = if self.open.is_none() { self.open(header, network)? } else { None };
-        if let Some(open) = &mut self.open {
+        let notice = if self.open.is_none() { self.open_undescribed(header, network)? } else { None };
+        if let Some(open) = self.open.as_mut().filter(|open| open.run_id == header.run_id) {
             let choice = open.divider.choose(header, missed);
             self.counters.skipped += choice.skipped;
             if choice.is_due {
@@ -298,25 +313,28 @@ impl ShowBridge {
         Ok(notice)
     }
 
-    fn open(&mut self, header: &FrameHeader, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
+    fn open_undescribed(&mut self, header: &FrameHeader, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
         let waited = self.waiting_since.get_or_insert_with(Instant::now).elapsed();
+        if self.stage.is_none() || waited < SCENE_TIMEOUT {
+            return Ok(None);
+        }
+        log::warn!("the show \"{}\" sends no scene: ROS 2 gets the default topics", self.name);
+        self.open(ShowScene::unknown(header.run_id), network)
+    }
+
+    /// Opens the topics of a run of which the stage has come. Closes those of the run before.
+    fn open(&mut self, scene: ShowScene, network: &DdsNetwork) -> Result<Option<Notice>, Ros2Error> {
+        self.close();
         let Some(stage) = self.stage.clone() else { return Ok(None) };
-        let scene = match self.scene.take() {
-            Some(scene) => scene,
-            None if waited < SCENE_TIMEOUT => return Ok(None),
-            None => {
-                log::warn!("the show \"{}\" sends no scene: ROS 2 gets the default topics", self.name);
-                ShowScene::unknown(header.run_id)
-            }
-        };
-        let ShowScene { run_id: _, alerts, settings } = scene;
+        let ShowScene { run_id, alerts, settings } = scene;
         let DdsNetwork { context, matches, control, stamps } = network;
         let settings = self.settings.clone().unwrap_or(settings);
         let settings = Ros2Settings { stamps: stamps.unwrap_or(settings.stamps), ..settings };
         let (name, cues) = (self.name.clone(), stage.stage.cues as usize);
         let rate = settings.greatest_rate();
         let topic_names = topic_names(&name, &settings, alerts, cues);
-        let config = Ros2Config { name, handles: header.handles as usize, settings, alerts, cues, stage };
+        let handles = stage.stage.dragons.iter().map(|dragon| dragon.benches as usize + 1).sum();
+        let config = Ros2Config { name, handles, settings, alerts, cues, stage };
         // The node of the run before has the same name, and subscribers would also get the latest alert of that run.
         self.ended = None;
         let mut node = node::open(context, &self.name)?;
@@ -324,9 +342,10 @@ impl ShowBridge {
         let topics = Topics::open(context.clone(), node, matches.clone(), config)?;
         let commands = control.then(|| ShowCommands::start(&self.name)).transpose()?;
         let control = ControlThread::start(endpoints, matches.clone(), commands)?;
-        let mut open = OpenShow { control, topics, divider: RateDivider::new(rate) };
-        self.alert.take().into_iter().for_each(|alert| open.topics.alert(alert));
-        self.cue.take().into_iter().for_each(|cue| open.topics.cue(cue));
+        let mut open = OpenShow { run_id, control, topics, divider: RateDivider::new(rate) };
+        let (alert, cue) = (self.alert.take(), self.cue.take());
+        alert.into_iter().filter(|alert| alert.run_id == run_id).for_each(|alert| open.topics.alert(alert));
+        cue.into_iter().filter(|cue| cue.run_id == run_id).for_each(|cue| open.topics.cue(cue));
         self.open = Some(open);
         Ok(Some(Notice::Opened { topics: topic_names }))
     }

@@ -144,6 +144,12 @@ impl Matches {
         });
     }
 
+    /// Notifies all subscribers of a local writer that the writer has written nothing until now, for the reason that
+    /// [`announce`](Self::announce) has.
+    pub(super) fn announce_to_all(&self, writer: GUID) {
+        self.subscribers(writer).into_keys().for_each(|reader| self.announce(writer, reader, 0));
+    }
+
     /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to
     /// `requests`.
     ///

@@ -130,7 +130,7 @@ impl Topics {
     /// Does the periodic work of the writers. Must be called often.
     pub(super) fn service(&mut self) {
         self.matches.update();
-        self.rosout.send_queued();
+        self.rosout.service(&self.matches);
         self.for_each_writer(|writer, matches, node| writer.service(matches, node));
     }
 

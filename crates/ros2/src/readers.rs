@@ -4,7 +4,7 @@
 //!
 //! | reader | is owed | because RustDDS |
 //! |---|---|---|
-//! | new, of a transient-local writer | no message but the latest, and a volatile one not even that | offers all that it keeps, whatever the reader's durability and depth (`Writer::update_reader_proxy`) |
+//! | new, of a transient-local writer | no message but the latest, or those of the lifespan; a volatile one none | offers all that it keeps, whatever the reader's durability and depth (`Writer::update_reader_proxy`) |
 //! | best-effort | an acknowledgement of every message, in its name | waits for it without end (`Writer::remove_all_acked_changes_but_keep_depth`) |
 //! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones |
 //!
@@ -28,7 +28,7 @@ pub(super) struct Readers {
     kind: Kind,
     /// Messages of the writer until now.
     written: u64,
-    /// Some of the last counts of messages with their times, the oldest first.
+    /// Some of the last counts of messages with their times, the oldest first. With a lifespan, all within it.
     marks: VecDeque<(Instant, u64)>,
     known: BTreeMap<GUID, Reader>,
 }
@@ -38,8 +38,10 @@ pub(super) struct Readers {
 pub(super) enum Kind {
     /// A reader may request the last messages of this number.
     Volatile(u64),
-    /// A late reader gets the latest message.
-    TransientLocal,
+    /// A late reader that requests the history gets the latest message.
+    Latest,
+    /// A late reader that requests the history gets the messages of this time.
+    Lifespan(Duration),
 }
 
 struct Reader {
@@ -69,8 +71,24 @@ impl Readers {
     }
 
     /// Counts a message of the writer.
-    pub(super) fn count(&mut self) {
+    pub(super) fn count(&mut self, now: Instant) {
+        if let Kind::Lifespan(lifespan) = self.kind {
+            self.marks.push_back((now, self.written));
+            while self.marks.pop_front_if(|(then, _)| now.duration_since(*then) > lifespan).is_some() {}
+        }
         self.written += 1;
+    }
+
+    /// Returns the messages that a late reader which requests the history gets.
+    fn kept(&self, now: Instant) -> u64 {
+        match self.kind {
+            Kind::Volatile(_) => 0,
+            Kind::Latest => self.written.min(1),
+            Kind::Lifespan(lifespan) => {
+                let first = self.marks.iter().find(|(then, _)| now.duration_since(*then) <= lifespan);
+                first.map_or(0, |(_, before)| self.written - before)
+            }
+        }
     }
 
     /// Returns the messages of the writer until now.
@@ -95,14 +113,12 @@ impl Readers {
         let new: Vec<(GUID, Requests)> = matched.iter().map(|(guid, requests)| (*guid, *requests)).collect();
         let new: Vec<_> = new.into_iter().filter(|(guid, _)| !self.known.contains_key(guid)).collect();
         self.known.extend(new.iter().map(|(guid, requests)| (*guid, Reader { requests: *requests, since: now })));
-        match self.kind {
-            Kind::TransientLocal => {
-                let last = |requests: Requests| self.written.saturating_sub(u64::from(requests.transient_local));
-                let withheld = new.into_iter().map(|(guid, requests)| (guid, last(requests)));
-                Owed { withheld: withheld.filter(|(_, last)| *last > 0).collect(), ..Owed::default() }
-            }
-            Kind::Volatile(depth) => Owed { acknowledgements: self.acknowledgements(depth, now), ..Owed::default() },
+        if let Kind::Volatile(depth) = self.kind {
+            return Owed { acknowledgements: self.acknowledgements(depth, now), ..Owed::default() };
         }
+        let last = |requests: Requests| self.written - if requests.transient_local { self.kept(now) } else { 0 };
+        let withheld = new.into_iter().map(|(guid, requests)| (guid, last(requests)));
+        Owed { withheld: withheld.filter(|(_, last)| *last > 0).collect(), ..Owed::default() }
     }
 
     fn acknowledgements(&mut self, depth: u64, now: Instant) -> Vec<(GUID, u64)> {
@@ -139,7 +155,7 @@ mod tests {
     }
 
     fn write(readers: &mut Readers, messages: u64) {
-        (0..messages).for_each(|_| readers.count());
+        (0..messages).for_each(|_| readers.count(Instant::now()));
     }
 
     #[test]
@@ -173,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_new_reader_of_a_latched_topic_gets_the_latest_message_at_most() {
-        let (mut readers, now) = (Readers::new(Kind::TransientLocal), Instant::now());
+        let (mut readers, now) = (Readers::new(Kind::Latest), Instant::now());
         let owed =
             |readers: &mut Readers, matched: &[(u8, Requests)]| readers.update(&self::matched(matched), now).withheld;
         assert_eq!(owed(&mut readers, &[(1, LATCHED)]), [], "nothing is written");
@@ -186,5 +202,19 @@ mod tests {
         assert_eq!(owed(&mut readers, &[(1, LATCHED)]), []);
         assert_eq!(owed(&mut readers, &all), [(guid(2), 2), (guid(3), 3)]);
         assert!(!readers.is_empty());
+    }
+
+    #[test]
+    fn a_late_reader_gets_the_messages_of_the_lifespan() {
+        let (mut readers, start) = (Readers::new(Kind::Lifespan(Duration::from_secs(10))), Instant::now());
+        let at = |seconds| start + Duration::from_secs(seconds);
+        (0..30).for_each(|second| readers.count(at(second)));
+        let mut withheld =
+            |number, requests, seconds| readers.update(&matched(&[(number, requests)]), at(seconds)).withheld;
+        // Those of seconds 20 to 29 stay, and that of 19 is ten seconds old.
+        assert_eq!(withheld(1, LATCHED, 29), [(guid(1), 19)]);
+        assert_eq!(withheld(2, LATCHED, 38), [(guid(2), 28)]);
+        assert_eq!(withheld(3, LATCHED, 60), [(guid(3), 30)]);
+        assert_eq!(withheld(4, RELIABLE, 60), [(guid(4), 30)]);
     }
 }

@@ -7,22 +7,27 @@
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::builtin_topics::rosout::{TOPIC_NAME, TYPE_NAME};
 use ros2_client::{Context, Log, Node, Publisher};
-use rustdds::TopicKind;
+use rustdds::{QosPolicyBuilder, TopicKind, policy};
 use serde::{Deserialize, Serialize};
 
 use super::Ros2Error;
+use super::matching::Matches;
+use super::readers::{Kind, Readers};
 use super::topic_writer::policies;
 use bench_dragon_messages::state::Severity;
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability};
 
 /// The most lines in the queue; then the oldest is dropped.
 const QUEUED_LINES: usize = 256;
-/// The lines kept for late subscribers.
+/// The most lines kept for late subscribers, and the longest time, as every node of ROS 2 does (rcl's
+/// `rcl_qos_profile_rosout_default`). RustDDS sends lines of any age, and Fast DDS takes them.
 const DEPTH: u32 = 100;
+const LIFESPAN: Duration = Duration::from_secs(10);
 /// A usual length of a message in bytes, for the bound of the memory.
 const LINE_BYTES: usize = 400;
 
@@ -77,6 +82,7 @@ pub fn take_queued() -> VecDeque<LogLine> {
 /// The writer of the topic.
 pub(super) struct Rosout {
     publisher: Publisher<Log>,
+    readers: Readers,
     /// The logger's name, as rcl derives it from the node's.
     name: String,
 }
@@ -90,21 +96,25 @@ impl Rosout {
         let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(format!("/rosout: {error}"));
         // ros2-client's own writer keeps one line.
         let qos = Qos { reliability: Reliability::Reliable, durability: Durability::TransientLocal, depth: DEPTH };
+        let lifespan = policy::Lifespan { duration: rustdds::Duration::from_std(LIFESPAN) };
+        let policies = QosPolicyBuilder::new().lifespan(lifespan).build().modify_by(&policies(qos, LINE_BYTES));
         let dds = context
             .domain_participant()
-            .create_topic(TOPIC_NAME.to_owned(), TYPE_NAME.to_owned(), &policies(qos, LINE_BYTES), TopicKind::NoKey)
+            .create_topic(TOPIC_NAME.to_owned(), TYPE_NAME.to_owned(), &policies, TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        Ok(Self { publisher, name: name.replace('/', ".") })
+        Ok(Self { publisher, readers: Readers::new(Kind::Lifespan(LIFESPAN)), name: name.replace('/', ".") })
     }
 
-    /// Sends the lines of the log.
-    pub(super) fn send_queued(&self) {
+    /// Sends the lines of the log, and withholds old ones from new subscribers. Must be called often.
+    pub(super) fn service(&mut self, matches: &Matches) {
+        let writer = self.publisher.guid();
+        matches.settle(writer, self.readers.update(&matches.subscribers(writer), Instant::now()));
         take_queued().into_iter().for_each(|line| self.send(line));
     }
 
     /// Sends a sentence about the show.
-    pub(super) fn tell(&self, severity: Severity, text: String) {
+    pub(super) fn tell(&mut self, severity: Severity, text: String) {
         let level = match severity {
             Severity::Ok => Log::INFO,
             Severity::Warning => Log::WARN,
@@ -113,9 +123,11 @@ impl Rosout {
         self.send(LogLine { stamp: Time::now(), level, text, file: String::new(), line: 0 });
     }
 
-    fn send(&self, LogLine { stamp, level, text, file, line }: LogLine) {
+    fn send(&mut self, LogLine { stamp, level, text, file, line }: LogLine) {
         let message = Log { stamp, level, name: self.name.clone(), msg: text, file, function: String::new(), line };
         // A full queue cannot be reported here: the report would be one more line.
-        let _ = self.publisher.publish(message);
+        if self.publisher.publish(message).is_ok() {
+            self.readers.count(Instant::now());
+        }
     }
 }

@@ -64,8 +64,9 @@ pub(super) struct TopicWriter<Message: Serialize> {
     readers: Readers,
     /// The time at which the subscribers were read.
     read: Option<Instant>,
-    /// The second copies of large messages, with the matches that name their readers.
-    copies: Option<(Copies, Matches)>,
+    /// The second copies of large messages.
+    copies: Option<Copies>,
+    matches: Matches,
 }
 
 /// A message that RustDDS has refused, with the time of the first refusal.
@@ -133,10 +134,14 @@ impl<Message: Serialize> TopicWriter<Message> {
     }
 
     fn write(&mut self, message: Arc<Message>) -> bool {
+        if self.readers.written() == 0 {
+            // Frames that come at once have one heartbeat, which names them all: the first would be old for Cyclone.
+            self.matches.announce_to_all(self.publisher.guid());
+        }
         let is_written = self.publisher.publish(Arc::clone(&message)).is_ok();
         if is_written {
             self.relief.count();
-            self.readers.count();
+            self.readers.count(Instant::now());
             self.copy(&message);
             self.latched.iter_mut().for_each(|latched| latched.is_written = true);
         }
@@ -145,9 +150,9 @@ impl<Message: Serialize> TopicWriter<Message> {
 
     /// Sends a second copy of a large message that has been written.
     fn copy(&self, message: &Message) {
-        let Some((copies, matches)) = &self.copies else { return };
+        let Some(copies) = &self.copies else { return };
         let writer = self.publisher.guid();
-        let readers = matches.neighbours(writer);
+        let readers = self.matches.neighbours(writer);
         if readers.is_empty() {
             return;
         }
@@ -309,7 +314,7 @@ impl WriterFactory<'_> {
         let is_constant = matches!(topic, Topic::Stage | Topic::Path);
         let nothing = Latched { latest: None, is_written: false, is_constant };
         let (kind, latched) = match qos.durability {
-            Durability::TransientLocal => (Kind::TransientLocal, Some(nothing)),
+            Durability::TransientLocal => (Kind::Latest, Some(nothing)),
             Durability::Volatile => (Kind::Volatile(qos.depth.into()), None),
         };
         Ok(Some(TopicWriter {
@@ -323,7 +328,8 @@ impl WriterFactory<'_> {
             relief: Relief::default(),
             readers: Readers::new(kind),
             read: None,
-            copies: Copies::of(bytes).map(|copies| (copies, self.matches.clone())),
+            copies: Copies::of(bytes),
+            matches: self.matches.clone(),
         }))
     }
 }
