@@ -16,8 +16,9 @@ use std::time::{Duration, Instant};
 
 use super::wire::Prefix;
 
-/// The interval at which sockets are read while no participant comes. Reading takes a fraction of a millisecond.
-const INTERVAL: Duration = Duration::from_secs(1);
+/// The interval at which sockets are read. Reading takes a fraction of a millisecond, and a new process needs longer to
+/// join the network.
+const INTERVAL: Duration = Duration::from_millis(20);
 /// The UDP sockets of this network namespace. A system without this file only has the rule of the newer participant.
 const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
 
@@ -35,10 +36,10 @@ pub(super) struct Departures {
 type Addresses = BTreeMap<SocketAddr, Option<BTreeSet<u64>>>;
 
 impl Departures {
-    /// Notes the addresses of remote endpoints. Returns the older participants that had one of these addresses.
+    /// Notes the addresses of remote endpoints. Returns the participants that had one of these addresses before, and
+    /// those that have died before RustDDS reported them.
     pub(super) fn note(&mut self, endpoints: impl IntoIterator<Item = (Prefix, Vec<SocketAddr>)>) -> Vec<Prefix> {
-        let mut sockets = None;
-        let mut died = Vec::new();
+        let (mut sockets, mut died) = (None, Vec::new());
         for (prefix, addresses) in endpoints {
             for address in addresses {
                 let known = self.participants.entry(prefix).or_default();
@@ -46,8 +47,9 @@ impl Departures {
                     continue;
                 }
                 let sockets = sockets.get_or_insert_with(read_sockets);
-                let of_port = sockets.get(&address.port()).filter(|_| is_local(address));
-                known.insert(address, of_port.cloned());
+                let of_port = is_local(address).then(|| sockets.get(&address.port()).cloned().unwrap_or_default());
+                died.extend(of_port.as_ref().filter(|sockets| sockets.is_empty()).map(|_| prefix));
+                known.insert(address, of_port);
                 let others = self.participants.iter().filter(|(other, _)| **other != prefix);
                 died.extend(others.filter(|(_, known)| known.contains_key(&address)).map(|(other, _)| *other));
             }
@@ -132,6 +134,7 @@ mod tests {
         let now = Instant::now();
         assert_eq!(note(&mut departures, OLD, address), [[0; 12]; 0]);
         assert_eq!(departures.gone(true, now), [[0; 12]; 0]);
+        assert_eq!(note(&mut departures, NEW, "127.0.0.1:9".parse().unwrap()), [NEW], "no socket has this port");
         drop(socket);
         assert_eq!(departures.gone(false, now), [[0; 12]; 0], "looked at a moment ago");
         // The port may have been taken again.
