@@ -40,7 +40,7 @@ impl NodeNames {
 }
 
 /// Translates the arguments after `--ros-args`, up to `--` or the end, to the program's own. As in rcl, the first of
-/// two rules for a name counts, the last of two values of a parameter, and the last of two levels of the log.
+/// two rules for a name counts. The last of two values of a parameter counts, and the last level of the log.
 ///
 /// # Errors
 /// Bad input: an argument that is not understood, or a command that understands none.

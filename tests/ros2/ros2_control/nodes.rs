@@ -47,8 +47,13 @@ fn a_publisher_is_one_node_of_its_name_and_launch_files_choose_the_name() {
     let name = format!("/{}", unique("one_node"));
     assert_eq!(nodes_beside(&name), [name]);
     ended(plain);
-    // As launch_ros starts it, with a name, a namespace, a parameter.
+    // As launch_ros starts it, with a name, a namespace, and `parameters=["p.yaml", {"rate": 40, ...}]`.
     let namespace = format!("__ns:=/{}", unique("hall"));
+    let folder = tempfile::tempdir().unwrap();
+    let [own, launched] = ["p.yaml", "launch_params_1"].map(|name| folder.path().join(name));
+    let nested = format!("{}:\n  gold:\n    ros__parameters:\n      rate: 20.0\n", unique("hall"));
+    std::fs::write(&own, nested).unwrap();
+    std::fs::write(&launched, "/**:\n  ros__parameters:\n    rate: 40\n    use_sim_time: false\n").unwrap();
     let mut run = program("unnamed");
     run.env("ROS_DOMAIN_ID", domain().to_string()).args([
         "run",
@@ -58,7 +63,8 @@ fn a_publisher_is_one_node_of_its_name_and_launch_files_choose_the_name() {
         "--duration",
         "300",
     ]);
-    run.args(["--ros-args", "-r", "__node:=gold", "-r", &namespace, "-p", "rate:=40", "-p", "use_sim_time:=false"]);
+    run.args(["--ros-args", "-r", "__node:=gold", "-r", &namespace]);
+    [own, launched].iter().for_each(|file| drop(run.arg("--params-file").arg(file)));
     let launched = answering(Process::start(&mut run), || program("hall/gold"));
     let name = format!("/{}", unique("hall/gold"));
     assert_eq!(nodes_beside(&name), [name]);
