@@ -2,8 +2,8 @@
 
     ros2_examples.py FILE NAME
 
-Stands in for rclpy and bench_dragon_msgs: `rclpy.spin` gives the node the messages that come as JSON lines
-`{"topic", "message"}` on standard input, and calls its timers after each. The node's log is printed.
+Stands in for rclpy and bench_dragon_msgs. Each line of standard input is a message: JSON with `topic` and `message`.
+`rclpy.spin` gives it to the node, and calls the node's timers. The node's log is printed.
 """
 
 import json

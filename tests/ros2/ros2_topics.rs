@@ -141,8 +141,8 @@ fn nanoseconds(stamp: &Value) -> u64 {
     stamp["sec"].as_u64().unwrap() * 1_000_000_000 + stamp["nanosec"].as_u64().unwrap()
 }
 
-/// A node with `use_sim_time` takes a frame that comes before its clock for one of its future. tf2 reports a transform
-/// with the stamp of the one before as an error, or keeps both.
+/// A node with `use_sim_time` takes a frame that comes before its clock for one of its future. To `tf2` a transform with
+/// the stamp of the one before is an error.
 #[test]
 fn the_clock_comes_before_its_frame_and_no_transform_has_the_stamp_of_the_one_before() {
     if !can_run(python_modules(&["cyclonedds"])) {

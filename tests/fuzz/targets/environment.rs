@@ -67,7 +67,7 @@ fn run(data: &[u8]) -> bool {
     let sentences = warnings(variable);
     let names_one = |text: &String| VARIABLES.iter().any(|name| text.starts_with(name) && set(name).is_some());
     assert!(sentences.iter().all(names_one), "{sentences:?}");
-    // What names other peers or another implementation is followed nowhere, so it has a warning.
+    // Other peers and another implementation have no effect, so there is a warning.
     let is_own = |value: String| value.trim().ends_with("cyclonedds_cpp");
     let is_warned = |name| sentences.iter().any(|text| text.starts_with(name));
     assert!(set("ROS_STATIC_PEERS").is_none() || is_warned("ROS_STATIC_PEERS"), "{sentences:?}");
