@@ -8,6 +8,7 @@ use crate::harness;
 #[path = "record/recorder.rs"]
 mod recorder_alone;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -383,4 +384,48 @@ fn what_cannot_be_recorded_is_refused_in_one_sentence() {
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("nothing came from"), "{}", text(&output.stderr));
     assert!(!Path::new(new).exists());
+}
+
+/// The scene of every topic has its stamps on `/clock`. The recorder joins a show that runs, so that frames come before
+/// the scene.
+#[cfg(feature = "ros2")]
+#[test]
+fn stamps_are_on_the_clock_that_the_scene_requests_from_the_first_frame_on() {
+    let (name, folder) = ("record_stamps", tempfile::tempdir().unwrap());
+    let file = folder.path().join("show.mcap");
+    let publisher = publisher(name, &scene(folder.path(), "ros2", ""), &["--start", "50"]);
+    harness::wait_until("the show runs", || {
+        program(name).args(["control", "state"]).output().unwrap().status.success()
+    });
+    let every = "handles,poses,alerts,stage,diagnostics,status,path,cues,clock";
+    let recorded = recorder(name, &file, &["--topics", every, "--duration", "6"]).output();
+    let recorded = harness::summary(&recorded);
+    stopped(publisher);
+    let bytes = std::fs::read(&file).unwrap();
+    // All these begin with a stamp: seconds and nanoseconds.
+    let part = |data: &[u8], at: usize| u32::from_le_bytes(data[at..at + 4].try_into().unwrap());
+    let mut stamps: BTreeMap<String, Vec<(u64, u64)>> = BTreeMap::new();
+    for message in MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
+        let stamp = u64::from(part(&message.data, 4)) * 1_000_000_000 + u64::from(part(&message.data, 8));
+        let topic = message.channel.topic.rsplit('/').next().unwrap().to_owned();
+        stamps.entry(topic).or_default().push((message.log_time, stamp));
+    }
+    let clock = &stamps["clock"];
+    assert!(clock.len() as u64 == recorded["frames"].as_u64().unwrap() && clock.len() > 60, "{recorded}");
+    for topic in ["handles", "poses"] {
+        let other = stamps[topic].iter().zip(clock).find(|(of_topic, of_clock)| of_topic != of_clock);
+        assert!(other.is_none() && stamps[topic].len() == clock.len(), "{topic}: {other:?}");
+    }
+    assert!(stamps["stage"].iter().chain(&stamps["path"]).all(|(_, stamp)| *stamp == 0), "they hold at any time");
+    for topic in ["handles", "status", "diagnostics"] {
+        for (log_time, stamp) in &stamps[topic] {
+            assert!((50..1000).contains(&(stamp / 1_000_000_000)), "{topic}: {stamp}");
+            assert!(*log_time > 1_700_000_000_000_000_000, "{topic}: {log_time}");
+        }
+    }
+    let verified = program(name).arg("verify").arg(&file).output().unwrap();
+    assert!(verified.status.success(), "{}", text(&verified.stderr));
+    let mut replay = program(name);
+    let replayed = Process::start(replay.args(["--json", "replay"]).arg(&file)).output();
+    assert_eq!(harness::summary(&replayed)["frames"], recorded["frames"], "{}", text(&replayed.stderr));
 }

@@ -3,7 +3,8 @@
 //! The feed's end copies each frame, so that a slow disk does not delay it. If the thread is 64 MB behind, the feed's
 //! end waits with the next frame. Frames then stay in the shared memory until the oldest are overwritten, which is a
 //! gap in the recording. The publisher and this process's memory are not affected. Event-driven messages are small and
-//! never wait. Called by the command `record`.
+//! never wait. The thread holds the first frames of a run until the scene has come, which has the clock of their stamps.
+//! Called by the command `record`.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -21,6 +22,9 @@ use bench_dragon_messages::{
 const MAINTAIN_INTERVAL: Duration = Duration::from_millis(50);
 /// The interval at which the feed's end polls for room.
 const ROOM_INTERVAL: Duration = Duration::from_millis(1);
+/// The longest wait for the scene of a run. A publisher detects a new subscriber within a second, unless a busy machine
+/// stops it. Only other programs publish without a scene.
+const SCENE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Seconds after which a disk that accepts nothing is given up at the end. A slow disk needs seconds for its buffers.
 const STUCK_SECONDS: u64 = 30;
 /// The interval at which the end of a recording polls the thread.
@@ -165,6 +169,44 @@ fn bytes(item: &Item) -> usize {
     }
 }
 
+/// The items of a run whose scene has not come.
+#[derive(Default)]
+struct Held {
+    items: Vec<Item>,
+    /// The time of the first one.
+    since: Option<Instant>,
+    /// The run that waits no longer: its scene has come, or the time is over.
+    released: Option<u64>,
+}
+
+impl Held {
+    /// Adds an item. Returns the items to record now, in their order. `None` is the passing of time; a full queue waits
+    /// no longer.
+    fn pass(&mut self, item: Option<Item>, is_full: bool) -> Vec<Item> {
+        let released = match &item {
+            Some(Item::Scene { run_id, .. }) => Some(*run_id),
+            Some(Item::Frame { header, .. }) if self.released != Some(header.run_id) => {
+                self.since.get_or_insert_with(Instant::now);
+                None
+            }
+            _ => None,
+        };
+        let is_late = self.since.is_some_and(|since| since.elapsed() > SCENE_TIMEOUT);
+        let is_over = is_late || is_full || matches!(item, Some(Item::Gone));
+        self.items.extend(item);
+        if self.since.is_some() && released.is_none() && !is_over {
+            return Vec::new();
+        }
+        self.since = None;
+        let run_of = |item: &Item| match item {
+            Item::Frame { header, .. } => Some(header.run_id),
+            _ => None,
+        };
+        self.released = released.or_else(|| self.items.iter().rev().find_map(run_of)).or(self.released);
+        std::mem::take(&mut self.items)
+    }
+}
+
 /// Records the items until the other end of the queue is dropped or a write fails.
 fn serve(
     mut recorder: Recorder,
@@ -172,30 +214,26 @@ fn serve(
     used: &Sender<Vec<HandlePose>>,
     shared: &RecordState,
 ) -> (Recorded, Option<RecordError>) {
+    let mut held = Held::default();
     let done = loop {
-        let item = match inbox.recv_timeout(MAINTAIN_INTERVAL) {
-            Ok(item) => Some(item),
-            Err(RecvTimeoutError::Timeout) => None,
-            Err(RecvTimeoutError::Disconnected) => break recorder.finish(),
-        };
-        if let Some(item) = &item {
-            shared.queued_bytes.fetch_sub(bytes(item), Ordering::AcqRel);
-        }
-        let done = match item {
-            Some(Item::Frame { header, handles, missed }) => {
-                let done = recorder.frame(&header, &handles, missed);
-                // At the end of the recording the other end is gone.
-                let _ = used.send(handles);
-                done
+        let received = inbox.recv_timeout(MAINTAIN_INTERVAL);
+        let is_full = shared.queued_bytes.load(Ordering::Acquire) > QUEUE_BYTES / 2;
+        let items = match received {
+            Ok(item) => held.pass(Some(item), is_full),
+            Err(RecvTimeoutError::Timeout) => held.pass(None, is_full),
+            Err(RecvTimeoutError::Disconnected) => {
+                let mut rest = std::mem::take(&mut held.items).into_iter();
+                let done = rest.try_for_each(|item| record(&mut recorder, item, used, shared));
+                break done.and_then(|()| recorder.finish());
             }
-            Some(Item::Stage(stage)) => recorder.stage(&stage),
-            Some(Item::Scene { run_id, text }) => recorder.scene(run_id, &text),
-            Some(Item::Alert(alert)) => recorder.alert(&alert),
-            Some(Item::Cue(cue)) => recorder.cue(&cue),
-            Some(Item::Status(status)) => recorder.status(&status),
-            Some(Item::Gone) => recorder.finish_run(),
-            None => Ok(()),
         };
+        // The frames before the scene have the clock of the scene too.
+        for item in &items {
+            if let Item::Scene { run_id, text } = item {
+                recorder.set_clock(*run_id, text);
+            }
+        }
+        let done = items.into_iter().try_for_each(|item| record(&mut recorder, item, used, shared));
         if let Err(error) = done.and_then(|()| recorder.maintain()) {
             break Err(error);
         }
@@ -207,4 +245,28 @@ fn serve(
         }
     };
     (recorder.recorded().clone(), done.err())
+}
+
+/// Records an item, and returns the memory of a frame.
+fn record(
+    recorder: &mut Recorder,
+    item: Item,
+    used: &Sender<Vec<HandlePose>>,
+    shared: &RecordState,
+) -> Result<(), RecordError> {
+    shared.queued_bytes.fetch_sub(bytes(&item), Ordering::AcqRel);
+    match item {
+        Item::Frame { header, handles, missed } => {
+            let done = recorder.frame(&header, &handles, missed);
+            // At the end of the recording the other end is gone.
+            let _ = used.send(handles);
+            done
+        }
+        Item::Stage(stage) => recorder.stage(&stage),
+        Item::Scene { run_id, text } => recorder.scene(run_id, &text),
+        Item::Alert(alert) => recorder.alert(&alert),
+        Item::Cue(cue) => recorder.cue(&cue),
+        Item::Status(status) => recorder.status(&status),
+        Item::Gone => recorder.finish_run(),
+    }
 }

@@ -8,14 +8,16 @@ use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopSt
 use bench_dragon_ros2_messages::diagnostics::{DiagnosticArray, LoopSecond};
 use bench_dragon_ros2_messages::markers::MarkerArray;
 use bench_dragon_ros2_messages::path::Path;
-use bench_dragon_ros2_messages::settings::{DiagnosticLimits, Topic};
+use bench_dragon_ros2_messages::settings::{DiagnosticLimits, StampClock, Topic};
 use bench_dragon_ros2_messages::transforms::TfMessage;
-use bench_dragon_ros2_messages::{Clock, HandlePoses, PoseArray, Stamped};
+use bench_dragon_ros2_messages::{Clock, HandlePoses, HasStamp, PoseArray, Stamped};
 
 /// The messages of one publisher.
 pub(super) struct Messages {
     name: String,
     topics: Vec<Topic>,
+    /// The clock of the stamps of the run.
+    pub stamps: StampClock,
     /// The messages of the latest call.
     pub batch: Batch,
     handles: HandlePoses,
@@ -31,6 +33,7 @@ impl Messages {
         Self {
             name: name.to_owned(),
             topics: topics.to_vec(),
+            stamps: StampClock::default(),
             batch: Batch::default(),
             handles: HandlePoses::of(0),
             poses: PoseArray::of(0),
@@ -50,26 +53,31 @@ impl Messages {
         let batch = &mut self.batch;
         batch.clear();
         let (stamp_ns, sequence) = (frame.stamp_ns, frame.sequence as u32);
+        let stamp = self.stamps.at(stamp_ns, frame.sim_time);
         for topic in self.topics.iter().copied() {
             match topic {
                 Topic::Handles => {
                     self.handles.update(frame, handles);
+                    self.handles.set_stamp(stamp);
                     batch.push(topic, stamp_ns, sequence, &self.handles);
                 }
                 Topic::Poses => {
                     self.poses.update(frame, handles);
+                    self.poses.set_stamp(stamp);
                     batch.push(topic, stamp_ns, sequence, &self.poses);
                 }
                 Topic::Clock => batch.push(topic, stamp_ns, sequence, &Clock::of(frame)),
                 Topic::Tf => {
                     if let (Some(transforms), Some(_)) = (&mut self.transforms, stage) {
                         transforms.update(frame, handles);
+                        transforms.set_stamp(stamp);
                         batch.push(topic, stamp_ns, sequence, transforms);
                     }
                 }
                 Topic::Markers => {
                     if let (Some(markers), Some(stage)) = (&mut self.markers, stage) {
                         markers.update(frame, handles, stage, alert);
+                        markers.set_stamp(stamp);
                         batch.push(topic, stamp_ns, sequence, markers);
                     }
                 }
@@ -84,22 +92,26 @@ impl Messages {
         self.batch.clear();
         self.markers = self.topics.contains(&Topic::Markers).then(|| MarkerArray::of(message));
         self.transforms = self.topics.contains(&Topic::Tf).then(|| TfMessage::of(&self.name, stage));
-        self.batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(message.clone()));
+        // Both hold at any simulated time.
+        let stamp = self.stamps.at(stage.stamp_ns, 0.0);
+        self.batch.push(Topic::Stage, stage.stamp_ns, sequence, &Stamped::stage(message.clone()).at(stamp));
         if self.topics.contains(&Topic::Path) {
-            self.batch.push(Topic::Path, stage.stamp_ns, sequence, &Path::of(message));
+            self.batch.push(Topic::Path, stage.stamp_ns, sequence, &Path::of(message).at(stamp));
         }
     }
 
     /// Fills the message of an alert.
     pub fn alert(&mut self, sequence: u32, alert: CollisionAlert) {
         self.batch.clear();
-        self.batch.push(Topic::Alerts, alert.stamp_ns, sequence, &Stamped::alert(alert));
+        let stamp = self.stamps.at(alert.stamp_ns, alert.sim_time);
+        self.batch.push(Topic::Alerts, alert.stamp_ns, sequence, &Stamped::alert(alert).at(stamp));
     }
 
     /// Fills the message of a cue.
     pub fn cue(&mut self, sequence: u32, cue: Cue) {
         self.batch.clear();
-        self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue));
+        let stamp = self.stamps.at(cue.stamp_ns, cue.sim_time);
+        self.batch.push(Topic::Cues, cue.stamp_ns, sequence, &Stamped::cue(cue).at(stamp));
     }
 
     /// Fills the messages of a status, with the current stage and alert. The diagnostics compare the status with the
@@ -112,11 +124,12 @@ impl Messages {
         before: &LoopStatus,
     ) {
         self.batch.clear();
-        self.batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(*status));
+        let stamp = self.stamps.at(status.stamp_ns, status.sim_time);
+        self.batch.push(Topic::Status, status.stamp_ns, sequence, &Stamped::status(*status).at(stamp));
         let limits = DiagnosticLimits::default();
         let second = LoopSecond { before, discarded: 0, discarded_before: 0, limits };
         let unknown = Stage::default();
-        let message = DiagnosticArray::of(&self.name, status, stage.unwrap_or(&unknown), alert, &second);
+        let message = DiagnosticArray::of(&self.name, status, stage.unwrap_or(&unknown), alert, &second).at(stamp);
         self.batch.push(Topic::Diagnostics, status.stamp_ns, sequence, &message);
     }
 }

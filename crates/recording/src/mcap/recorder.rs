@@ -11,7 +11,8 @@ use super::file::McapFile;
 use super::messages::Messages;
 use super::run::{Event, Run};
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, StageMessage};
-use bench_dragon_ros2_messages::settings::Topic;
+use bench_dragon_ros2_messages::settings::{StampClock, Topic};
+use bench_dragon_show::scene::Scene;
 
 /// The topics recorded by default: the topics of a replay, and the topics that tools show without this program's
 /// message types.
@@ -97,6 +98,8 @@ pub struct Recorder {
     finished_bytes: u64,
     number: u64,
     messages: Messages,
+    /// The latest run whose scene is known, and the clock of its stamps.
+    clock: Option<(u64, StampClock)>,
 }
 
 impl Recorder {
@@ -117,6 +120,7 @@ impl Recorder {
             finished_bytes: 0,
             number: 1,
             messages,
+            clock: None,
         })
     }
 
@@ -164,11 +168,27 @@ impl Recorder {
         self.event(Event::Stage(Box::new(stage.clone())))
     }
 
-    /// Attaches the text of a run's scene. An empty text is not known.
+    /// Reads the clock of a run's stamps from the text of its scene, for all messages that are recorded later.
+    pub fn set_clock(&mut self, run_id: u64, text: &str) {
+        if self.clock.is_some_and(|(known, _)| known == run_id) {
+            return;
+        }
+        // The publisher has checked the scene; a publisher of a later version may know more.
+        let scene = Scene::parse_any(text, "the scene of the show", "scene").ok();
+        let settings = scene.and_then(|scene| scene.ros2);
+        let stamps = settings.map_or_else(StampClock::default, |settings| settings.stamps);
+        self.clock = Some((run_id, stamps));
+        if self.run.as_ref().is_some_and(|run| run.run_id == run_id) {
+            self.messages.stamps = stamps;
+        }
+    }
+
+    /// Attaches the text of a run's scene, and reads its clock. An empty text is not known.
     ///
     /// # Errors
     /// As [`Recorder::frame`].
     pub fn scene(&mut self, run_id: u64, text: &str) -> Result<(), RecordError> {
+        self.set_clock(run_id, text);
         self.event(Event::Scene { run_id, text: text.into() })
     }
 
@@ -245,6 +265,8 @@ impl Recorder {
         self.finish_run()?;
         let file = self.make_file()?;
         self.run = Some(Run::new(file, frame));
+        let of_run = self.clock.filter(|(run_id, _)| *run_id == frame.run_id);
+        self.messages.stamps = of_run.map_or_else(StampClock::default, |(_, stamps)| stamps);
         for early in std::mem::take(&mut self.early) {
             if early.run_id() == frame.run_id {
                 self.event(early)?;
