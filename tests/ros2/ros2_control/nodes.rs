@@ -64,7 +64,9 @@ fn a_publisher_is_one_node_of_its_name_and_launch_files_choose_the_name() {
         "300",
     ]);
     run.args(["--ros-args", "-r", "__node:=gold", "-r", &namespace]);
-    [own, launched].iter().for_each(|file| drop(run.arg("--params-file").arg(file)));
+    for file in [own, launched] {
+        run.arg("--params-file").arg(file);
+    }
     let launched = answering(Process::start(&mut run), || program("hall/gold"));
     let name = format!("/{}", unique("hall/gold"));
     assert_eq!(nodes_beside(&name), [name]);
