@@ -2,13 +2,10 @@
 arrival.
 
     osc_peer.py --port P
-
-Ends with the message that frames have stopped.
 """
 
 import argparse
 import json
-import os
 import socket
 
 from pythonosc.dispatcher import Dispatcher
@@ -17,8 +14,6 @@ from pythonosc.osc_server import BlockingOSCUDPServer
 
 def heard(address, *arguments):
     print(json.dumps({"address": address, "arguments": arguments}), flush=True)
-    if "stopped" in arguments:
-        os._exit(0)
 
 
 def main():
