@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 
-from chromium import browser as chromium
+from chromium import be_patient, browser as chromium
 
 # No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 550
@@ -57,6 +57,9 @@ def state():
 
 def opened(browser, url):
     page = browser.new_context(viewport={"width": 1280, "height": 720}).new_page()
+    # Another test's processes can hold a page up for longer than Playwright's 30 s.
+    page.set_default_timeout(120_000)
+    be_patient(page)
     page.complaints = []
     page.on("pageerror", lambda error: page.complaints.append(str(error)))
     page.goto(url)

@@ -18,8 +18,8 @@ import chromium
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, browser, drawn, opened, play, publisher, server, started, until, words
 from stage_show import at, luminance, projection, risen, shot, spread
 
-# Before the contact, at a hundredth of the speed: little changes during the test.
-APPROACH = ["--start", "410", "--time-scale", "0.01"]
+# Ten minutes before the contact, longer than any test takes: little changes during the test.
+APPROACH = ["--start", "410", "--time-scale", "0.004"]
 # Important elements that are cut off by the window, by a scrolling panel or by the buttons at its foot.
 CUT = """() => {
     const nav = document.querySelector("nav").getBoundingClientRect();
@@ -94,16 +94,15 @@ def kiosk_shows_no_buttons():
     """As `chromium --kiosk` shows it: in a separate window, not in full screen by the button."""
     with server() as url, started("view", "--json", "--port", "0", "--control") as conducted, publisher(*APPROACH), tempfile.TemporaryDirectory() as profile:
         conduct = re.search(r"http://[^\"]+", conducted.stdout.readline()).group()
-        with chromium.browsers() as browsers:
-            arguments = ["--kiosk", "--window-size=1280,800"]
-            with browsers.launch_persistent_context(profile, executable_path=chromium.PROGRAM, no_viewport=True, args=arguments) as kiosk:
-                page = kiosk.pages[0]
-                for address in (url, conduct):
-                    approaching(page, address, "dark,follow")
-                    time_line = "document.getElementById('conduct').hidden || getComputedStyle(document.getElementById('conduct')).opacity === '0'"
-                    seen = page.evaluate("[...document.querySelectorAll('nav, #rate, #detail')].filter((one) => one.checkVisibility({opacityProperty: true})).map((one) => one.id || one.tagName)")
-                    assert not seen and page.evaluate(time_line), f"{seen} or the transport bar in a kiosk"
-                    assert page.locator("#left").is_visible() and page.locator("#alert").is_visible(), words(page)
+        arguments = ["--kiosk", "--window-size=1280,800"]
+        with chromium.browsers().launch_persistent_context(profile, executable_path=chromium.PROGRAM, no_viewport=True, args=arguments) as kiosk:
+            page = kiosk.pages[0]
+            for address in (url, conduct):
+                approaching(page, address, "dark,follow")
+                time_line = "document.getElementById('conduct').hidden || getComputedStyle(document.getElementById('conduct')).opacity === '0'"
+                seen = page.evaluate("[...document.querySelectorAll('nav, #rate, #detail')].filter((one) => one.checkVisibility({opacityProperty: true})).map((one) => one.id || one.tagName)")
+                assert not seen and page.evaluate(time_line), f"{seen} or the transport bar in a kiosk"
+                assert page.locator("#left").is_visible() and page.locator("#alert").is_visible(), words(page)
 
 
 def forced_colours_keep_their_meaning():

@@ -12,6 +12,7 @@ import subprocess
 import numpy
 
 from stage_picture import NAME, PROGRAM, STILL, browser, drawn, listen, opened, play, publisher, server, started, truth_at, until, words
+from stage_places import APPROACH
 from stage_show import CONTACT, shot
 
 # Windows: phones, and desktop windows at 200 and 400 % zoom.
@@ -21,7 +22,7 @@ PROCESSION = ["--scene", "config/procession.toml"]
 
 def the_picture_keeps_half_of_the_window():
     """At least 55 % of the height, with and without the transport bar; the page scrolls to the rest, and fingers hit it."""
-    with server() as url, started("view", "--json", "--port", "0", "--control") as conducted, publisher("--start", "410", "--time-scale", "0.01") as _, browser(has_touch=True, is_mobile=True) as (page, complaints):
+    with server() as url, started("view", "--json", "--port", "0", "--control") as conducted, publisher(*APPROACH) as _, browser(has_touch=True, is_mobile=True) as (page, complaints):
         conduct = json.loads(conducted.stdout.readline())["url"]
         for width, height in WINDOWS:
             for address in (url, conduct):

@@ -17,7 +17,7 @@ import numpy
 
 from chromium import at_rest
 from stage_motion import solved_at
-from stage_picture import BODY_LENGTH, HEAD_LENGTH, PROGRAM, STILL, WIDTH, browser, drawn, opened, passes, play, publisher, server, started, truth_at, until, words
+from stage_picture import BODY_LENGTH, HEAD_LENGTH, PROGRAM, STILL, WATCHDOG, WIDTH, browser, drawn, opened, passes, play, publisher, server, started, truth_at, until, words
 
 SIZES = [(1280, 800), (3840, 2160), (390, 844)]
 # Place and time of the paper's contact, by the reference of 38 digits.
@@ -172,8 +172,8 @@ def fixed_views(page, url, handles):
 
 def what_is_coming_is_named_and_seen():
     # A quarter of the real speed, so that a slow machine has time to test.
-    with server() as url, publisher("--start", "406.5", "--time-scale", "0.25") as child, browser(viewport={"width": 1280, "height": 800}) as (page, complaints):
-        dark, chinese = (opened(page.context.browser, viewport={"width": 1280, "height": 800}) for _ in range(2))
+    with server() as url, publisher("--start", "406.5", "--time-scale", "0.25") as child, browser(patient=False, viewport={"width": 1280, "height": 800}) as (page, complaints):
+        dark, chinese = (opened(page.context.browser, patient=False, viewport={"width": 1280, "height": 800}) for _ in range(2))
         for (one, _), address in [((page, complaints), "light"), (dark, "dark"), (chinese, "lang=zh")]:
             one.goto(f"{url}#{address}")
         until(page, f"picture.time >= {CONTACT - 5}", "five seconds before the contact")
@@ -443,7 +443,7 @@ def nothing_is_complained_about():
     """No error messages through loops, themes, views and sound; ten minutes with BENCH_DRAGON_LONG=1. And the moving lanterns
     of the show never light what is beyond their reach."""
     seconds = 600 if os.environ.get("BENCH_DRAGON_LONG") == "1" else 6
-    signal.alarm(seconds + 120)
+    signal.alarm(seconds + WATCHDOG)
     with server() as url, publisher("--start", "408.5", "--loop"), browser(viewport={"width": 640, "height": 480}) as (page, complaints):
         show, seen = opened(page.context.browser, viewport={"width": 960, "height": 480})
         page.goto(f"{url}#sound,follow,keys")
