@@ -2,6 +2,7 @@
 //! process (`tests/fastdds/peer.cpp`), built at the first use.
 #![cfg(feature = "ros2")]
 
+mod harmless;
 mod streams;
 
 use crate::harness;
@@ -370,6 +371,11 @@ fn visit(name: &str, index: usize) -> Visit {
     if end.is_some_and(|end| end["samples"] == 0 && end["writers"] == 0) {
         return Visit::Undiscovered;
     }
+    // rclpy would never return from `take` at a message without a payload.
+    assert!(
+        lines.iter().all(|line| line["type"] != "sample" || line["bytes"].as_u64() > Some(4)),
+        "{topic}: {lines:?}"
+    );
     let received = lines.iter().filter(|line| line["type"] == "sample").count();
     assert!(received >= samples.parse().unwrap(), "{topic}: {lines:?}");
     Visit::Served
@@ -406,13 +412,10 @@ fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_mes
     let undiscovered = undiscovered.into_inner();
     println!("{} subscribers, {undiscovered} discovered nothing, MB: {memories:.1?}", rounds * beside);
     assert!(undiscovered <= rounds * beside / 4, "{undiscovered} of {}", rounds * beside);
-    // The queues fill first, with the messages of some seconds: more where the machine is busy for some time.
+    // The queues fill first, with the messages of some seconds.
     let highest = |memories: &[f64]| memories.iter().copied().fold(0.0, f64::max);
-    let (first, rest) = memories.split_at(rounds / 4);
-    assert!(highest(rest) < highest(first) + 32.0, "{memories:.1?}");
-    let last = &memories[rounds - 250.min(rounds / 2)..];
-    let lowest = last.iter().copied().fold(f64::INFINITY, f64::min);
-    assert!(highest(last) < lowest + 10.0, "the last 1,000: {memories:.1?}");
+    let (first, rest) = memories.split_at(100_usize.div_ceil(beside).min(rounds / 2));
+    assert!(highest(rest) < highest(first) + 10.0, "{memories:.1?}");
     // The same process still serves, and ends.
     assert_eq!(child_of(publisher.id()), Some(process));
     assert!(visit(name, 0) == Visit::Served || visit(name, 0) == Visit::Served);

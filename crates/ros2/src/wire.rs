@@ -32,6 +32,8 @@ const KEY: u8 = 8;
 /// The entities of the participants' discovery (RTPS 2.5, section 9.3.1.3).
 const PARTICIPANT_READER: [u8; 4] = [0, 1, 0, 0xc7];
 const PARTICIPANT_WRITER: [u8; 4] = [0, 1, 0, 0xc2];
+/// The number of a participant's last message: more than any participant sends.
+const LAST_MESSAGE: [u8; 4] = [0, 0, 0, 0x40];
 /// The bytes of a fragment: RustDDS's `FRAGMENT_SIZE`. A reader takes fragments of one size.
 pub(super) const FRAGMENT_BYTES: usize = 256;
 /// The bytes before a payload: its encoding, little-endian CDR, and no options.
@@ -123,8 +125,9 @@ pub(super) fn fragments(writer: GUID, reader: GUID, sequence: u64, body: &[u8], 
 /// Returns the message of a participant to all that it has left the network.
 pub(super) fn farewell(participant: Prefix) -> Vec<u8> {
     let mut bytes = header(participant);
-    // No flags beyond the header's, the distance to the parameters, and the first message of the writer.
-    let mut body = [[0, 0, 16, 0], PARTICIPANT_READER, PARTICIPANT_WRITER, [0; 4], [1, 0, 0, 0]].concat();
+    // No flags beyond the header's, the distance to the parameters, and the message's number. RustDDS ignores a number
+    // that it has received (`TopicCache::add_change`).
+    let mut body = [[0, 0, 16, 0], PARTICIPANT_READER, PARTICIPANT_WRITER, [0; 4], LAST_MESSAGE].concat();
     // PID_STATUS_INFO: disposed and unregistered; the end of the parameters.
     body.extend([0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0]);
     // The key, as a list of parameters in little endian: PID_PARTICIPANT_GUID, and the end.
@@ -266,7 +269,7 @@ mod tests {
     fn a_farewell_names_the_participant() {
         #[rustfmt::skip]
         let expected = [
-            0x15, 11, 60, 0, 0, 0, 16, 0, 0, 1, 0, 0xc7, 0, 1, 0, 0xc2, 0, 0, 0, 0, 1, 0, 0, 0,
+            0x15, 11, 60, 0, 0, 0, 16, 0, 0, 1, 0, 0xc7, 0, 1, 0, 0xc2, 0, 0, 0, 0, 0, 0, 0, 64,
             0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0,
             0, 3, 0, 0, 0x50, 0, 16, 0, 1, 15, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 0, 0, 1, 0xc1, 1, 0, 0, 0,
         ];
