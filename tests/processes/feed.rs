@@ -155,15 +155,19 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
 }
 
 /// A publisher gives the subscribers that wait for it 100 ms to connect, at whichever moment they try. A busy machine
-/// can delay the opening of a service for longer, so that two of ten shows may lack their first frame. A show counts if
-/// the machine ran this test throughout.
+/// can delay the opening of a service for longer, so that two shows may lack their first frame. A show in which the
+/// machine did not run this test for some time is not counted.
 #[test]
 fn a_feed_that_waits_for_a_show_gets_the_first_frame() {
     let mut feed = Feed::new(&unique("first"), FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
     let mut seen = Vec::new();
     let deadline = Instant::now() + Duration::from_secs(300);
-    let (mut shows, mut complete) = (0, 0);
-    while shows < 10 {
+    let (mut complete, mut incomplete) = (0, 0);
+    while complete < 8 {
+        assert!(
+            Instant::now() < deadline,
+            "{complete} shows were received from the first frame on; the last: {seen:?}"
+        );
         seen.clear();
         let publisher = publisher("first", &["--rate", "50", "--duration", "0.3"]);
         let ending = std::thread::spawn(move || publisher.output());
@@ -178,16 +182,14 @@ fn a_feed_that_waits_for_a_show_gets_the_first_frame() {
         while seen.last() != Some(&Seen::Gone) && ended.elapsed() < Duration::from_secs(5) {
             poll(&mut feed, &mut seen);
         }
-        if longest > Duration::from_millis(80) && Instant::now() < deadline {
-            continue;
-        }
-        shows += 1;
-        if let [run] = runs(&seen)[..] {
-            let (first, last, received, missed) = span(&seen, run);
-            complete += u32::from((first, last + 1, received + missed) == (0, published, published));
-        }
+        let is_complete = runs(&seen).first().is_some_and(|run| {
+            let (first, last, received, missed) = span(&seen, *run);
+            runs(&seen).len() == 1 && (first, last + 1, received + missed) == (0, published, published)
+        });
+        complete += u32::from(is_complete);
+        incomplete += u32::from(!is_complete && longest < Duration::from_millis(80));
+        assert!(incomplete <= 2, "{incomplete} shows were not received from the first frame on; the last: {seen:?}");
     }
-    assert!(complete >= 8, "{complete} of 10 shows were received from the first frame on; the last: {seen:?}");
 }
 
 /// A publisher opens its services one after another, the poses first.

@@ -21,7 +21,7 @@ use mcap::{MessageStream, Summary};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-/// Returns a scene of the folder `config` whose subscribers may fall behind by 6,000 frames, with the safe solver: an
+/// Returns a scene of the folder `config` whose subscribers may fall behind by 6,000 frames. It has the safe solver: an
 /// unoptimised build makes tables for seconds.
 fn scene(folder: &Path, name: &str, added: &str) -> PathBuf {
     let text = std::fs::read_to_string(format!("config/{name}.toml")).unwrap();

@@ -2,8 +2,8 @@
 
     light_peer.py --name NAME [--teams HANDLES...]
 
-Prints "ready" once it looks for the publisher, "enough" when it has five seconds of frames at 50 Hz and, at the end, a
-JSON line with the counts. Ends with an error if a frame is not its counterpart rounded.
+Prints "ready" once it looks for the publisher, and "enough" when it has five seconds of frames at 50 Hz. At the end it
+prints a JSON line with the counts. Ends with an error if a frame is not its counterpart rounded.
 """
 
 import argparse

@@ -18,8 +18,8 @@ import chromium
 from stage_picture import BODY_LENGTH, HEAD_LENGTH, browser, drawn, opened, play, publisher, server, started, until, words
 from stage_show import at, luminance, projection, risen, shot, spread
 
-# Ten minutes before the contact, longer than any test takes: little changes during the test.
-APPROACH = ["--start", "410", "--time-scale", "0.004"]
+# Nearly ten minutes before the contact, longer than any test takes: little changes during the test.
+APPROACH = ["--start", "410", "--time-scale", "0.0042"]
 # Important elements that are cut off by the window, by a scrolling panel or by the buttons at its foot.
 CUT = """() => {
     const nav = document.querySelector("nav").getBoundingClientRect();

@@ -49,8 +49,8 @@ class Scenes:
         return started("--scene", str(scene), "run", "--quiet", "--json", *arguments)
 
     def before_contact(self):
-        """Ten minutes before the contact, longer than any test takes."""
-        return ["--start", str(self.results["contact"]["time_lo"] - 3), "--time-scale", "0.005"]
+        """Nearly ten minutes before the contact, longer than any test takes."""
+        return ["--start", str(self.results["contact"]["time_lo"] - 3), "--time-scale", "0.0052"]
 
 
 @contextlib.contextmanager
