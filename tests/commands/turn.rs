@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::process::Command;
 
-use crate::harness::{can_run, few, python, python_modules, text};
+use crate::harness::{all, can_run, python, python_modules, text};
 use serde_json::Value;
 
 /// Plans a turn of the turnaround's team with 12 benches of a width in metres.
@@ -24,6 +24,7 @@ fn number(line: &Value, field: &str) -> f64 {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn the_least_turn_of_a_third_ratio_is_that_of_another_search() {
     // By `tests/python/least_turn.py`: the head's link locks at the junction of the arcs.
     const RADIUS: f64 = 3.552348981005;
@@ -43,7 +44,7 @@ fn the_least_turn_of_wide_boards_is_that_of_another_search() {
     let line = planned("2", "1.3");
     encloses(&line, RADIUS);
     assert_eq!((&line["limit"], &line["bench_a"], &line["bench_b"]), (&"contact".into(), &0.into(), &11.into()));
-    if !few() && can_run(python_modules(&["math"])) {
+    if all() && can_run(python_modules(&["math"])) {
         let (radius, printed) = other_search(&["2", "12", "1.65", "0.275", "1.3"], 1);
         assert!((radius - RADIUS).abs() < 5e-11 && printed.ends_with(" 0 11\n"), "{printed}");
     }

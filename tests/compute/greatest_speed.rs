@@ -84,6 +84,7 @@ fn on_the_way_in_nothing_is_faster_than_the_head() {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn tables_of_50_digits_and_the_reference_agree_with_the_turnaround() {
     let scene = load("turnaround");
     let plan = plan(&scene, &scene.motion.timeline(&mut |_| ()));

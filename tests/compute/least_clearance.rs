@@ -97,6 +97,7 @@ fn shows_that_end_with_a_lock_are_enclosed_up_to_it() {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn random_shows_are_no_nearer_than_is_proved() {
     let (mut proved, mut tried) = (0, 0);
     for index in 0..24 {
@@ -158,6 +159,7 @@ fn the_least_pitch_to_4_5_m_is_enclosed_to_a_nanometre() {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn least_pitches_of_other_teams_and_radii_are_those_of_the_brute_force() {
     // Benches, lengths of the boards, width, inset, radius. Some boards touch a turn apart, at the radius and outside,
     // as pairs (0, k) and (1, k). Wide boards touch the next but one. One radius is below half a link.

@@ -40,6 +40,7 @@ fn chain_at(scene: &Scene, travelled: f64, chain: &mut Chain) -> bool {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn the_turnaround_is_free_and_its_least_clearance_is_that_of_dense_sampling() {
     let scene = turnaround();
     let timeline = timeline(&scene);
@@ -178,6 +179,7 @@ fn the_least_pitch_to_4_5_m_is_where_boards_just_touch() {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn the_greatest_speed_of_the_turnaround_is_that_of_dense_sampling() {
     let scene = turnaround();
     let plan = greatest_speed(&scene, &timeline(&scene), 2.0, &mut |_| ()).unwrap();

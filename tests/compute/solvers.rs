@@ -293,6 +293,7 @@ fn every_scene_of_the_configuration_keeps_the_promise() {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn corners_of_the_ranges() {
     // Benches, links of head and body, pitch, start turn, speed. Each comment states the reason for its line.
     let corners = [

@@ -1,7 +1,7 @@
 //! Certificates of scenes with obstacles: the checker accepts them, they agree with the ordinary search, and a
 //! certificate of a changed scene is refused.
 //!
-//! `BENCH_DRAGON_LONG=1` makes 5,000 scenes in place of 200, `BENCH_DRAGON_CASES=few` 40.
+//! `BENCH_DRAGON_ALL=1` makes 200 scenes in place of 40, `BENCH_DRAGON_LONG=1` 5,000.
 
 use std::fmt::Write;
 

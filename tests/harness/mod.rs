@@ -442,17 +442,17 @@ pub fn long() -> bool {
     is_set("BENCH_DRAGON_LONG")
 }
 
-/// Returns true if few cases are requested, as by `tests/run --quick`.
-pub fn few() -> bool {
-    std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few")
+/// Returns true if all random cases are requested, as by `tests/run --all`.
+pub fn all() -> bool {
+    is_set("BENCH_DRAGON_ALL") || long()
 }
 
-/// Returns the first value if [`few`] cases are requested, the last for [`long`] tests, otherwise the second.
-pub fn cases<T>(of_few: T, usual: T, of_long: T) -> T {
+/// Returns the first value, the second if [`all`] cases are requested, the last for [`long`] tests.
+pub fn cases<T>(few: T, of_all: T, of_long: T) -> T {
     match () {
         () if long() => of_long,
-        () if few() => of_few,
-        () => usual,
+        () if all() => of_all,
+        () => few,
     }
 }
 

@@ -78,8 +78,8 @@ fn the_promises_hold_in_every_night() {
     let hours = match number("BENCH_DRAGON_NIGHT_HOURS") {
         Some(hours) => hours,
         None if is("BENCH_DRAGON_LONG", "1") => LONG_HOURS,
-        None if is("BENCH_DRAGON_CASES", "few") => FEW_HOURS,
-        None => HOURS,
+        None if is("BENCH_DRAGON_ALL", "1") => HOURS,
+        None => FEW_HOURS,
     };
     let first = if hours > HOURS { LONG_SEEDS } else { 0 };
     let total = play_for(hours, first);

@@ -1,8 +1,8 @@
 //! Tests of the checker: its intervals against exact integers, its lemmas and its rules on cases made by hand.
 
-/// Returns `all`, or `few` with `BENCH_DRAGON_CASES=few`.
+/// Returns `few`, or `all` with `BENCH_DRAGON_ALL=1`.
 fn cases(all: usize, few: usize) -> usize {
-    if std::env::var_os("BENCH_DRAGON_CASES").is_some_and(|cases| cases == "few") { few } else { all }
+    if std::env::var_os("BENCH_DRAGON_ALL").is_some_and(|value| value == "1") { all } else { few }
 }
 
 mod clearance;

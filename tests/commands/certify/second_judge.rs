@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use fastrand::Rng;
 use serde_json::{Value, json};
 
-use crate::harness::{Process, aloud, can_run, cases, few, json_lines, python, python_modules, text};
+use crate::harness::{Process, all, aloud, can_run, cases, json_lines, python, python_modules, text};
 
 /// Random times and steps of each certificate.
 const PLACES: &str = "5";
@@ -279,7 +279,7 @@ fn a_second_judge_agrees_and_refuses_what_was_changed() {
     let folder = folder.path();
     // `long` is proved for minutes, and `ros2` is the paper's scene.
     let config: &[&str] =
-        if few() { &["school"] } else { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] };
+        if all() { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] } else { &["school"] };
     let all = cases(8, 50, 500);
     let read = |name: &&str| (name.to_string(), std::fs::read_to_string(format!("config/{name}.toml")).unwrap());
     let scenes: Vec<_> = config.iter().map(read).collect();

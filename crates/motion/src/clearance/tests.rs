@@ -339,9 +339,15 @@ fn frames(path: &Path, places: &[f64]) -> Vec<f64> {
     places.iter().flat_map(|place| [0.0, 5e-5, 1e-3, 1.0 / 60.0].map(|by| place * path.length() + by)).collect()
 }
 
-/// Returns the number of random cases, ten times as many if the tests that take minutes are requested.
+/// Returns a quarter of the random cases, all of them with `BENCH_DRAGON_ALL=1`, and ten times as many if the tests that
+/// take minutes are requested.
 fn count(cases: usize) -> usize {
-    if std::env::var_os("BENCH_DRAGON_LONG").is_some() { 10 * cases } else { cases }
+    let is_set = |variable| std::env::var_os(variable).is_some_and(|value| value == "1");
+    match () {
+        () if is_set("BENCH_DRAGON_LONG") => 10 * cases,
+        () if is_set("BENCH_DRAGON_ALL") => cases,
+        () => cases / 4,
+    }
 }
 
 /// Runs a check on random cases and returns the sum of its counts.
@@ -377,12 +383,13 @@ fn the_same_as_all_pairs_on_random_paths() {
 fn no_boards_are_nearer_than_the_bounds() {
     let cases = (any_team(), any_lanes(), prop::collection::vec(0.0..1.0f64, 12));
     let close = Cell::new(0);
-    let checked = sum_over_cases(100, cases, |(team, path, places)| {
+    let count = count(100);
+    let checked = sum_over_cases(count, cases, |(team, path, places)| {
         let Some(table) = bound_table(&path, &team) else { return 0 };
         let slacks = places.iter().filter_map(|place| check_bounds(&table, &path, &team, place * path.length()));
         slacks.inspect(|slack| close.set(close.get() + usize::from(*slack < 0.02 * team.link(1)))).count()
     });
-    assert!(checked > 100 * 12 / 2, "{checked} frames had a table");
+    assert!(checked > count * 12 / 2, "{checked} frames had a table");
     // Without bounds the test would pass, too.
     assert!(close.get() > checked / 2, "{close:?} of {checked} frames had a close bound");
 }
