@@ -6,13 +6,17 @@
 pub mod accepted;
 pub mod cue;
 mod dragons;
+mod mend;
 pub mod path;
 pub mod precision;
 pub mod ros2;
 pub(crate) mod stage;
+mod team;
 mod text;
 
+use std::cell::RefCell;
 use std::path::Path as FilePath;
+use std::rc::Rc;
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -26,6 +30,7 @@ use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::RawRos2;
 use self::stage::RawStage;
+use self::team::RawTeam;
 pub use self::text::{SceneText, printable};
 use bench_dragon_messages::Roster;
 use bench_dragon_motion::ensemble::Ensemble;
@@ -119,6 +124,11 @@ pub struct Scene {
     pub motion: Motion,
     /// The dragons of a scene with `[[dragons]]`; `None` for a scene with `[team]`.
     pub ensemble: Option<Ensemble>,
+    /// The sizes of benches that the text leaves to their defaults, as in `width = 0.3`; of several dragons each with
+    /// its dragon's name before it.
+    pub team_defaults: Vec<String>,
+    /// Sentences on numbers that are accepted and hardly meant, such as millimetres; each names its file and line.
+    pub doubts: Vec<String>,
     /// The placement of the path's coordinates on the stage, if the scene states one. The motion's own placement
     /// contains this one.
     pub placement: Option<Placement>,
@@ -168,14 +178,14 @@ impl Scene {
     /// One sentence that names the file, the line, the field and the expected value. A scene of several dragons is
     /// refused.
     pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
-        let source = Source { text, file, dragon: None };
+        let source = Source::new(text, file);
         match several(text) {
             Some(dragons) => Err(source.field_error(
                 &dragons,
                 "the scene has several dragons, which this command does not take, expected one dragon in [team] and \
                  [path]",
             )),
-            None => source.read::<RawScene>()?.validated(&source, stem),
+            None => source.scene::<RawScene>(|raw| raw.validated(&source, stem)),
         }
     }
 
@@ -184,10 +194,10 @@ impl Scene {
     /// # Errors
     /// One sentence that names the file, the line, the field and the expected value.
     pub fn parse_any(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
-        let source = Source { text, file, dragon: None };
+        let source = Source::new(text, file);
         match several(text) {
-            Some(_) => source.read::<RawSeveral>()?.validated(&source, stem),
-            None => source.read::<RawScene>()?.validated(&source, stem),
+            Some(_) => source.scene::<RawSeveral>(|raw| raw.validated(&source, stem)),
+            None => source.scene::<RawScene>(|raw| raw.validated(&source, stem)),
         }
     }
 
@@ -269,15 +279,41 @@ fn several(text: &str) -> Option<Spanned<serde::de::IgnoredAny>> {
 }
 
 /// The text being read, for line numbers.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Source<'a> {
     text: &'a str,
     file: &'a str,
     /// The dragon whose tables are checked, if there are several.
     dragon: Option<&'a str>,
+    /// The sentences of [`Scene::doubts`].
+    doubts: Rc<RefCell<Vec<String>>>,
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    fn new(text: &'a str, file: &'a str) -> Self {
+        Self { text, file, dragon: None, doubts: Rc::default() }
+    }
+
+    /// Reads and checks a scene. An error that follows doubts may come from the first of them.
+    fn scene<T: for<'de> Deserialize<'de>>(
+        &self,
+        validated: impl FnOnce(T) -> Result<Scene, SceneError>,
+    ) -> Result<Scene, SceneError> {
+        let result = validated(self.read()?);
+        let doubts = self.doubts.take();
+        match (result, doubts.first()) {
+            (Ok(scene), _) => Ok(Scene { doubts, ..scene }),
+            (Err(SceneError(sentence)), Some(doubt)) => Err(SceneError(format!("{sentence} ({doubt})"))),
+            (Err(error), None) => Err(error),
+        }
+    }
+
+    /// Notes that a number is accepted, and hardly meant.
+    fn doubt<T>(&self, value: &Spanned<T>, sentence: &str) {
+        let SceneError(sentence) = self.field_error(value, sentence);
+        self.doubts.borrow_mut().push(sentence);
+    }
+
     fn read<T: for<'de> Deserialize<'de>>(&self) -> Result<T, SceneError> {
         let deserializer = toml::Deserializer::parse(self.text).map_err(|error| self.toml_error(&error, ""))?;
         serde_path_to_error::deserialize(deserializer)
@@ -293,6 +329,11 @@ impl Source<'_> {
         let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
         // `Spanned` values are wrapped in a field that no user wrote.
         let field = field.replace(".$__serde_spanned_private_value", "");
+        let line = error.span().map(|span| self.line(span.start));
+        let line = line.and_then(|line| self.text.lines().nth(line - 1)).unwrap_or_default();
+        if let Some(sentence) = mend::sentence(error.message(), &field, line) {
+            return SceneError(format!("{}{place}: {sentence}", self.file));
+        }
         let field = if field.is_empty() || field == "." { String::new() } else { format!("{field}: ") };
         let message = error.message().trim().replace('\n', ", ");
         let message =
@@ -354,16 +395,6 @@ struct RawScene {
     cues: Vec<RawCue>,
     #[serde(default)]
     publish: RawPublish,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawTeam {
-    benches: Spanned<i64>,
-    head_length: Spanned<f64>,
-    body_length: Spanned<f64>,
-    width: Spanned<f64>,
-    hole_inset: Spanned<f64>,
 }
 
 #[derive(Deserialize)]
@@ -441,7 +472,8 @@ impl RawScene {
             Some(stage) => checked.on_ground(stage.validated(source)?),
             None => checked,
         };
-        SharedTables { name, alerts, cues, publish, ends: motion.ends() }.validated(source, stem, checked, placement)
+        let shared = SharedTables { name, alerts, cues, publish, ends: motion.ends() };
+        Ok(Scene { team_defaults: team.defaults(), ..shared.validated(source, stem, checked, placement)? })
     }
 }
 
@@ -504,6 +536,8 @@ impl SharedTables {
             name,
             motion,
             ensemble: None,
+            team_defaults: Vec::new(),
+            doubts: Vec::new(),
             placement,
             on_contact: on_contact.unwrap_or(OnContact::Stop),
             at_end: at_end.unwrap_or(AtEnd::Hold),
@@ -519,33 +553,6 @@ impl SharedTables {
             subscribers,
             ros2: self.publish.ros2.as_ref().map(|ros2| ros2.validated(source)).transpose()?,
         })
-    }
-}
-
-impl RawTeam {
-    fn validated(&self, source: &Source) -> Result<Team, SceneError> {
-        let length = |field, value| source.check(field, value, Accepted::LENGTH);
-        let team = Team {
-            benches: source.check_count("team.benches", &self.benches, Accepted::BENCHES)?,
-            head_length: length("team.head_length", &self.head_length)?,
-            body_length: length("team.body_length", &self.body_length)?,
-            width: length("team.width", &self.width)?,
-            hole_inset: length("team.hole_inset", &self.hole_inset)?,
-        };
-        for (field, board) in [("head_length", &self.head_length), ("body_length", &self.body_length)] {
-            // A shorter board has its two holes in one place, or crosswise.
-            if *board.get_ref() - 2.0 * team.hole_inset < Accepted::LENGTH.least {
-                let sentence = format!(
-                    "team.{field} is {} and leaves no bench between its holes, expected more than twice \
-                     team.hole_inset ({}) by at least {} metres",
-                    board.get_ref(),
-                    team.hole_inset,
-                    Accepted::LENGTH.least
-                );
-                return Err(source.field_error(board, &sentence));
-            }
-        }
-        Ok(team)
     }
 }
 

@@ -9,9 +9,10 @@ use toml::Spanned;
 use super::cue::RawCue;
 use super::path::RawPath;
 use super::stage::RawStage;
+use super::team::RawTeam;
 use super::{
-    Accepted, RawAlerts, RawEnds, RawMotion, RawPlacement, RawPublish, RawTeam, Scene, SceneError, SharedTables,
-    SolverName, Source, motion_of,
+    Accepted, RawAlerts, RawEnds, RawMotion, RawPlacement, RawPublish, Scene, SceneError, SharedTables, SolverName,
+    Source, motion_of,
 };
 use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::ground::Ground;
@@ -94,9 +95,15 @@ impl RawSeveral {
         }
         let ensemble = Ensemble::new(dragons);
         let motion = ensemble.dragons()[0].motion.clone();
+        let of_dragon = |raw: &Spanned<RawDragon>| {
+            let RawDragon { name, team, .. } = raw.get_ref();
+            let defaults = team.defaults();
+            (!defaults.is_empty()).then(|| format!("{}: {}", name.get_ref(), defaults.join(", ")))
+        };
+        let team_defaults = given.iter().filter_map(of_dragon).collect();
         let Self { name, alerts, cues, publish, motion: ends, .. } = self;
         let scene = SharedTables { name, alerts, cues, publish, ends }.validated(source, stem, motion, None)?;
-        Ok(Scene { ensemble: Some(ensemble), ..scene })
+        Ok(Scene { ensemble: Some(ensemble), team_defaults, ..scene })
     }
 }
 
@@ -109,7 +116,7 @@ impl RawDragon {
                 format!("dragons.name is {name:?}, expected 1 to {MOST_DRAGON_NAME} of the letters a-z, 0-9 and _");
             return Err(source.field_error(&self.name, &sentence));
         }
-        let within = Source { dragon: Some(name), ..*source };
+        let within = Source { dragon: Some(name), ..source.clone() };
         if let Some(field) = self.motion.ends().first_given() {
             let sentence = format!("motion.{field} belongs to the whole show, expected it in the table [motion]");
             return Err(within.field_error(&self.name, &sentence));

@@ -23,6 +23,8 @@ use bench_dragon_motion::solve::reference::Piece;
 
 /// The greatest number of pieces of a route.
 pub(crate) const MOST_STEPS: usize = 4096;
+/// The turns above which an arc is doubted: nobody walks ten times around one circle, and degrees begin there.
+const MOST_ARC_TURNS: f64 = 10.0;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -274,7 +276,17 @@ impl RawStep {
         };
         let radius = checked(source, "radius", radius, Accepted::LENGTH)?;
         let turns = match extent {
-            Extent::Turns(turns) => checked(source, "turns", turns, Accepted::ARC_TURNS)?.into(),
+            Extent::Turns(given) => {
+                let turns = checked(source, "turns", given, Accepted::ARC_TURNS)?;
+                if turns > MOST_ARC_TURNS {
+                    let metres = turns * TAU * radius;
+                    let sentence = format!(
+                        "path.pieces.turns is {turns}, an arc of {metres:.0} m: degrees? 90 degrees are 0.25 turns"
+                    );
+                    source.doubt(given, &sentence);
+                }
+                turns.into()
+            }
             Extent::Length(length) => {
                 let metres = checked(source, "length", length, Accepted::LEG)?;
                 as_turns(source, length, metres / (TAU * radius))?;
