@@ -8,11 +8,13 @@ macro_rules! eprintln {
     }};
 }
 
+pub mod argument_errors;
 mod certificate_file;
 pub mod chase;
 pub mod check;
 pub mod control;
 pub mod draw;
+mod duration;
 pub mod events;
 mod lines;
 mod log_lines;
@@ -27,6 +29,7 @@ pub mod replay;
 mod ros2_process;
 pub mod ros_args;
 pub mod run;
+pub mod scene_argument;
 mod scene_facts;
 pub mod send;
 mod service_manager;
@@ -40,6 +43,7 @@ pub mod view;
 pub mod watch;
 pub mod write_manual;
 
+use duration::{seconds, wall_seconds};
 use new_file::NewFile;
 use std::ffi::OsString;
 use std::io::{self, BufWriter, StdoutLock, Write};
@@ -60,7 +64,7 @@ use serde::Serialize;
 /// Options before or after every subcommand.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Common {
-    /// The scene to play (TOML); by default the paper's, which is built in
+    /// The scene (TOML), of commands that take it as their argument; by default the paper's, which is built in
     #[arg(long, value_name = "FILE", global = true)]
     pub scene: Option<std::path::PathBuf>,
     /// The name under which services and topics appear; view, send and metrics take several
@@ -156,6 +160,24 @@ impl From<io::Error> for CommandError {
     fn from(error: io::Error) -> Self {
         if error.kind() == io::ErrorKind::BrokenPipe { Self::ClosedPipe } else { Self::Failed(error.to_string()) }
     }
+}
+
+/// Refuses the name of a picture of another kind: an SVG in it would open nowhere.
+///
+/// # Errors
+/// Bad input: the name ends as that of another kind of picture.
+pub fn svg_file(option: &str, file: Option<&Path>) -> Result<(), CommandError> {
+    const OTHERS: [&str; 9] = ["png", "jpg", "jpeg", "gif", "webp", "bmp", "tif", "tiff", "pdf"];
+    let Some(file) = file else { return Ok(()) };
+    let end = file.extension().map(|end| end.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if !OTHERS.contains(&&*end) {
+        return Ok(());
+    }
+    Err(CommandError::BadInput(format!(
+        "{option} {}: pictures are SVG alone, expected {}, which rsvg-convert or a browser makes into other kinds",
+        file.display(),
+        file.with_extension("svg").display()
+    )))
 }
 
 /// Returns the error for a `file` that cannot be created.
@@ -270,6 +292,11 @@ pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     timeline
 }
 
+/// Warns of numbers of a scene that are hardly meant.
+pub fn warn_of_doubts(scene: &Scene) {
+    scene.doubts.iter().for_each(|doubt| log::warn!("{doubt}"));
+}
+
 /// Warns that a search gave up, with the time that the search reached.
 pub fn warn_of_gap(timeline: &Timeline) {
     if let Some(until) = timeline.searched_until() {
@@ -342,24 +369,4 @@ pub fn end_when_shared_memory_is_full() -> Result<(), CommandError> {
     // serve as descriptors.
     unsafe { signal_hook::low_level::register(signal_hook::consts::SIGBUS, end) }?;
     Ok(())
-}
-
-/// Parses a wall time, `60`, `90s`, `5m` or `8h`, to seconds.
-///
-/// # Errors
-/// One sentence for other texts, for clap to print.
-pub fn wall_seconds(text: &str) -> Result<f64, String> {
-    let text = text.trim();
-    let (digits, unit) = match text.char_indices().last() {
-        Some((at, 's')) => (&text[..at], 1.0),
-        Some((at, 'm')) => (&text[..at], 60.0),
-        Some((at, 'h')) => (&text[..at], 3600.0),
-        _ => (text, 1.0),
-    };
-    let seconds = digits.parse::<f64>().map(|number| number * unit).unwrap_or(f64::NAN);
-    if seconds > 0.0 && seconds <= 1e9 {
-        Ok(seconds)
-    } else {
-        Err("expected a time above 0 such as 60, 90s, 5m or 8h".to_owned())
-    }
 }

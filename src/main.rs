@@ -1,16 +1,17 @@
 //! The command line: reads arguments, sets up the log, runs one subcommand, converts its error to an exit code.
+//!
+//! A subcommand that reads a scene has `arg = scene_argument()`. The others refuse one.
 
 #[macro_use]
 mod commands;
 mod logging;
 
-use std::path::Path;
 use std::process::ExitCode;
 
-use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use commands::ros_args;
-use commands::{CommandError, Common};
+use commands::scene_argument::{self, scene_argument};
+use commands::{CommandError, Common, argument_errors};
 
 /// Publishes a bench dragon live: handle poses and collision alerts at a fixed rate, over iceoryx2 shared memory and,
 /// on request, as ROS 2 topics.
@@ -26,12 +27,14 @@ pub struct CommandLine {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Publish a scene live
+    #[command(arg = scene_argument())]
     Run(commands::run::RunArguments),
     /// Conduct a running publisher: pause, rate, seek, step, hold
     Control(commands::control::ControlArguments),
     /// Record a running publisher as MCAP, or repair a recording that was cut
     Record(commands::record::RecordArguments),
     /// Publish a recording again, as the show was
+    #[command(arg = scene_argument())]
     Replay(commands::replay::ReplayArguments),
     /// Compare every bit of a log, check every line of a certificate, or compare every pose of a recording
     Verify(commands::verify::VerifyArguments),
@@ -46,30 +49,36 @@ pub enum Command {
     /// Serve a running publisher's figures to Prometheus
     Metrics(commands::metrics::MetricsArguments),
     /// Solve a scene offline and print every handle as a table
+    #[command(arg = scene_argument())]
     Solve(commands::solve::SolveArguments),
     /// Find contact, touch of an obstacle, stall, lock and path end; with --certify, prove them
+    #[command(arg = scene_argument())]
     Events(commands::events::EventsArguments),
     /// Draw the stage at a time as an SVG
+    #[command(arg = scene_argument())]
     Draw(commands::draw::DrawArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
+    #[command(arg = scene_argument())]
     Trade(commands::trade::TradeArguments),
     /// Plan a choreography: the least pitch, the least turn radius, the greatest speed
     Plan(commands::plan::PlanArguments),
     /// Soak-test: publish for hours to real subscriber processes and give a verdict
+    #[command(arg = scene_argument())]
     Soak(commands::soak::SoakArguments),
     /// A subscriber process of soak
-    #[command(hide = true)]
+    #[command(hide = true, arg = scene_argument())]
     SoakSubscriber(commands::soak::SoakSubscriberArguments),
     /// The commanding process of soak --conduct
-    #[command(hide = true)]
+    #[command(hide = true, arg = scene_argument())]
     SoakLoadGenerator(commands::soak_load_generator::SoakLoadGeneratorArguments),
     /// A client that soak --conduct kills
-    #[command(hide = true)]
+    #[command(hide = true, arg = scene_argument())]
     SoakClient(commands::soak_load_generator::SoakClientArguments),
     /// Write man pages and shell completions for a package
     #[command(hide = true)]
     WriteManual(commands::write_manual::WriteManualArguments),
     /// Validate a scene and print what it models
+    #[command(arg = scene_argument())]
     Check(commands::check::CheckArguments),
 }
 
@@ -88,13 +97,21 @@ fn main() -> ExitCode {
         Ok(translated) => translated,
         Err(error) => return exit_code(Err(error)),
     };
-    let CommandLine { mut common, command } = match CommandLine::try_parse_from(arguments) {
+    let mut definition = CommandLine::command();
+    let parsed = definition.try_get_matches_from_mut(&arguments).and_then(|matches| {
+        let CommandLine { common, command } = CommandLine::from_arg_matches(&matches)?;
+        Ok((common, command, matches))
+    });
+    let (mut common, command, matches) = match parsed {
         Ok(parsed) => parsed,
-        Err(error) => match scene_without_option(&error) {
+        Err(error) => match argument_errors::sentence(&error, &definition, &arguments) {
             Some(sentence) => return exit_code(Err(CommandError::BadInput(sentence))),
-            None => error.exit(),
+            None => error.format(&mut definition).exit(),
         },
     };
+    if let Err(sentence) = scene_argument::resolve(&mut common.scene, &definition, &matches) {
+        return exit_code(Err(CommandError::BadInput(sentence)));
+    }
     logging::set_up(&common);
     if let [name] = &mut common.names[..] {
         *name = names.applied_to(name);
@@ -125,18 +142,6 @@ fn main() -> ExitCode {
         Command::Check(arguments) => commands::check::check(&common, arguments),
     });
     exit_code(done)
-}
-
-/// Returns the sentence for an argument that names a scene file without `--scene`.
-fn scene_without_option(error: &clap::Error) -> Option<String> {
-    let context = match error.kind() {
-        ErrorKind::UnknownArgument => ContextKind::InvalidArg,
-        ErrorKind::InvalidSubcommand => ContextKind::InvalidSubcommand,
-        _ => return None,
-    };
-    let Some(ContextValue::String(argument)) = error.get(context) else { return None };
-    let is_scene = !argument.starts_with('-') && Path::new(argument).extension().is_some_and(|end| end == "toml");
-    is_scene.then(|| format!("unexpected argument '{argument}', expected --scene {argument}"))
 }
 
 /// Prints the error of a command. Returns the exit code.

@@ -28,6 +28,7 @@ use bench_dragon::proof::scene_hash;
 use bench_dragon::publisher::transports::iceoryx2::chase_status::ChaseStatusError;
 use bench_dragon::show::scene::{Scene, SceneText};
 
+use super::scene_argument::scene_argument;
 use super::{CommandError, Common, Output, expect_exact_motion, stop_on_signals, wall_seconds};
 
 /// The interval of polls for the scene of a show.
@@ -65,6 +66,7 @@ enum Kind {
         timecode: TimecodeArguments,
     },
     /// A performer with a tracker, by PosiStageNet; without --scene the show's own scene gives the path
+    #[command(arg = scene_argument())]
     Psn(PsnArguments),
 }
 

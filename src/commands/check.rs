@@ -141,7 +141,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if common.json {
         return if covered.is_some() { output.finish() } else { print_lines(&scene, &timeline, common, output) };
     }
-    describe(&scene, &mut output)?;
+    describe(&scene, &warnings(&scene, &timeline), &mut output)?;
     ahead(&scene, &timeline, &mut output)?;
     let (found, show_end) = find_least_clearance(&scene, &timeline, common);
     output.line(&format!("  {}", least_clearance(&scene, found.of_show())))?;
@@ -179,7 +179,6 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             output.line(&format!("    {sentence}."))?;
         }
     }
-    warn_of_the_start(&scene, &timeline);
     output.finish()
 }
 
@@ -216,14 +215,14 @@ fn ahead(scene: &Scene, timeline: &Timeline, output: &mut Output) -> Result<(), 
     Ok(())
 }
 
-/// Logs a warning if boards overlap at the start, and if a board is at an obstacle there.
-fn warn_of_the_start(scene: &Scene, timeline: &Timeline) {
-    if timeline.find(EventKind::Contact).is_some_and(|contact| contact.time == 0.0) {
-        log::warn!("boards overlap at the start of scene \"{}\": widen the pitch or narrow the boards", scene.name);
-    }
-    if timeline.find(EventKind::Obstacle).is_some_and(|touch| touch.time == 0.0) {
-        log::warn!("a board is within the keep-out of an obstacle at the start of scene \"{}\"", scene.name);
-    }
+/// Returns the warnings about a scene: its doubtful numbers, and boards that overlap or are at an obstacle at the start.
+fn warnings(scene: &Scene, timeline: &Timeline) -> Vec<String> {
+    let begins_with = |kind| timeline.find(kind).is_some_and(|timed| timed.time == 0.0);
+    let overlap = "boards overlap at the start: widen the pitch or narrow the boards";
+    let obstacle = "a board is within the keep-out of an obstacle at the start";
+    let starts = [(EventKind::Contact, overlap), (EventKind::Obstacle, obstacle)];
+    let starts = starts.into_iter().filter(|(kind, _)| begins_with(*kind)).map(|(_, warning)| warning.to_owned());
+    scene.doubts.iter().cloned().chain(starts).collect()
 }
 
 /// A line of `check --json`: the least clearance of two boards.

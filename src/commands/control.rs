@@ -9,15 +9,15 @@ use bench_dragon::messages::control::{Code, Command, MOST_PERIODS, RATES};
 use bench_dragon::messages::state::PlaybackState;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, number};
+use super::{CommandError, Common, Output, number, seconds};
 
 /// Arguments of `control`.
 #[derive(Debug, clap::Args)]
 pub struct ControlArguments {
     #[command(subcommand)]
     action: Action,
-    /// Longest wait for the answer, seconds; by default 30, and for a step as long as it makes progress
-    #[arg(long, value_name = "SECONDS", global = true, allow_negative_numbers = true)]
+    /// Longest wait for the answer; by default 30 s, and for a step as long as it makes progress
+    #[arg(long, value_name = "TIME", value_parser = seconds, global = true, allow_negative_numbers = true)]
     timeout: Option<f64>,
 }
 
@@ -38,7 +38,8 @@ enum Action {
     },
     #[command(about = Command::Seek(1.0).entry().help, allow_negative_numbers = true)]
     Seek {
-        /// Seconds since the start of the scene
+        /// Simulated time since the start of the scene: 400, 1:30
+        #[arg(value_parser = seconds)]
         time: f64,
     },
     #[command(about = Command::Step(1).entry().help, allow_negative_numbers = true)]

@@ -14,12 +14,14 @@ use serde::Serialize;
 
 use super::solve::time_of;
 use super::swept::{Benches, Stretch, benches, swept};
-use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
+use super::{
+    CommandError, Common, Output, figure, number, progress_bar, search_timeline, seconds, svg_file, warn_of_doubts,
+};
 
 /// Arguments of `draw`.
 #[derive(Debug, clap::Args)]
 pub struct DrawArguments {
-    /// Simulated seconds, or contact, obstacle, stall, lock, path_end
+    /// Simulated time (60, 1:30), or contact, obstacle, stall, lock, path_end
     #[arg(long, value_name = "TIME", default_value = "0", allow_negative_numbers = true, conflicts_with = "every")]
     at: String,
     /// Write to a file instead of standard output; with --every a pattern such as frames/%05d.svg
@@ -35,8 +37,8 @@ pub struct DrawArguments {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Many times")]
 struct Many {
-    /// Simulated seconds between two pictures, which share one camera and one colour scale; with --until
-    #[arg(long, value_name = "SECONDS", requires = "until", allow_negative_numbers = true, group = "stretch")]
+    /// Simulated time between two pictures, which share one camera and one colour scale; with --until
+    #[arg(long, value_name = "TIME", value_parser = seconds, requires = "until", allow_negative_numbers = true, group = "stretch")]
     every: Option<f64>,
     /// The ground that boards cover, with its area, under the boards of --at
     #[arg(long, group = "stretch")]
@@ -109,7 +111,9 @@ const VIEW: Accepted = Accepted { least: 1e-9, greatest: 1e9, unit: "metres" };
 
 /// Draws the stage.
 pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandError> {
+    svg_file("--output", arguments.output.as_deref())?;
     let scene = common.load_scene()?;
+    warn_of_doubts(&scene);
     let look = arguments.look.look()?;
     let timeline = search_timeline(&scene, common);
     let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);

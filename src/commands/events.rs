@@ -12,7 +12,7 @@ use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
-use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline, warn_of_doubts};
 
 /// Arguments of `events`.
 #[derive(Debug, clap::Args)]
@@ -48,6 +48,7 @@ struct EventLine {
 pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
     let scene = text.parse_any()?;
+    warn_of_doubts(&scene);
     let timeline = search_timeline(&scene, common);
     let proved = match &arguments.certify {
         Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),

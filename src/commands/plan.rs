@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
 use super::events::bench_name;
+use super::scene_argument::scene_argument;
 use super::{CommandError, Common, Output, expect_exact_motion, number, progress_bar, search_timeline};
 
 /// Arguments of `plan`.
@@ -27,6 +28,7 @@ pub struct PlanArguments {
 #[derive(Debug, clap::Subcommand)]
 enum Question {
     /// The least pitch at which the scene's team reaches a radius on a spiral without touching itself
+    #[command(arg = scene_argument())]
     Pitch {
         /// Metres from the centre that the front handle of the head must reach
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
@@ -36,6 +38,7 @@ enum Question {
         certify: Option<PathBuf>,
     },
     /// The greatest constant speed of the head at which no handle of the show exceeds a limit
+    #[command(arg = scene_argument())]
     Speed {
         /// Metres per second that no handle may exceed
         #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
@@ -45,6 +48,7 @@ enum Question {
         certify: Option<PathBuf>,
     },
     /// The least turn radius with which the scene's team turns round without contact, stall or lock
+    #[command(arg = scene_argument())]
     Turn {
         /// Radius of the first arc over that of the second; without it, the best that is found
         #[arg(long, value_name = "K", allow_negative_numbers = true)]

@@ -48,7 +48,7 @@ pub struct RecordArguments {
     /// begins another file too
     #[arg(long, value_name = "SIZE|TIME", value_parser = split, conflicts_with = "recover")]
     split: Option<Split>,
-    /// Wall time after which to end: 60, 90s, 5m, 8h
+    /// Wall time after which to end: 60, 90s, 1:30, 1h30m
     #[arg(long, value_name = "TIME", value_parser = wall_seconds, conflicts_with = "recover")]
     duration: Option<f64>,
     /// Replace files that exist

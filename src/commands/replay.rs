@@ -44,10 +44,16 @@ pub struct ReplayArguments {
     /// Playback speed, as a factor of the recorded speed
     #[arg(long, value_name = "X", default_value_t = 1.0, help_heading = "The show", allow_negative_numbers = true)]
     time_scale: f64,
-    /// Begin with the first frame of the recording at or after these simulated seconds
-    #[arg(long, value_name = "SECONDS", help_heading = "The show", allow_negative_numbers = true)]
+    /// Begin with the first frame of the recording at or after this simulated time
+    #[arg(
+        long,
+        value_name = "TIME",
+        value_parser = super::seconds,
+        help_heading = "The show",
+        allow_negative_numbers = true
+    )]
     start: Option<f64>,
-    /// Wall time after which to end: 60, 90s, 5m, 8h
+    /// Wall time after which to end: 60, 90s, 1:30, 1h30m
     #[arg(long, value_name = "TIME", value_parser = super::wall_seconds, help_heading = "The show")]
     duration: Option<f64>,
     /// Begin again whenever the recording is over

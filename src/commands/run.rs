@@ -24,7 +24,7 @@ use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
-use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
+use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_doubts, warn_of_gap};
 
 /// Nanoseconds that waiting subscribers have before the first frame: each tries to connect every 20 ms.
 const LEAD_NS: u64 = 100_000_000;
@@ -38,16 +38,17 @@ pub struct RunArguments {
     /// Simulated seconds per second of wall time
     #[arg(long, value_name = "X", default_value_t = 1.0, help_heading = "The show", allow_negative_numbers = true)]
     time_scale: f64,
-    /// Simulated seconds at which the show begins
+    /// Simulated time at which the show begins
     #[arg(
         long,
-        value_name = "SECONDS",
+        value_name = "TIME",
+        value_parser = super::seconds,
         default_value_t = 0.0,
         help_heading = "The show",
         allow_negative_numbers = true
     )]
     start: f64,
-    /// Wall time after which to end: 60, 90s, 5m, 8h
+    /// Wall time after which to end: 60, 90s, 1:30, 1h30m
     #[arg(long, value_name = "TIME", value_parser = super::wall_seconds, help_heading = "The show")]
     duration: Option<f64>,
     /// Begin again whenever the show has ended
@@ -84,6 +85,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     arguments.parent.watch()?;
     let text = common.scene_text()?;
     let mut scene = text.parse_any()?;
+    warn_of_doubts(&scene);
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
     }

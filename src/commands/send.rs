@@ -17,6 +17,7 @@ use bench_dragon::outputs::send::trackers::{Numbers, Selection};
 
 use super::parent::Parent;
 use super::ros_args::UseSimTime;
+use super::scene_argument::scene_argument;
 use super::{CommandError, Common, Output, number, stop_on_signals};
 
 /// Arguments of `send`.
@@ -34,6 +35,7 @@ enum Kind {
     Osc(OscArguments),
     /// ROS 2 topics, and with --control services that conduct the show; the settings are those of the show's scene, or
     /// of --scene
+    #[command(arg = scene_argument())]
     Ros2(Ros2Arguments),
 }
 

@@ -35,7 +35,7 @@ const MOST_FLAKY_CLIENTS: usize = 8;
 /// Arguments of `soak`.
 #[derive(Debug, clap::Args)]
 pub struct SoakArguments {
-    /// Wall time after which to end: 60, 90s, 5m, 8h
+    /// Wall time after which to end: 60, 90s, 1:30, 1h30m
     #[arg(long, value_name = "TIME", value_parser = wall_seconds, default_value = "8h", help_heading = "The test")]
     duration: f64,
     /// Frames per second; by default the scene's

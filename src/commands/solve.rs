@@ -7,23 +7,23 @@ use bench_dragon::motion::solve::Chain;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::{solve_at_or_just_before, table};
 
-use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline};
+use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline, seconds};
 
 /// Arguments of `solve`.
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("times").required(true))]
 pub struct SolveArguments {
-    /// Simulated seconds, or contact, obstacle, stall, lock, path_end; several separated by commas
+    /// Simulated times (60, 1:30), or contact, obstacle, stall, lock, path_end; several separated by commas
     #[arg(long, value_name = "TIMES", value_delimiter = ',', group = "times", allow_negative_numbers = true)]
     at: Vec<String>,
-    /// Simulated seconds between two rows; with --until
-    #[arg(long, value_name = "SECONDS", group = "times", requires = "until", allow_negative_numbers = true)]
+    /// Simulated time between two rows; with --until
+    #[arg(long, value_name = "TIME", value_parser = seconds, group = "times", requires = "until", allow_negative_numbers = true)]
     every: Option<f64>,
     /// The first time of --every
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, requires = "every", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TIME", value_parser = seconds, default_value_t = 0.0, requires = "every", allow_negative_numbers = true)]
     from: f64,
     /// The last time of --every, inclusive
-    #[arg(long, value_name = "SECONDS", requires = "every", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TIME", value_parser = seconds, requires = "every", allow_negative_numbers = true)]
     until: Option<f64>,
     /// Write to a file instead of standard output
     #[arg(short, long, value_name = "FILE")]
@@ -147,9 +147,9 @@ pub fn time_of(option: &str, text: &str, timeline: &Timeline) -> Result<f64, Com
             CommandError::BadInput(format!("{option} {text}: this scene has no {text}; `events` lists its events"))
         });
     }
-    let time: f64 = text.parse().map_err(|_| {
+    let time = seconds(text).map_err(|sentence| {
         CommandError::BadInput(format!(
-            "{option} {text}: expected seconds, or one of contact, obstacle, stall, lock, path_end"
+            "{option} {text}: {sentence}, or one of contact, obstacle, stall, lock, path_end"
         ))
     })?;
     let end = timeline.end();

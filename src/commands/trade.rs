@@ -12,7 +12,7 @@ use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 use serde::Serialize;
 
-use super::{CommandError, Common, Output, progress_bar, warn_of_gap};
+use super::{CommandError, Common, Output, progress_bar, seconds, svg_file, warn_of_gap};
 
 /// Arguments of `trade`.
 #[derive(Debug, Clone, clap::Args)]
@@ -30,7 +30,7 @@ pub struct TradeArguments {
     #[arg(long, value_name = "HZ", value_parser = display_rate, help_heading = "The display")]
     pub display_rate: Option<f64>,
     /// Delay of the display behind the stream [default: 0 for `hold`, else one publishing period]
-    #[arg(long, value_name = "SECONDS", value_parser = delay, help_heading = "The display")]
+    #[arg(long, value_name = "TIME", value_parser = delay, help_heading = "The display")]
     pub delay: Option<f64>,
 }
 
@@ -47,7 +47,7 @@ fn display_rate(text: &str) -> Result<f64, String> {
 }
 
 fn delay(text: &str) -> Result<f64, String> {
-    let delay = text.parse().unwrap_or(f64::NAN);
+    let delay = seconds(text)?;
     if (0.0..f64::INFINITY).contains(&delay) { Ok(delay) } else { Err("expected at least 0, in seconds".to_owned()) }
 }
 
@@ -55,6 +55,8 @@ fn delay(text: &str) -> Result<f64, String> {
 pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandError> {
     /// Share of the solvers in the progress of a dragon.
     const SOLVERS: f64 = 0.85;
+    svg_file("--plot", arguments.plot.as_deref())?;
+    svg_file("--display-plot", arguments.display_plot.as_deref())?;
     let scene = common.load_scene()?;
     let parts = parts(&scene);
     if parts.len() > 1 && (arguments.plot.is_some() || arguments.display_plot.is_some()) {

@@ -27,7 +27,7 @@ use super::{CommandError, Common, severity_colour, shows_colour, stop_on_signals
 /// Arguments of `watch`.
 #[derive(Debug, clap::Args)]
 pub struct WatchArguments {
-    /// Wall time after which to end: 60, 90s, 5m, 8h
+    /// Wall time after which to end: 60, 90s, 1:30, 1h30m
     #[arg(long, value_name = "TIME", value_parser = wall_seconds)]
     duration: Option<f64>,
 }

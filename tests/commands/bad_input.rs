@@ -68,6 +68,11 @@ fn scenes_that_cannot_be_played() {
         ("hole_inset = 0.275", "hole_inset = 0", &["line 9", "team.hole_inset"]),
         ("hole_inset = 0.275", "hole_inset = nan", &["line 9", "team.hole_inset"]),
         ("hole_inset = 0.275", "hole_inset = 1.2", &["line 7", "body_length", "hole_inset"]),
+        (
+            "body_length = 2.20        # m, whole board, tail included\nwidth = 0.30              # m\nhole_inset = 0.275",
+            "hole_inset = 1.2",
+            &["line 7", "team.body_length is 2.2", "hole_inset"],
+        ),
         ("kind = \"spiral\"", "kind = \"circle\"", &["line 12", "path.kind", "circle", "spiral"]),
         ("pitch = 0.55", "pitch = 0", &["line 13", "path.pitch"]),
         ("pitch = 0.55", "pitch = -0.55", &["line 13", "path.pitch", "-0.55"]),
@@ -181,6 +186,16 @@ fn arguments_that_cannot_be_used() {
         (vec!["run", "--name", &long_name], "--name"),
         (vec!["watch", "--name", &long_name], "--name"),
         (vec!["watch", "--duration=-1s"], "--duration"),
+        (vec!["run", "--name", "龙"], "expected a name for services of iceoryx2: 1 to 247 characters of ASCII"),
+        (vec!["run", "--rate", "60fps"], "'60fps' for '--rate <HZ>': expected a number without a unit, such as 60"),
+        (vec!["run", "--start", "1:99"], "expected seconds, or a time such as 90s, 1:30, 5m or 1h30m"),
+        (vec!["run", "--cpu", "one"], "'one' for '--cpu <N>': expected a whole number"),
+        (vec!["control", "seek", "soon"], "expected seconds, or a time such as 90s, 1:30"),
+        (vec!["control", "play"], "control play is no command, expected resume (after a pause) or go"),
+        (vec!["control", "stop"], "control stop is no command, expected pause, or hold"),
+        (vec!["draw", "-o", "x.png"], "--output x.png: pictures are SVG alone, expected x.svg, which"),
+        (vec!["draw", "--every", "1", "--until", "2", "-o", "f/%d.PNG"], "expected f/%d.svg, which"),
+        (vec!["trade", "--plot", "x.pdf"], "--plot x.pdf: pictures are SVG alone, expected x.svg"),
         (vec!["solve"], "--at"),
         (vec!["solve", "--at", "soon"], "--at"),
         (vec!["solve", "--at", "-1"], "--at"),
@@ -202,6 +217,7 @@ fn arguments_that_cannot_be_used() {
         (vec!["draw", "--every", "1e-300", "--until", "1", "-o", "%d.svg"], "--every 1e-300 gives 9.99"),
         (vec!["draw", "--every=-1e300", "--until", "1", "-o", "%d.svg"], "--every is -1e300, expected"),
         (vec!["run", "--rate", "1e308"], "--rate is 1e308, expected"),
+        (vec!["check", "paper"], "paper: there is no such file, expected a scene file"),
         (vec!["plan", "speed", "--max-handle-speed", "1e308"], "--max-handle-speed is 1e308, expected"),
         (vec!["control", "step", "-1"], "'[PERIODS]': expected a whole number from 1 to 9007199254740992"),
         (
@@ -241,15 +257,55 @@ fn a_million_benches_at_a_rate_nobody_can_meet_are_no_bad_input() {
     assert!(frames > 0 && overruns > 0, "{summary}");
 }
 
+/// Every command that reads a scene, with what else it needs.
+const READERS: &str = "check|run|solve --at 1|events|draw|trade|plan pitch --reach-radius 4|plan turn|soak|\
+                       plan speed --max-handle-speed 2|chase psn|send ros2|replay x.mcap";
+
 #[test]
-fn a_scene_without_its_option_is_told_the_option() {
-    let commands = "check|run|solve --at 1|events|draw|trade|plan pitch|plan speed|plan turn|soak|";
-    for command in commands.split('|') {
-        let arguments: Vec<&str> = command.split_whitespace().chain(["config/paper.toml"]).collect();
-        let sentence = "error: unexpected argument 'config/paper.toml', expected --scene config/paper.toml\n";
-        assert_eq!(refusal(&arguments), sentence, "{arguments:?}");
+fn a_scene_is_an_argument_of_every_command_that_reads_one() {
+    let with = |command: &str, more: &[&str]| {
+        let words: Vec<&str> = command.split_whitespace().chain(more.iter().copied()).collect();
+        refusal(&words)
+    };
+    for command in READERS.split('|') {
+        let missing = with(command, &["no_such.toml"]);
+        let sentence = "error: no_such.toml: there is no such file, expected a scene file in TOML\n";
+        assert_eq!(missing, sentence, "{command}");
+        assert_eq!(with(command, &["--scene", "no_such.toml"]), sentence, "{command}");
+        let twice = with(command, &["a.toml", "--scene", "b.toml"]);
+        assert_eq!(twice, "error: the scene is given twice, a.toml and --scene b.toml, expected one of them\n");
+        assert!(with(command, &["a.toml", "b.toml"]).contains("'b.toml', expected one scene"), "{command}");
     }
-    // Other arguments are refused in clap's words.
-    assert!(refusal(&["check", "paper"]).contains("'paper'"));
-    assert!(!refusal(&["check", "paper"]).contains("--scene paper"));
+    assert_eq!(refusal(&["--scene", "b.toml", "check", "a.toml"]).lines().count(), 1);
+    let answer = |arguments: &[&str]| {
+        let output = run(arguments);
+        assert!(output.status.success(), "{arguments:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let events = answer(&["--json", "events", "config/school.toml"]);
+    assert_eq!(events, answer(&["--json", "events", "--scene", "config/school.toml"]));
+    assert_ne!(events, answer(&["--json", "events"]));
+    assert!(answer(&["draw", "--help"]).contains("\nArguments:\n  [SCENE]"));
+}
+
+#[test]
+fn a_scene_that_no_command_reads_is_refused() {
+    for command in "watch|view|metrics|control go|record -o x.mcap|send psn|chase artnet|verify x.jsonl".split('|') {
+        let words: Vec<&str> = command.split_whitespace().collect();
+        for scene in [&["a.toml"][..], &["--scene", "a.toml"]] {
+            let printed = refusal(&[&words, scene].concat());
+            assert!(printed.contains(" takes no scene, expected it without a.toml"), "{command}: {printed}");
+            assert!(printed.starts_with(&format!("error: {}", words[0])), "{command}: {printed}");
+            assert_eq!(printed.lines().count(), 1, "{command}: {printed}");
+        }
+    }
+    for (arguments, example) in [
+        (&["a.toml"][..], "bench-dragon run a.toml"),
+        (&["a.toml", "check"], "bench-dragon run a.toml"),
+        (&["plan", "a.toml"], "bench-dragon plan pitch a.toml"),
+        (&["send", "a.toml"], "bench-dragon send ros2 a.toml"),
+    ] {
+        let printed = refusal(arguments);
+        assert!(printed.contains("a command before the scene") && printed.contains(example), "{printed}");
+    }
 }

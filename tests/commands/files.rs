@@ -13,7 +13,8 @@ const SCENE: &str = "tests/scenes/missed_contact.toml";
 
 fn run(arguments: &[&str], file: &Path) -> Output {
     let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
-    Process::start(program.args(["--scene", SCENE]).args(arguments).arg(file)).output()
+    let scene = if arguments[0] == "record" { None } else { Some(["--scene", SCENE]) };
+    Process::start(program.args(scene.iter().flatten()).args(arguments).arg(file)).output()
 }
 
 /// The commands that write one file, without its name.

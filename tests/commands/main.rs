@@ -5,6 +5,7 @@ mod certify;
 mod check_cues;
 mod draw;
 mod files;
+mod first_scene;
 mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]

@@ -10,9 +10,15 @@ use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 use super::super::{CommandError, Output, figure, number};
 
 /// Prints the description of a scene.
-pub(super) fn describe(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
-    output.line(&format!("Scene \"{}\" is valid.", scene.name))?;
+pub(super) fn describe(scene: &Scene, warnings: &[String], output: &mut Output) -> Result<(), CommandError> {
+    let judged = if warnings.is_empty() { "is valid." } else { "can be played, but probably not as it is meant:" };
+    output.line(&format!("Scene \"{}\" {judged}", scene.name))?;
+    warnings.iter().try_for_each(|warning| output.line(&format!("  Warning: {warning}")))?;
     dragons(scene, output)?;
+    if !scene.team_defaults.is_empty() {
+        let separator = if scene.ensemble.is_some() { "; " } else { ", " };
+        output.line(&format!("  By default, in metres: {}.", scene.team_defaults.join(separator)))?;
+    }
     if !scene.ground().is_empty() {
         output.line(&format!("  Stage: {}.", ground(scene)))?;
     }

@@ -63,14 +63,28 @@ fn check_values(matches: &clap::ArgMatches) {
         let Some(text) = raw.next_back().and_then(|raw| raw.to_str()) else { continue };
         let text = text.trim();
         let units = [("s", 1.0), ("m", 60.0), ("h", 3600.0), ("px", 1.0), ("mm", 1.0), ("%", 0.01), ("", 1.0)];
-        let number =
-            units.iter().find_map(|(unit, factor)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * factor));
+        let in_unit =
+            |(unit, factor): &(&str, f64)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * factor);
+        let number = units.iter().find_map(in_unit).or_else(|| seconds_of_parts(text));
         let number = number.unwrap_or_else(|| panic!("--{name} takes {text:?}"));
         assert!(number >= least && number <= greatest, "--{name} takes {text}");
         if let ("duration", Ok(Some(seconds))) = (name, matches.try_get_one::<f64>(name)) {
-            assert_eq!(*seconds, number, "--duration {text}");
+            assert!((seconds - number).abs() <= 1e-12 * number, "--duration {text}: {seconds}");
         }
     }
+}
+
+/// Returns the seconds of `1:30` or `1h30m`: each part counts sixty times the part after it.
+fn seconds_of_parts(text: &str) -> Option<f64> {
+    if text.contains(':') {
+        return text.split(':').try_fold(0.0, |sum, part| Some(60.0 * sum + part.parse::<f64>().ok()?));
+    }
+    let parts = text.split_inclusive(['h', 'm', 's']);
+    parts.map(str::trim).try_fold(0.0, |sum, part| {
+        let (number, unit) = part.split_at(part.len() - 1);
+        let factor = [("h", 3600.0), ("m", 60.0), ("s", 1.0)].into_iter().find(|(name, _)| *name == unit)?.1;
+        Some(sum + factor * number.trim().parse::<f64>().ok()?)
+    })
 }
 
 fn check_refusal(error: &clap::Error, arguments: &[&str]) {
@@ -133,7 +147,7 @@ fn words() -> &'static Words {
     })
 }
 
-const VALUES: [&str; 30] = [
+const VALUES: [&str; 32] = [
     "__ns:=/a",
     "__node:=b",
     "use_sim_time:=true",
@@ -142,6 +156,8 @@ const VALUES: [&str; 30] = [
     "1-4294967295",
     "5m",
     "1.5m",
+    "1h30m",
+    "1:30",
     "60",
     "90s",
     "8h",

@@ -12,11 +12,11 @@ use super::{MOST_PUBLISHERS, SHARED_MEMORY};
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// iceoryx2 refuses the name.
-    #[error("the name is \"{name}\", expected a name for services of iceoryx2: not empty, at most {most} bytes")]
+    #[error("the name is \"{name}\", expected a name for services of iceoryx2: 1 to {most} characters of ASCII")]
     Name {
         /// The name given.
         name: String,
-        /// The most bytes a name may have.
+        /// The most characters a name may have.
         most: usize,
     },
     /// Another publisher runs under this name.
