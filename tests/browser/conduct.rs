@@ -320,3 +320,8 @@ fn bar_conducts() {
 fn token_and_own_pages() {
     in_a_browser("token_and_own_pages");
 }
+
+#[test]
+fn own_page_draws() {
+    in_a_browser("own_page_draws");
+}

@@ -28,7 +28,7 @@ _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
 
 @contextlib.contextmanager
 def started(*arguments):
-    child = subprocess.Popen([PROGRAM, "--name", NAME, "--scene", SCENE, *arguments], stdout=subprocess.PIPE, text=True)
+    child = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdout=subprocess.PIPE, text=True)
     try:
         yield child
     finally:
@@ -37,8 +37,8 @@ def started(*arguments):
 
 
 @contextlib.contextmanager
-def publisher(*arguments):
-    with started("run", "--quiet", "--json", "--rate", "50", *arguments) as child:
+def publisher(*arguments, scene=SCENE):
+    with started("run", scene, "--quiet", "--json", "--rate", "50", *arguments) as child:
         until(state, "a publisher")
         yield child
 
@@ -309,6 +309,42 @@ def token_and_own_pages():
             assert gets_frames(browser, elsewhere, ready), "an admitted page gets nothing"
 
 
+# Heads, and the other boards of the first and of the second dragon on the example page.
+HEAD, FIRST, SECOND = "ffd24a", "1fb8a6", "e2572b"
+# The pixels of each colour, and the pixels of a metre.
+COLOURS = """() => {
+    const canvas = document.querySelector("canvas"), context = canvas.getContext("2d"), counts = {};
+    const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+    for (let k = 0; k < data.length; k += 4) {
+        const colour = data[k + 3] ? [0, 1, 2].map((one) => data[k + one].toString(16).padStart(2, "0")).join("") : "";
+        counts[colour] = (counts[colour] ?? 0) + 1;
+    }
+    return [counts, canvas.width, canvas.height];
+}"""
+
+
+def own_page_draws():
+    """The example page has as many pixels of each colour as its boards have square metres. Only edges are blended."""
+    head, body = 3.41 * 0.30, 2.20 * 0.30
+    for scene, at, expected in [
+        ("config/paper.toml", 100, {HEAD: head, FIRST: 222 * body}),
+        ("config/coil.toml", 100, {HEAD: 2 * head, FIRST: 59 * body, SECOND: 59 * body}),
+    ]:
+        rows = subprocess.run([PROGRAM, "solve", scene, "--at", str(at), "--json"], capture_output=True, check=True)
+        handles = json.loads(rows.stdout)["handles"]
+        spans = [max(row[axis] for row in handles) - min(row[axis] for row in handles) for axis in (0, 1)]
+        with publisher("--start", str(at), "--paused", scene=scene), chromium() as browser, server("--pages", "examples/page") as ready:
+            page = browser.new_context(viewport={"width": 1600, "height": 1200}).new_page()
+            page.goto(ready["url"] + "pages/")
+            until(lambda: len(page.evaluate(COLOURS)[0]) > 1, "a picture on the user's own page")
+            counts, wide, high = page.evaluate(COLOURS)
+            metre = 0.9 * min(wide / (spans[0] + 2), high / (spans[1] + 2))
+            for colour, metres in expected.items():
+                share = counts.get(colour, 0) / (metres * metre**2)
+                assert 0.6 < share < 1.02, f"{scene}: {share} of the area of {colour}: {counts.get(colour)} pixels"
+            assert (SECOND in expected) == (SECOND in counts), scene
+
+
 class Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *_):
         pass
@@ -326,4 +362,4 @@ def gets_frames(browser, elsewhere, ready):
 
 signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} did not end within {WATCHDOG} s"))
 signal.alarm(WATCHDOG)
-{scenario.__name__: scenario for scenario in [bar_conducts, token_and_own_pages]}[SCENARIO]()
+{scenario.__name__: scenario for scenario in [bar_conducts, token_and_own_pages, own_page_draws]}[SCENARIO]()
