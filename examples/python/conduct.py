@@ -6,9 +6,10 @@ Without a command it plays a short scene: half speed, a pause of a second, and r
 """
 
 import argparse
+import sys
 import time
 
-from bench_dragon import COMMANDS, Controller, described
+from bench_dragon import COMMANDS, CommandRefused, Controller, described
 
 
 def main():
@@ -27,4 +28,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except CommandRefused as refused:
+        sys.exit(str(refused))

@@ -126,3 +126,61 @@ fn the_last_handle_of_each_of_two_dragons_has_the_heading_of_its_last_bench() {
     publisher.signal(SIGINT);
     assert!(publisher.output().status.success());
 }
+
+/// Prints what a user sees of messages, and a command that is refused.
+const PRINTED: &str = "
+import json, sys
+from bench_dragon import CommandRefused, Controller, subscribe
+feed, alerts, cues, stage = subscribe(sys.argv[1], seconds=120), [], [], None
+for frame in feed:
+    alerts += feed.alerts()
+    cues += feed.cues()
+    stage = stage or feed.stage()
+    if alerts and cues and stage:
+        break
+controller = Controller(sys.argv[1])
+held = controller.send('hold')
+try:
+    controller.send('resume')
+except CommandRefused as error:
+    refused = [str(error), error.answer.playback, error.answer.code]
+controller.send('release')
+print(json.dumps([repr(one) for one in (frame.header, alerts[0], cues[0], stage[0], stage[1][0], held)] + refused))
+";
+
+#[test]
+fn messages_and_refusals_print_what_they_say() {
+    if !can_run(python_modules(&["iceoryx2", "numpy"])) {
+        return;
+    }
+    let file = scene_file("python_printed", &[]);
+    let cue = "\n[[cues]]\nname = \"gong\"\nat = 400.5\n";
+    std::fs::write(&file, std::fs::read_to_string(&file).unwrap() + cue).unwrap();
+    let mut run = program("python_printed");
+    let run = run.arg("run").arg(&file).args(["--json", "--start", "400", "--duration", "300"]);
+    let publisher = Process::start(run);
+    let mut peer = python();
+    peer.env("PYTHONPATH", "packaging/python").args(["-c", PRINTED, &unique("python_printed")]);
+    let output = Process::start(&mut peer).output();
+    let found = json_lines(&output).pop().unwrap_or_else(|| panic!("{}", text(&output.stderr)));
+    let [header, alert, cue, stage, segment, held, refused] =
+        [0, 1, 2, 3, 4, 5, 6].map(|k| found[k].as_str().unwrap_or_else(|| panic!("{found}")));
+    for (printed, parts) in [
+        (header, &["FrameHeader(run_id=", "sim_time=400.", "handles=224, state=", "playback=playing"][..]),
+        (alert, &["CollisionAlert(", "level=", "event=contact", "event_bench_a=0, event_bench_b=8)"]),
+        (cue, &["Cue(", "name='gong'"]),
+        (stage, &["dragons=[StageDragon(", "benches=223", "state=contact", "StageCue(", "bench_b=NO_BENCH"]),
+        (segment, &["StageSegment(", "kind=inward_spiral"]),
+        (held, &["ControlResponse(", "code=done", "playback=held"]),
+        (refused, &["resume is refused: refused in this state: held at 0.0 x, t = 40"]),
+    ] {
+        for part in parts {
+            assert!(printed.contains(part), "no {part} in {printed}");
+        }
+        assert!(!printed.contains(" object at "), "{printed}");
+    }
+    assert!(!header.contains("reserved") && !header.contains("state=0"), "{header}");
+    assert_eq!((found[7].as_u64(), found[8].as_u64()), (Some(2), Some(2)), "{found}");
+    publisher.signal(SIGINT);
+    assert!(publisher.output().status.success());
+}

@@ -10,11 +10,19 @@ import json
 import random
 import time
 
-from bench_dragon import COMMANDS, Controller
+from bench_dragon import COMMANDS, CommandRefused, Controller
 
 
 def line(**fields):
     print(json.dumps(fields), flush=True)
+
+
+def answer_of(controller, command, value=0.0):
+    """Returns the answer to a command, refused or not."""
+    try:
+        return controller.send(command, value)
+    except CommandRefused as refused:
+        return refused.answer
 
 
 def table(controller):
@@ -27,12 +35,12 @@ def table(controller):
     for state, steps in states.items():
         for command in COMMANDS:
             for before in [("release", 0), ("resume", 0), ("rate", 1.0), *steps]:
-                controller.send(*before)
-            answer = controller.send(command, values.get(command, 0.0))
+                answer_of(controller, *before)
+            answer = answer_of(controller, command, values.get(command, 0.0))
             line(state=state, command=command, code=answer.code, playback=answer.playback, tick=answer.tick)
-    controller.send("release")
+    answer_of(controller, "release")
     for number, value in ((10, 0.0), (4294967295, 0.0), (3, float("nan")), (3, 1e7), (4, -1.0), (4, 1e9), (5, 0.0), (5, 0.5)):
-        answer = controller.send(number, value)
+        answer = answer_of(controller, number, value)
         line(state="any", command=number, value=None if value != value else value, code=answer.code)
 
 

@@ -5,9 +5,10 @@
     for frame in subscribe("bench_dragon"):
         x = frame.handles["x"]                   # metres, a numpy array in the publisher's own memory
 
-`subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands. `HermiteReader`
-gives the handles between two frames, `name_in` the names of benches and obstacles. All messages have the layouts of the
-program of the same version.
+`subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands; one that is
+refused raises `CommandRefused`. `HermiteReader` gives the handles between two frames, `name_in` the names of benches and
+obstacles. All messages have the layouts of the program of the same version; `print` shows their fields, states and
+levels by name.
 """
 
 import importlib
@@ -45,13 +46,13 @@ from bench_dragon.layouts import (
 from bench_dragon.names import name_in
 
 if TYPE_CHECKING:
-    from bench_dragon.control import CODES, COMMANDS, Controller, described
+    from bench_dragon.control import CODES, COMMANDS, CommandRefused, Controller, described
     from bench_dragon.feed import Feed, Frame, subscribe
     from bench_dragon.services import LayoutError
 
 # The names of modules that need iceoryx2, which a subscriber over ROS 2 may lack: they are imported when first used.
 _IN_MODULES = {
-    "control": ("CODES", "COMMANDS", "Controller", "described"),
+    "control": ("CODES", "COMMANDS", "CommandRefused", "Controller", "described"),
     "feed": ("Feed", "Frame", "subscribe"),
     "services": ("LayoutError",),
 }
@@ -69,6 +70,7 @@ __all__ = [
     "COMMANDS",
     "ChaseStatus",
     "CollisionAlert",
+    "CommandRefused",
     "ControlRequest",
     "ControlResponse",
     "Controller",

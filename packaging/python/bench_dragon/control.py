@@ -17,8 +17,21 @@ from bench_dragon.services import layout_error, new_node
 COMMANDS = ("state", "pause", "resume", "rate", "seek", "step", "restart", "hold", "release", "go")
 CODES = ("done", "already so", "refused in this state", "value out of range", "not understood", "too many waiting")
 
+ControlRequest.NAMES = {"command": dict(enumerate(COMMANDS))}
+ControlResponse.NAMES = {"code": dict(enumerate(CODES)), "playback": dict(enumerate(PLAYBACK))}
+
 # Seconds between two looks for an answer.
 POLL_INTERVAL = 0.0005
+
+
+class CommandRefused(RuntimeError):
+    """The publisher refuses a command, in a sentence. `answer` is its response, with the state of the show."""
+
+    def __init__(self, command: str | int, answer: ControlResponse) -> None:
+        """Creates the error of a command and the response to it."""
+        name = COMMANDS[command] if isinstance(command, int) and 0 <= command < len(COMMANDS) else command
+        super().__init__(f"{name} is refused: {described(answer)}")
+        self.answer = answer
 
 
 class Controller:
@@ -42,7 +55,8 @@ class Controller:
         """Sends a command by name or number and returns the response, in its own memory.
 
         `value`: simulated seconds per second for `rate`, simulated seconds for `seek`, periods for `step`, else 0.
-        Raises ValueError for an unknown name, TimeoutError without an answer within `timeout` seconds.
+        Raises `CommandRefused` if the publisher refuses the command, ValueError for an unknown name, TimeoutError
+        without an answer within `timeout` seconds.
         """
         if isinstance(command, str) and command not in COMMANDS:
             raise ValueError(f'no command is called "{command}": expected one of {", ".join(COMMANDS)}')
@@ -55,6 +69,8 @@ class Controller:
             if response is not None:
                 answer = ControlResponse.from_buffer_copy(response.payload().contents)
                 response.delete()
+                if answer.code > CODES.index("already so"):
+                    raise CommandRefused(command, answer)
                 return answer
             if is_last:
                 raise TimeoutError(f"no answer to {command} within {timeout} s")

@@ -109,11 +109,28 @@ class Message(ctypes.Structure):
 
     # The version of the layout.
     LAYOUT: ClassVar[int]
+    # The names of the values of a field, for people.
+    NAMES: ClassVar[dict[str, dict[int, Any]]] = {}
 
     @classmethod
     def type_name(cls) -> str:
         """Returns the name that iceoryx2 compares with the publisher's."""
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+
+    def __repr__(self) -> str:
+        """Returns fields and values, states and levels by name."""
+        fields = [field[0] for field in self._fields_ if field[0] != "reserved"]
+        return f"{type(self).__name__}({', '.join(f'{field}={self._shown(field)}' for field in fields)})"
+
+    def _shown(self, field: str) -> str:
+        value = getattr(self, field)
+        if field in self.NAMES:
+            return str(self.NAMES[field].get(value, value))
+        if isinstance(value, ctypes.Array):
+            # A name, which zeros follow, or a hash.
+            text = bytes(value).rstrip(b"\0").decode(errors="replace")
+            return repr(text) if text.isprintable() and "\ufffd" not in text else bytes(value).hex()
+        return "NO_BENCH" if "bench" in field and value == NO_BENCH else repr(value)
 
 
 def _list(element: type[Message], most: int) -> type[ctypes.Structure]:
@@ -130,6 +147,9 @@ def _list(element: type[Message], most: int) -> type[ctypes.Structure]:
 
         def __getitem__(self, index: int) -> Any:
             return self.items[: len(self)][index]
+
+        def __repr__(self) -> str:
+            return repr(self.items[: len(self)])
 
     return List
 
@@ -199,6 +219,7 @@ class FrameHeader(Message):
     """
 
     LAYOUT = 2
+    NAMES = {"state": dict(enumerate(STATES)), "playback": dict(enumerate(PLAYBACK))}
     # New for every start of a publisher: a change means that it was started again.
     run_id: int
     # Counts the frames published in this run from 0, without gaps: over iceoryx2 a gap means that frames were missed. A
@@ -266,6 +287,7 @@ class CollisionAlert(Message):
     """
 
     LAYOUT = 2
+    NAMES = {"level": dict(enumerate(LEVELS)), "event": EVENTS}
     # The run this alert belongs to, as `FrameHeader.run_id`.
     run_id: int
     # The tick of the frame this alert goes with.
@@ -585,6 +607,7 @@ class StageSegment(Message):
     """
 
     LAYOUT = 6
+    NAMES = {"kind": dict(enumerate(SEGMENTS))}
     # Its beginning, metres right of the centre.
     x: float
     # Its beginning, metres up from the centre.
@@ -690,6 +713,7 @@ class StageObstacle(Message):
     """An obstacle of the show in a `Stage`, or its boundary."""
 
     LAYOUT = 6
+    NAMES = {"kind": dict(enumerate(OBSTACLES))}
     # Metres that every board has to stay away.
     keep_out: float
     # The kind of shape: one of `OBSTACLES`.
@@ -716,6 +740,7 @@ class StageEvent(Message):
     """An event of the show in a `Stage`."""
 
     LAYOUT = 6
+    NAMES = {"state": dict(enumerate(STATES))}
     # Simulated seconds at which it happens.
     time: float
     # The event, as the state that it leads to: one of `STATES`.

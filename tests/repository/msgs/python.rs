@@ -1,7 +1,7 @@
 //! `packaging/python/bench_dragon/layouts.py`: the layouts as classes of ctypes, with type hints.
 
 use crate::msgs::render::{ENUMS, NOTICE, Target, comment, targets, wrapped};
-use crate::msgs::source::{Docs, Enumeration, Kind, Layout, Source, links, without_links};
+use crate::msgs::source::{Docs, Enumeration, Field, Kind, Layout, Source, links, without_links};
 
 const HEAD: &str = r#""""The memory layouts of bench-dragon's messages, once, for every Python subscriber.
 
@@ -24,11 +24,28 @@ class Message(ctypes.Structure):
 
     # The version of the layout.
     LAYOUT: ClassVar[int]
+    # The names of the values of a field, for people.
+    NAMES: ClassVar[dict[str, dict[int, Any]]] = {}
 
     @classmethod
     def type_name(cls) -> str:
         """Returns the name that iceoryx2 compares with the publisher's."""
         return f"bench_dragon/{cls.__name__}/{cls.LAYOUT}"
+
+    def __repr__(self) -> str:
+        """Returns fields and values, states and levels by name."""
+        fields = [field[0] for field in self._fields_ if field[0] != "reserved"]
+        return f"{type(self).__name__}({', '.join(f'{field}={self._shown(field)}' for field in fields)})"
+
+    def _shown(self, field: str) -> str:
+        value = getattr(self, field)
+        if field in self.NAMES:
+            return str(self.NAMES[field].get(value, value))
+        if isinstance(value, ctypes.Array):
+            # A name, which zeros follow, or a hash.
+            text = bytes(value).rstrip(b"\0").decode(errors="replace")
+            return repr(text) if text.isprintable() and "\ufffd" not in text else bytes(value).hex()
+        return "NO_BENCH" if "bench" in field and value == NO_BENCH else repr(value)
 
 
 def _list(element: type[Message], most: int) -> type[ctypes.Structure]:
@@ -45,6 +62,9 @@ def _list(element: type[Message], most: int) -> type[ctypes.Structure]:
 
         def __getitem__(self, index: int) -> Any:
             return self.items[: len(self)][index]
+
+        def __repr__(self) -> str:
+            return repr(self.items[: len(self)])
 
     return List
 "#;
@@ -144,6 +164,10 @@ fn class(source: &Source, layout: &Layout) -> String {
         text += &format!("    {one_line}\n    \"\"\"\n");
     }
     text += &format!("\n    LAYOUT = {}\n", layout.version);
+    let named: Vec<_> = layout.fields.iter().filter_map(|field| names_of(source, field)).collect();
+    if !named.is_empty() {
+        text += &format!("    NAMES = {{{}}}\n", named.join(", "));
+    }
     for field in &layout.fields {
         text += &comment(&plain(source, Some(layout), &field.docs), "    ");
         text += &format!("    {}: {}\n", field.name, type_hint(&field.kind));
@@ -153,6 +177,18 @@ fn class(source: &Source, layout: &Layout) -> String {
         text += &format!("        (\"{}\", {}),\n", field.name, type_name(&field.kind));
     }
     text + "    ]\n"
+}
+
+/// Returns the entry of `NAMES` of a field whose comment has a link to its values.
+fn names_of(source: &Source, field: &Field) -> Option<String> {
+    let mut targets = field.docs.iter().flat_map(|text| links(text)).map(|link| Target::of(source, link));
+    let names = targets.find_map(|target| match target {
+        Target::Enum(names) if names.rust == "EventKind" => Some(names.python.to_owned()),
+        Target::Enum(names) => Some(format!("dict(enumerate({}))", names.python)),
+        Target::Group(prefix) => Some(format!("dict(enumerate({}S))", prefix.trim_end_matches('_'))),
+        _ => None,
+    })?;
+    Some(format!("\"{}\": {names}", field.name))
 }
 
 /// Returns comments in the words of Python.
