@@ -42,14 +42,14 @@ fn check_says_which_sizes_it_took_by_default() {
 
 #[test]
 fn times_are_seconds_or_minutes() {
-    let rows = |at: &str| answer(&["solve", "config/school.toml", "--at", at]).0;
+    let rows = |at: &str| answer(&["solve", "config/paper.toml", "--at", at]).0;
     assert_eq!(rows("1:10"), rows("70"));
     assert_eq!(rows("1m10s"), rows("70"));
     let many = |every: &str, from: &str, until: &str| {
         answer(&["solve", "config/school.toml", "--every", every, "--from", from, "--until", until]).0
     };
-    assert_eq!(many("0.5s", "0:30", "1m"), many("0.5", "30", "60"));
-    let [minutes, seconds] = ["1:10", "70"].map(|at| answer(&["draw", "config/school.toml", "--at", at]).0);
+    assert_eq!(many("0.5s", "0:30", "0m50s"), many("0.5", "30", "50"));
+    let [minutes, seconds] = ["1:10", "70"].map(|at| answer(&["draw", "config/paper.toml", "--at", at]).0);
     assert_eq!(minutes, seconds);
 }
 

@@ -166,7 +166,7 @@ fn messages_and_refusals_print_what_they_say() {
     let [header, alert, cue, stage, segment, held, refused] =
         [0, 1, 2, 3, 4, 5, 6].map(|k| found[k].as_str().unwrap_or_else(|| panic!("{found}")));
     for (printed, parts) in [
-        (header, &["FrameHeader(run_id=", "sim_time=400.", "handles=224, state=", "playback=playing"][..]),
+        (header, &["FrameHeader(run_id=", "sim_time=40", "handles=224, state=", "playback=playing"][..]),
         (alert, &["CollisionAlert(", "level=", "event=contact", "event_bench_a=0, event_bench_b=8)"]),
         (cue, &["Cue(", "name='gong'"]),
         (stage, &["dragons=[StageDragon(", "benches=223", "state=contact", "StageCue(", "bench_b=NO_BENCH"]),

@@ -1,6 +1,7 @@
 //! Sentences for mistakes of a first scene that TOML reports in words which name no remedy.
 //!
-//! In: the reader's message, the field, and the line of the error. Out: a sentence, or nothing. Only [`super`] calls it.
+//! In: the reader's message, the field, and the line of the error. Out: a sentence, or nothing. Only [`super`] calls
+//! it.
 
 use serde::Deserialize;
 
@@ -90,7 +91,7 @@ mod tests {
                 "",
                 "line 4: benches: unknown field here, benches stands in [team], expected a line [team] above it",
             ),
-            ("[alerts] ", "# ", "approach_time stands in [alerts], expected a line [alerts] above it"),
+            ("[alerts] ", "# ", "approach_clearance stands in [alerts], expected a line [alerts] above it"),
             ("pitch = 0.55", "rate = 60", "line 13: path.rate: unknown field here, rate stands in [publish]"),
             ("[motion]", two, "[stage.obstacles] is one of a list, expected [[stage.obstacles]], with two brackets"),
             ("[motion]", "[cues]\nname = \"a\"\n[motion]", "line 16: [cues] is one of a list, expected [[cues]]"),

@@ -23,7 +23,7 @@ use bench_dragon_motion::solve::reference::Piece;
 
 /// The greatest number of pieces of a route.
 pub(crate) const MOST_STEPS: usize = 4096;
-/// The turns above which an arc is doubted: nobody walks ten times around one circle, and degrees begin there.
+/// The turns above which an arc is doubted: a dance has no ten rounds on one circle, and degrees are mostly above.
 const MOST_ARC_TURNS: f64 = 10.0;
 
 #[derive(Deserialize)]
