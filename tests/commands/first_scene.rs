@@ -1,4 +1,4 @@
-//! What a new user does first: a short scene, times in minutes, numbers that are hardly meant.
+//! The first steps of a new user: a short scene, times in minutes, numbers that are hardly meant.
 
 use std::io::Write;
 use std::process::{Command, Output};
