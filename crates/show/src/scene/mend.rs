@@ -50,7 +50,8 @@ fn decimal_comma(line: &str) -> Option<&str> {
 
 /// Returns the table in which a key stands, by the tables' own definitions.
 fn table_of(key: &str) -> Option<&'static str> {
-    let tables: [(&str, fn(&str) -> bool); 8] = [
+    type HasKey = fn(&str) -> bool;
+    let tables: [(&str, HasKey); 8] = [
         ("team", has::<RawTeam>),
         ("path", has::<RawPath>),
         ("motion", has::<RawMotion>),
