@@ -67,6 +67,7 @@ pub const INSTEAD: &[(&str, &str, &str)] = &[
     ("--duration 10m", "--duration 2", "shorter"),
     ("--duration 75", "--duration 2", "shorter"),
     ("--duration 60 ", "--duration 2 ", "shorter"),
+    ("--duration 60s ", "--duration 2 ", "shorter"),
     ("--duration 40s", "--duration 2", "shorter"),
     ("--seconds 60", "--seconds 2", "shorter"),
     ("--rate RATE", "--rate 60", "the reader's own number"),
