@@ -1,8 +1,7 @@
 //! The nearest two boards of a chain: by all pairs as the reference, and by the live method that tests few of them.
 //!
-//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. The show calls it if a scene has alerts. Pairs that share a
-//! handle never count. Both methods evaluate a pair with the same function on the same numbers, so they agree to the
-//! last bit.
+//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. Pairs that share a handle never count. Both methods
+//! evaluate a pair with the same function on the same numbers, so they agree to the last bit.
 
 mod between;
 mod between_table;

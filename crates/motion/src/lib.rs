@@ -1,9 +1,8 @@
 //! The motion: a team on a path at a speed, with a method to solve it. This crate alone decides what a show computes:
-//! the solver and the reason for it, the events, and the live clearance. It also decides the time of a travelled
-//! distance and the outline to draw.
+//! the solver and the reason for it, the events, the live clearance, the time of a travelled distance, and the outline
+//! to draw.
 //!
-//! In: the numbers of a scene. The show, the plans and the commands call it. Only `model` distinguishes the kinds of
-//! curves.
+//! In: the numbers of a scene. Only `model` distinguishes the kinds of curves.
 
 pub mod clearance;
 pub mod contact;

@@ -1,7 +1,6 @@
 //! Links on a path: the follower, which is the handle at the rear end of a link, and the link's pose.
 //!
 //! In: a path, the place of a link's front handle, the link's length. Out: the rear handle's place and the link's pose.
-//! Solvers and events call it.
 
 use crate::model::Point;
 use crate::model::curve::{Curve, Follower};

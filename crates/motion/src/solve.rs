@@ -1,7 +1,7 @@
 //! Solvers: from the head's travel to the state of every handle.
 //!
-//! The solvers differ in cost and accuracy and implement [`Solver`]; [`crate`] chooses one. Each lies on the measured
-//! Pareto front of error against time, except the paper's solver and the reference.
+//! The solvers differ in cost and accuracy and implement [`Solver`]; [`crate`] chooses one. Except for the paper's
+//! solver and the reference, each lies on the measured Pareto front of error against time.
 
 pub mod newton;
 pub mod paper;

@@ -1,7 +1,7 @@
 //! [`sweep`]: the positions that boards take one after the other while the head goes from one place to another. The
 //! positions are near enough to each other for an outline of the ground that the boards cover.
 //!
-//! In: a motion, a stretch of its path, some benches. Out: pairs of positions of one board. `drawing::swept` calls it.
+//! In: a motion, a stretch of its path, some benches. Out: pairs of positions of one board.
 
 use std::ops::Range;
 

@@ -1,21 +1,21 @@
 //! The nearest two boards of different dragons of a frame.
 //!
 //! In: the chain of all dragons on the stage, and the clearance of the nearest two boards found so far. Out: a nearer
-//! pair, if there is one. The show calls it if a scene has several dragons and alerts.
+//! pair, if there is one.
 //!
 //! Where all dragons have tables of their frames, a table lists the pairs that can be the nearest at each time of the
 //! show ([`super::between_table`]). Otherwise the pairs are found from frame to frame.
 //!
 //! The broad phase is the same as in [`super::search`]. Every bench carries from frame to frame a lower bound of its
-//! distance to the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A
-//! bench is tested again only when its bound comes within the limit. The box about each dragon gives a wide bound to
-//! benches that are far from all later dragons. For the other benches a grid finds the boards nearby.
+//! distance to the boards of later dragons, and each frame lowers all bounds by the greatest approach of two boards. A
+//! bench is tested again only when its bound comes within the limit. For benches that are far from all later dragons,
+//! the box about each dragon gives a wide bound. For the other benches a grid finds the boards nearby.
 //!
 //! Dragons that go side by side hardly approach each other, however fast they go. So a bench keeps a list of the boards
-//! near it. Each entry has a distance and the places of the board's handles at that time, as seen from the bench. Seen
-//! so, the bench's front handle is the origin and its link is an axis. A point of a board is a linear function of the
-//! board's two handles. So two boards have approached by no more than [`corner_reach`] times the movement of the
-//! handles as seen from the bench. A board of the list is measured again only when this bound comes within the limit.
+//! near it. Each entry has a distance and the places of the board's handles at that time, as seen from the bench: the
+//! bench's front handle is then the origin and its link an axis. A point of a board is a linear function of the board's
+//! two handles, so two boards have approached by no more than [`corner_reach`] times the movement of the handles as
+//! seen from the bench. A board of the list is measured again only when this bound comes within the limit.
 
 use super::between_table::{BetweenTable, TabledDragon};
 use super::grid::Grid;

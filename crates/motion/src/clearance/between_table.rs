@@ -1,16 +1,16 @@
-//! The boards of two dragons that can be the nearest, for every time of a show. These boards are listed before the
-//! show, so that a frame tests only the listed boards.
+//! The boards of two dragons that can be the nearest, for every time of a show. They are listed before the show, so
+//! that a frame tests only the listed boards.
 //!
 //! The time is divided into equal cells. Throughout a cell every handle is near a quadratic polynomial of the cell's
-//! time. The polynomials give a lower and an upper bound of the distance of every two boards (see [`super::moving`]).
-//! The list of a cell has the pairs whose lower bound is within the least upper bound, in ascending order. Its last
-//! entry stands for all other pairs.
+//! time, and these polynomials give a lower and an upper bound of the distance of every two boards (see
+//! [`super::moving`]). The list of a cell has the pairs whose lower bound is within the least upper bound, in ascending
+//! order. Its last entry stands for all other pairs.
 //!
-//! The polynomials follow from the rows of each dragon's table ([`crate::solve::table::rows`]). Throughout a cell,
-//! alpha of the second handle is nearly a linear function of the time. The polynomials hold while alpha and the head
-//! are within assumed errors, which every frame checks.
+//! The polynomials follow from the rows of each dragon's table ([`crate::solve::table::rows`]), because throughout a
+//! cell alpha of the second handle is nearly a linear function of the time. They hold while alpha and the head are
+//! within assumed errors, which every frame checks.
 //!
-//! In: the dragons of a show and its end. Out: a list for every frame. Only [`super::between`] calls it.
+//! In: the dragons of a show and its end. Out: a list for every frame.
 
 use super::between::Moment;
 use super::cells::track;

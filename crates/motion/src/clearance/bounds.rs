@@ -1,22 +1,22 @@
-//! Lower bounds of the distance of boards to the boards behind them, for every place on the path. The bounds are
-//! computed before the show, so that a frame tests only the few pairs that can be the nearest.
+//! Lower bounds of the distance of boards to the boards behind them, for every place on the path. They are computed
+//! before the show, so that a frame tests only the few pairs that can be the nearest.
 //!
 //! If the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
 //! [`crate::solve::table::rows`]. So the distances of a body bench to those behind it depend on the alpha of its front
-//! handle alone. Every row of T is divided into [`CELLS`] equal cells. While one handle is in a cell, the next is in
-//! the same cell of the next row. Each (row, cell) has a list of the benches that can be near. The list has a proven
-//! lower bound of the signed distance to each bench (see [`super::moving`]), in ascending order. The last entry stands
-//! for all others. Far behind, where boards hardly move against each other while all advance by a link, one list is
-//! valid for all cells of a row.
+//! handle alone. Every row of T is divided into [`CELLS`] equal cells, and while one handle is in a cell, the next is
+//! in the same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven lower
+//! bound of the signed distance to each (see [`super::moving`]), in ascending order. The last entry stands for all
+//! others. Far behind, boards hardly move against each other while all advance by a link, so there one list is valid
+//! for all cells of a row.
 //!
-//! The rows are grouped into blocks. The least bound of each block is also kept cell by cell. So the least bounds of a
-//! whole chain are adjacent in memory. A frame reads only the blocks whose least bound is within its limit.
+//! The rows are grouped into blocks, and the least bound of each block is also kept, cell by cell, so that the least
+//! bounds of a whole chain are adjacent in memory. A frame reads only the blocks whose least bound is within its limit.
 //!
-//! The head's link differs. But while the second handle is in a cell, the head too is near a known quadratic polynomial
-//! of the cell's time. The head's list is valid while the head is within the assumed error, which every frame checks.
-//! Past a stall the head is elsewhere and has no list.
+//! The head's link differs from the others. But while the second handle is in a cell, the head too is near a known
+//! quadratic polynomial of the cell's time. The head's list is valid while the head is within the assumed error, which
+//! every frame checks. Past a stall the head is elsewhere and has no list.
 //!
-//! In: a path and a team. Out: lists for every frame. Only the clearance calls it.
+//! In: a path and a team. Out: lists for every frame.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
-//! Places of the handles and the head while the second handle is in a cell of the table. The places are quadratic
-//! polynomials of the cell's time with error bounds. Used only to make the table, except for [`CELLS`].
+//! The places of the handles and of the head while the second handle is in a cell of the table, as quadratic
+//! polynomials of the cell's time with error bounds. Except for [`CELLS`], they are used only while the table is made.
 
 use super::moving::Quadratic;
 use crate::model::Vector;

@@ -1,5 +1,4 @@
-//! The lists of the table: which boards can be near a board throughout a cell, and how near. Called by the making of
-//! the table; the search reads the entries.
+//! The lists of the table: which boards can be near a board throughout a cell, and how near.
 
 use super::cells::handles;
 use super::grid::Grid;

@@ -1,12 +1,12 @@
 //! The bench of a frame that is nearest to an obstacle.
 //!
-//! In: the chain of a frame and the clearance of its nearest two boards. Out: a board nearer to an obstacle, if there
-//! is one. The show calls it if a scene has obstacles and alerts.
+//! In: the chain of a frame and the clearance of its nearest two boards. Out: a board that is nearer to an obstacle, if
+//! there is one.
 //!
-//! Obstacles stand still. So the clearance of a body bench depends on the place of its front handle alone. A follower
-//! table gives this place as a row and a phase (see [`super::bounds`]). Each row is divided into [`CELLS`] equal cells.
-//! For each row and cell a table has a lower bound of the clearance of all obstacles. The bound is the clearance in the
-//! middle of the cell, less the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the
+//! Obstacles stand still, so the clearance of a body bench depends on the place of its front handle alone. A follower
+//! table gives this place as a row and a phase (see [`super::bounds`]). Each row is divided into [`CELLS`] equal cells,
+//! and for each row and cell a table has a lower bound of the clearance of all obstacles: the clearance in the middle
+//! of the cell, less the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the
 //! benches that the bounds do not exclude.
 
 use super::cells::handles;

@@ -1,5 +1,4 @@
-//! The search for the nearest pair of one chain: it tests the pairs that known bounds do not exclude. Only the
-//! clearance calls it.
+//! The search for the nearest pair of one chain: it tests the pairs that known bounds do not exclude.
 
 use std::ops::Range;
 

@@ -1,12 +1,12 @@
 //! First contact and least clearance of boards of two dragons of a show, by the steps of [`super`].
 //!
-//! **Why nothing is skipped.** The proof in [`super`] does not use that two boards belong to one chain. It needs the
-//! clearances at both ends of a step. It also needs bounds C of the paths of the boards' points on the stage. Here a
-//! step is an interval of time. Each head goes forward along its path, or stands. So C of each board follows from its
-//! own dragon, and B = C_a + C_b. Boards that stand have no path. Let two boards be on straight lines, and let neither
-//! begin or end to move within the step. Then they move relative to each other by the difference of their two vectors,
-//! along a straight line. B is the length of this difference. So two dragons that go side by side, or one behind the
-//! other, cost few steps.
+//! **Why nothing is skipped.** The proof in [`super`] does not use that two boards belong to one chain. It needs only
+//! the clearances at both ends of a step, and bounds C of the paths of the boards' points on the stage. Here a step is
+//! an interval of time, in which each head goes forward along its path, or stands. So C of each board follows from its
+//! own dragon, and B = C_a + C_b; a board that stands has no path. If two boards are on straight lines, and neither
+//! begins or ends to move within the step, they move relative to each other by the difference of their two vectors,
+//! along a straight line. Then B is the length of this difference, so that two dragons that go side by side, or one
+//! behind the other, need few steps.
 
 use crate::event::Budget;
 use crate::linkage::NoFollower;

@@ -1,5 +1,5 @@
 //! Bounds of the relative motion of two boards while the head goes from one place to another. The search rests on these
-//! bounds; the proof is in the header of [`super`].
+//! bounds, which are proved in the header of [`super`].
 
 use crate::event::Budget;
 use crate::linkage::follower;

@@ -3,7 +3,8 @@
 //!
 //! In: a [`SteppedSearch`], which knows the bodies and the bounds of their motion. The bodies are the boards of one
 //! chain (`search`), the boards of two dragons (`between`), or boards and obstacles (`ground`). Out: calls of
-//! [`SteppedSearch::record`]. No pair is at or below the limit anywhere else.
+//! [`SteppedSearch::record`] for every step that may contain something nearer; no pair is at or below the limit
+//! anywhere else.
 
 use crate::event::{Budget, Spent};
 use crate::linkage::NoFollower;

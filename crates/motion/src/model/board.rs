@@ -1,5 +1,4 @@
-//! The rectangle of a board. Separation, clearance and the drawings use this module, which is independent of team and
-//! path.
+//! The rectangle of a board, independent of team and path.
 
 use super::{Point, Vector};
 

@@ -1,5 +1,5 @@
-//! A path by its numbers in a scene: from them [`Path`] is built in doubles, and the reference builds its path with
-//! more digits.
+//! A path by its numbers in a scene. [`Path`] is built from them in doubles, and the reference builds its path from
+//! them with more digits.
 
 use super::curve::Side;
 use super::double_double::DoubleDouble;

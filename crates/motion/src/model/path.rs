@@ -1,8 +1,8 @@
 //! The path that the handles ride: segments one after the other without a gap or a corner, travelled by arc length. A
 //! spiral is a path of one segment.
 //!
-//! Scenes construct it; the linkage, the solvers and the events use it. The head starts at distance 0. A path reaches
-//! as far behind its start as any team needs, and ends at [`Path::length`].
+//! The head starts at distance 0. A path reaches as far behind its start as any team needs, and ends at
+//! [`Path::length`].
 
 use std::f64::consts::TAU;
 

@@ -1,12 +1,12 @@
 //! The distance of two boards. Every value is **positive apart, negative overlapping, zero touching**, in metres.
 //!
-//! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). Overlapping: minus
-//!   the least translation that parts the boards. Apart: at most the distance, and equal to it unless two corners are
-//!   nearest.
-//! - [`signed_distance_board_board`] (its points: [`closest_points_board_board`]): the Euclidean distance apart, the
-//!   separation overlapping.
+//! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). If the boards
+//!   overlap, this is minus the least translation that parts them. If they are apart, it is at most their distance, and
+//!   equal to it unless two corners are the nearest points.
+//! - [`signed_distance_board_board`] (its points: [`closest_points_board_board`]): the Euclidean distance if the boards
+//!   are apart, and the separation if they overlap.
 //!
-//! Positions are subtracted first. So the error is a few units in the last place of the boards' size and of their
+//! Positions are subtracted first, so the error is a few units in the last place of the boards' size and of their
 //! distance, plus the rounding of the centres. Swapping the boards gives the same bits.
 
 use super::board::Board;

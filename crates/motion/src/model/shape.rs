@@ -1,11 +1,11 @@
-//! Shapes that stand on the stage, and the signed distance of a board to each. The ground calls this module, which is
-//! independent of team, path and keep-out.
+//! Shapes that stand on the stage, and the signed distance of a board to each. They are independent of team, path and
+//! keep-out.
 //!
-//! The signed distance is positive apart, in metres: the Euclidean distance. It is negative where the board and the
-//! shape overlap: minus the least translation that frees the board (`escape`). The shape of a boundary is the plane
-//! outside its polygon.
+//! The signed distance is in metres. Where board and shape are apart, it is the Euclidean distance; where they overlap,
+//! it is minus the least translation that frees the board (`escape`). The shape of a boundary is the plane outside its
+//! polygon.
 //!
-//! Corners are first taken to the board's frame. So the error is a few units in the last place of the board's size, of
+//! Corners are first taken to the board's frame, so the error is a few units in the last place of the board's size, of
 //! the distance, and of the coordinates.
 
 mod escape;

@@ -1,35 +1,36 @@
 //! Proofs about a step of a link's front handle, from the configurations at its two ends.
 //!
 //! In: a link and two of its configurations. Out: that the follower map is continuous over the step, or that it jumps,
-//! and the number of turns of the rear handle. Only [`super`] calls it.
+//! and the number of turns of the rear handle.
 //!
 //! **Notation.** The front handle is at travel s in [s0, s1], h = s1 - s0, and u is a place behind it. P is the path, T
 //! its tangent, L the link, and D(s, u) = |P(s) - P(u)|. In the stretch concerned, the path's greatest curvature is k.
 //!
 //! **Continuous.** For fixed u, d2(D^2)/ds^2 = 2 (1 + (P(s) - P(u)) . P''(s)) lies within 2 (1 -+ k D). So over the
 //! step D^2 <= max(ends) + max(0, k D - 1) h^2 / 4 and D^2 >= min(ends) - (1 + k D) h^2 / 4.
-//! 1. With the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
+//! 1. By the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
 //!    step. D <= s - u proves this as far as s - u is less than L. From there the proof goes back in steps within which
-//!    D^2 cannot grow to L^2 ([`Link::nearer_throughout`]). So no nearer point comes to be at the link's distance.
-//! 2. With the second bound, a place `far` is further away than L throughout.
-//! 3. Between the two the distance grows backward: q(s, u) = T(u) . (P(s) - P(u)) > 0. This follows from its values at
-//!    the corners, |q_u| <= 1 + k D and |q_ss| <= k.
+//!    D^2 cannot grow to L^2 ([`Link::nearer_throughout`]), so no nearer point comes to be at the link's distance.
+//! 2. By the second bound, a place `far` is further away than L throughout.
+//! 3. Between the two the distance grows backward, that is, q(s, u) = T(u) . (P(s) - P(u)) > 0. This follows from its
+//!    values at the corners, because |q_u| <= 1 + k D and |q_ss| <= k.
 //!
-//! Hence there is one root between `far` and `near`. This root is the follower, and by 3 it moves continuously. Its
-//! cosine is at least min q / L.
+//! Hence there is exactly one root between `far` and `near`. This root is the follower, and because of 3 it moves
+//! continuously. Its cosine is at least min q / L.
 //!
-//! **Jump.** Let a place strictly between the two followers be nearer than L throughout, by the first bound. Then no
-//! follower passes this place, and the follower map has a discontinuity in the step.
+//! **Jump.** If a place strictly between the two followers is nearer than L throughout, by the first bound, then no
+//! follower passes this place, so the follower map has a discontinuity in the step.
 //!
-//! **Turns.** Let f be the front cosine, the rear cosine at least c, and m = max |f| over the step. The rear handle is
-//! at most m / c times as fast as the front handle. The link turns by at most (1 + m / c) / L per metre. So |f'| <= k +
-//! (1 + m / c) / L, and m is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h.
-//! Further, with signed curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L. Here |v| <= m / c, and t and
-//! t' are the parts of the two tangents across the link. Where f' keeps its sign, f has at most one zero.
+//! **Turns.** Let f be the front cosine, let the rear cosine be at least c, and let m = max |f| over the step. The rear
+//! handle is at most m / c times as fast as the front handle, so the link turns by at most (1 + m / c) / L per metre.
+//! Hence |f'| <= k + (1 + m / c) / L, and m is at most max(ends) + |f'| h / 2. So f has no zero where |f0| + |f1| > max
+//! |f'| h. Further, with signed curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, where |v| <= m / c,
+//! and t and t' are the parts of the two tangents across the link. Where f' keeps its sign, f has at most one zero.
 //!
 //! All these bounds tighten in proportion to the step. The quantities that they must not exceed are f, c, and the
-//! difference of a nearer point's distance to L. These quantities fall in proportion to the distance from a singular
-//! configuration, even where all of them vanish at once. So the steps shrink in geometric progression towards it.
+//! difference of a nearer point's distance to L, and these fall only in proportion to the distance from a singular
+//! configuration, even where all of them vanish at once. Therefore the steps shrink in geometric progression towards
+//! it.
 
 use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::curve::Curve;

@@ -2,13 +2,14 @@
 //! lock.
 //!
 //! In: a link and the start of its front handle. Out: turns and end, in metres of travel of the front handle. The
-//! search advances it step by step. An uncertain step is halved, the earlier half first, down to the resolution.
+//! search advances the link step by step. An uncertain step is halved, the earlier half first, down to the resolution.
 //!
-//! **At the resolution.** An unresolved stretch begins where a step of a few units in the last place is uncertain. Each
-//! further step in it may be as long as the stretch is already. Near a degenerate configuration, the effect of rounding
-//! grows in proportion to the distance from it. Over the whole stretch a jump is searched, and the signs of the front
-//! cosine at its ends are compared. A lock is a proven jump, found to the last digit; everything else is a graze. Jumps
-//! of less than about 1e-8 links and pairs of turns within one such stretch are below the resolution of doubles.
+//! **At the resolution.** An unresolved stretch begins where a step of a few units in the last place is uncertain. Near
+//! a degenerate configuration the effect of rounding grows in proportion to the distance from it, so each further step
+//! in the stretch may be as long as the stretch is already. Over the whole stretch a jump is searched, and the signs of
+//! the front cosine at its ends are compared. A lock is a proven jump, found to the last digit; everything else is a
+//! graze. Jumps of less than about 1e-8 links, and pairs of turns within one such stretch, are below the resolution of
+//! doubles.
 
 use std::f64::consts::FRAC_PI_2;
 

@@ -1,9 +1,9 @@
-//! The chain to more than 30 digits, by an independent method: the solvers are measured against it.
+//! The chain to more than 30 digits, by an independent method, against which the solvers are measured.
 //!
 //! In: a path by the numbers of the scene, a team and a time. Out: every handle as sums of two doubles. Points are
-//! Cartesian, and the condition on a follower is the plain distance of two points; no formula is rearranged to save
-//! digits. The method shares only names with the path, the linkage and the solvers in doubles. The method takes some
-//! milliseconds per frame. `trade` and tests call it; a scene computes with it the turns of a spiral whose length is
+//! Cartesian, and the condition on a follower is the plain distance of two points, because no formula is rearranged to
+//! save digits. The method shares only names with the path, the linkage and the solvers in doubles, and takes some
+//! milliseconds a frame. `trade` and tests use it, and so does a scene, for the turns of a spiral whose length is
 //! given.
 
 mod curve;

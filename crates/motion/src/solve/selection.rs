@@ -1,13 +1,13 @@
-//! Selects the table for a requested accuracy. Among the tables measured to meet the accuracy on this path with this
-//! team, the selected table reads the fewest bytes per handle.
+//! The selection of the table for a requested accuracy. Among the tables measured to meet the accuracy on this path
+//! with this team, the selected table reads the fewest bytes per handle.
 //!
 //! In: the motion and the requested accuracy. Out: a table with its measured error. The same request gives the same
-//! table in every run: cost is counted in bytes, never timed. [`crate`] and `trade` call this module.
+//! table in every run, because cost is counted in bytes, never timed.
 //!
 //! Every candidate starts from one table of T whose polynomials have an error of a sixteenth of the requested accuracy.
-//! The loss of a format is bounded over all phases while the format is made. Then frames are compared with the safe
-//! solver's at test points over the whole path: positions, and velocities where they are computed. Test points include
-//! junctions, kinks and the last metres of the table. Half the requested accuracy is left for the error between them.
+//! While a format is made, its loss is bounded over all phases. Then frames are compared with the safe solver's at test
+//! points over the whole path, which include junctions, kinks and the last metres of the table: positions, and
+//! velocities where they are computed. Half the requested accuracy is left for the error between the test points.
 
 use std::time::{Duration, Instant};
 

@@ -1,6 +1,6 @@
 //! The least translation that frees a board from a shape with which it overlaps.
 //!
-//! In the board's frame the board is the rectangle of half sides (h, w) about the origin. Moved by t the board meets a
+//! In the board's frame the board is the rectangle of half sides (h, w) about the origin. Moved by t, the board meets a
 //! side of the shape if and only if t is in the side's Minkowski sum with the rectangle. This sum is a hexagon: the set
 //! |x - m_x| <= h + |e_x| / 2, |y - m_y| <= w + |e_y| / 2, |n . (t - m)| <= h |n_x| + w |n_y|. Here the side has the
 //! middle m, the vector e and the unit normal n. Moved by t the board meets no side but lies within the shape if and

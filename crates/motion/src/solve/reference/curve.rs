@@ -1,6 +1,6 @@
 //! The curves of the reference, with 38 digits in plain Cartesian coordinates, and in doubles for its first guess.
 //!
-//! In: a [`RouteStep`] with the end of the path before it. Out: its curve. Only the reference calls it.
+//! In: a [`RouteStep`] with the end of the path before it. Out: its curve.
 
 use super::Piece;
 use super::real::{Functions, Real, RealVector};

@@ -1,7 +1,6 @@
 //! The path of a description with 38 digits: curves in plain Cartesian coordinates, one after the other.
 //!
-//! In: a [`PathDescription`]. Out: a path that gives places by metres of travel and by a curve's own coordinate. Only
-//! the reference calls it.
+//! In: a [`PathDescription`]. Out: a path that gives places by metres of travel and by a curve's own coordinate.
 
 use super::curve::{Curve, RealParam, RealPiece, origin, spiral_length};
 use super::real::{Functions, Real, RealVector};

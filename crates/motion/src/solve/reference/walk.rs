@@ -3,7 +3,7 @@
 //! The straight-line distance from the handle grows by at most a metre per metre of path. So from a place whose
 //! distance is m metres short of the link, a step of m metres back cannot pass the place sought. This method is sphere
 //! tracing (Hart, The Visual Computer 12, 1996, for rays). The points are displacements from places that the reference
-//! knows exactly, so that they keep their digits far from the origin. Only the reference calls it.
+//! knows exactly, so that they keep their digits far from the origin.
 
 use super::curve::{RealParam, RoughPlace};
 use super::path::Segment;

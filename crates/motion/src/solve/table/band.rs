@@ -2,8 +2,7 @@
 //!
 //! A [`NodeChain`] holds the places of one phase in all rows of a band, each found from the place behind it. Five node
 //! chains make a piece: their slopes give its polynomials, and their places prove the polynomials. If the proof fails,
-//! the piece is halved. The next band starts from the frontmost row of the band before. Only
-//! [`super::FollowerTable::new`] calls it.
+//! the piece is halved. The next band starts from the frontmost row of the band before.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! Places of the head and the handle behind it, by the metres that the head has travelled.
 //!
-//! The head's link differs from the others, so its map is not the table's. Both places are tabulated over the head's
-//! travel instead. Only the follower table makes and reads it.
+//! The head's link differs from the others, so its map is not the table's, and both places are tabulated over the
+//! head's travel instead.
 
 use super::polynomial::SlopeFit;
 use super::rows::{Alpha, Rows};

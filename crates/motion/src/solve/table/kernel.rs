@@ -1,7 +1,6 @@
 //! A frame from the table: every handle behind the head independently, eight at a time.
 //!
-//! Called by the follower table, and for other formats by [`super::single_kernel`]. The loops over [`LANES`] have a
-//! fixed length, so that the compiler vectorises them.
+//! The loops over [`LANES`] have a fixed length, so that the compiler vectorises them.
 
 use std::f64::consts::{PI, TAU};
 

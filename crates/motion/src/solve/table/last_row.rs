@@ -1,6 +1,6 @@
 //! The last row behind a band of the table, from which the band's node chains start.
 //!
-//! In: that row's pieces. Out: a node at any phase. Used only to make the table.
+//! In: that row's pieces. Out: a node at any phase.
 
 use super::polynomial::{from_slopes, horner};
 use super::rows::Piece;

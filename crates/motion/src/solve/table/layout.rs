@@ -1,7 +1,5 @@
 //! Layout of the table before it is made: its reach forward, its bands of rows, and the phases at which the path's
 //! junctions cut it.
-//!
-//! Called by [`super::band`] only.
 
 use super::beginning::Beginning;
 use super::rows::Piece;

@@ -3,8 +3,8 @@
 //! In: the rows of T and the allowed loss. Out: the same bands with other pieces, and a proven bound of the loss over
 //! all phases and all rows that a frame can read. Only frames read it; the clearance reads the rows.
 //!
-//! Every polynomial of a piece is rewritten exactly for a part of it and shortened by Chebyshev polynomials, which
-//! bounds the change. The rounding of single precision is added. If the sum is too large, the part is halved.
+//! Every polynomial of a piece is rewritten exactly for a part of it, and then shortened by Chebyshev polynomials,
+//! which bounds the change. The rounding of single precision is added. If the sum is too large, the part is halved.
 
 use super::polynomial::{economise, on_part};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, piece_at, piece_of_share};

@@ -1,4 +1,4 @@
-//! Polynomials on -1..1 with given slopes, and how to shorten them. Used only to make the table.
+//! Polynomials on -1..1 with given slopes, and how to shorten them.
 
 use nalgebra::SMatrix;
 

@@ -1,8 +1,8 @@
-//! Places along a path relative to each other, to the last digit at any distance from the origin. And the step from a
+//! Places along a path relative to each other, to the last digit at any distance from the origin, and the step from a
 //! handle to the handle ahead.
 //!
-//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Used only to make the
-//! table, not by frames.
+//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Frames do not use it, only
+//! the making of the table.
 
 use crate::linkage;
 use crate::model::Vector;
