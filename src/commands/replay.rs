@@ -21,7 +21,8 @@ use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::{CommandError, Common, number, stop_on_signals};
 
-/// Nanoseconds that waiting subscribers have before the first frame: unlike a show's, it is not sent again.
+/// The time, in nanoseconds, that waiting subscribers have before the first frame, which, unlike a show's, is not sent
+/// again.
 const LEAD_NS: u64 = 500_000_000;
 /// The most cues for which memory is reserved, whatever a damaged stage states.
 const MOST_CUES: usize = 1000;

@@ -26,7 +26,7 @@ use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_gap};
 
-/// Nanoseconds that waiting subscribers have before the first frame: each tries to connect every 20 ms.
+/// The time, in nanoseconds, that waiting subscribers have before the first frame: each tries to connect every 20 ms.
 const LEAD_NS: u64 = 100_000_000;
 
 /// Arguments of `run`.

@@ -114,9 +114,9 @@ struct PairSearch<'a, 'w> {
     upper: Option<UpperBetween>,
     /// The least of the metres that the stretches have shown boards to be apart.
     shown: Option<f64>,
-    /// Seconds up to which stretches have come.
+    /// The time up to which stretches have come, in seconds.
     time: f64,
-    /// Seconds of the next step to try.
+    /// The length of the next step to try, in seconds.
     step: f64,
     steps: u64,
     most_steps: u64,

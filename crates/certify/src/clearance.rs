@@ -30,7 +30,7 @@ pub(super) use certificate::first_line as clearance_first_line;
 /// Width of the enclosure in metres, with room for the rounding of both ends.
 const WIDTH: f64 = 0.9e-9;
 
-/// Metres by which a new upper bound must be lower than the one before.
+/// The difference, in metres, by which a new upper bound must be lower than the one before.
 const LOWER: f64 = 1e-3 * WIDTH;
 
 /// Factors of the step length after a step that is shown, after one that is not, and after further ones that are not.
@@ -226,9 +226,9 @@ pub(super) struct Descent<'a, 'w> {
 pub(super) struct Part {
     /// The dragon; empty in a show of one.
     pub dragons: Vec<usize>,
-    /// Seconds of the show during which it stands at its start.
+    /// The time of the show, in seconds, during which it stands at its start.
     pub delay: f64,
-    /// Seconds at which the show ends, if that is not by itself.
+    /// The time at which the show ends, in seconds, if the dragon does not end it itself.
     pub show_end: Option<f64>,
 }
 

@@ -34,7 +34,7 @@ pub(super) struct FirstOrderHandle {
 /// The motion of the head over a step. For two dragons, tau is a time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
-    /// Metres of the head per unit of tau.
+    /// The travel of the head per unit of tau, in metres.
     pub rate: Interval,
     /// Upper bound of the metres of path from the head's place to the head in the middle of the step.
     pub offset: f64,

@@ -13,13 +13,13 @@ use bench_dragon_motion::model::{self, Point};
 /// Rounding of a corner in the path's own coordinates, as a share of the coordinates.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Metres of an overlap with an outline that is no more than a touch.
+/// The depth, in metres, up to which an overlap with an outline is no more than a touch.
 const DEEPEST: f64 = 1e-10;
 
 /// An obstacle in the path's own coordinates.
 pub(super) struct Barrier {
     obstacle: Obstacle,
-    /// Metres by which the rounding of the corners may move them.
+    /// The distance, in metres, by which the rounding of the corners may move them.
     rounding: f64,
 }
 

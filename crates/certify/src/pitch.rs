@@ -124,7 +124,7 @@ const MOST_TURNS: f64 = 1e7;
 /// The proof that a team reaches a radius with one pitch.
 #[derive(Debug, Clone)]
 pub(crate) struct Reached {
-    /// Metres from the centre from which on Lemma 8 holds.
+    /// The distance from the centre, in metres, from which on Lemma 8 holds.
     pub far: f64,
     /// The steps from there to the radius.
     pub steps: Vec<Step>,

@@ -176,7 +176,7 @@ pub(super) struct Listed<'c, 'a> {
     /// Multiples of the pad to try, and the number of multiples that were too small for the last handle.
     multiples: &'static [f64],
     too_small: usize,
-    /// Metres added to every pad, for a path that is an interval of paths.
+    /// The length added to every pad, in metres, for a path that is an interval of paths.
     slack: f64,
     /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,

@@ -222,9 +222,9 @@ impl Fold<'_> {
 pub(crate) struct Passage {
     /// The path.
     pub path: Path,
-    /// Metres of path before the turn. Lemma 8 holds further out.
+    /// The length of path before the turn, in metres. Lemma 8 holds further out.
     pub lead_in: f64,
-    /// Metres of path after it.
+    /// The length of path after it, in metres.
     pub lead_out: f64,
     description: PathDescription,
 }

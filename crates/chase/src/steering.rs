@@ -14,14 +14,14 @@ use crate::filter::seconds_between;
 const RATE_INTERVAL_NS: u64 = 100_000_000;
 /// A change of the rate that is too small to be sent, as a part of the rate.
 const LEAST_CHANGE: f64 = 2e-5;
-/// Seconds in which a small error is taken up, and an error above [`SMALL`].
+/// The times in which a small error and an error above [`SMALL`] are corrected, in seconds.
 const TAKE_UP: f64 = 1.0;
 const TAKE_UP_FAST: f64 = 0.25;
 /// Errors that follow from jitter, seconds.
 const SMALL: f64 = 0.005;
 /// The distance from its place at which a paused show is moved there, seconds.
 const PLACE: f64 = 0.02;
-/// Seconds from a command to its effect, before the first answer.
+/// The time from a command to its effect, in seconds, before the first answer.
 const LATENCY: f64 = 0.012;
 /// The time after which an unanswered command is given up, nanoseconds.
 const PATIENCE_NS: u64 = 2_000_000_000;
@@ -78,7 +78,7 @@ pub struct Steering {
     show: Option<Show>,
     /// Simulated seconds at the end of the show.
     end: f64,
-    /// Seconds from a command to its effect.
+    /// The time from a command to its effect, in seconds.
     latency: f64,
     waiting: Option<Waiting>,
     rate_sent_ns: u64,

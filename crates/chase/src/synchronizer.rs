@@ -32,7 +32,7 @@ pub struct Reading {
     pub position: f64,
     /// Arrival, CLOCK_MONOTONIC in nanoseconds.
     pub at_ns: u64,
-    /// Seconds after which positions begin again at 0.
+    /// The time, in seconds, after which positions begin again at 0.
     pub day: f64,
 }
 
@@ -47,14 +47,14 @@ pub enum Motion {
     Locked {
         /// Position, seconds.
         position: f64,
-        /// Seconds per second.
+        /// The rate, in seconds per second.
         rate: f64,
     },
     /// Readings have stopped; the position continues.
     Freewheeling {
         /// Position, seconds.
         position: f64,
-        /// Seconds per second.
+        /// The rate, in seconds per second.
         rate: f64,
     },
     /// The source stands at a position, seconds.

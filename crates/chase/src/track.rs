@@ -30,9 +30,9 @@ const SEEK_ABOVE: f64 = 2.0;
 /// A place on the path next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
-    /// Metres of path from the start.
+    /// The length of path from the start, in metres.
     pub travelled: f64,
-    /// Metres from the point to the path.
+    /// The distance from the point to the path, in metres.
     pub distance: f64,
 }
 

@@ -20,7 +20,7 @@ use bench_dragon_motion::solve::Chain;
 /// The radius of a bench's pool of light, and of a lantern's halo, metres.
 const POOL: f64 = 3.2;
 const HALO: f64 = 0.62;
-/// Metres of light around the boards of a picture.
+/// The width of the light around the boards of a picture, in metres.
 pub const MARGIN: f64 = 2.0;
 /// The lanterns of a board, as shares of half its length: the second of each is gold.
 const ON_BODY: [f64; 3] = [-0.41, 0.0, 0.41];

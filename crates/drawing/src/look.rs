@@ -29,7 +29,7 @@ impl Theme {
 /// A place in the audience.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seat {
-    /// Turns around the stage from its south.
+    /// The place of the seat, in turns around the stage from its south.
     pub turns: f64,
     /// The distance from the dragon's middle, metres; by default it follows from the dragon's reach.
     pub distance: Option<f64>,

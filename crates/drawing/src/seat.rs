@@ -41,7 +41,7 @@ pub struct Spot {
     pub y: f64,
     /// Sheet units a metre.
     pub scale: f64,
-    /// Metres along the line of sight.
+    /// The distance along the line of sight, in metres.
     pub depth: f64,
 }
 

@@ -22,7 +22,8 @@ pub const TOLERANCE: f64 = 1e-3;
 /// much.
 const STRAIGHT: f64 = 0.1 * TOLERANCE;
 
-/// Metres of the grid to which corners are rounded: on a grid, the union has no corner but the corners of its rings.
+/// The step of the grid to which corners are rounded, in metres. On a grid, the union has no corner but the corners of
+/// its rings.
 const GRID: f64 = 1e-6;
 
 /// Polygons that are united first: few, since the positions of a board overlap many others and every edge crosses
@@ -37,7 +38,8 @@ pub type Ring = Vec<[f64; 2]>;
 pub struct SweptStretch<'a> {
     /// The motion.
     pub motion: &'a Motion,
-    /// Metres that its head has travelled at the beginning and at the end; equal for a dragon that stands.
+    /// The distances that its head has travelled at the beginning and at the end, in metres; equal for a dragon that
+    /// stands.
     pub travelled: (f64, f64),
     /// The benches, counted from 0.
     pub benches: Range<usize>,

@@ -32,7 +32,7 @@ use search::{CarriedBounds, ClearanceSearch};
 /// The nearest two boards that share no handle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairClearance {
-    /// Metres between them; negative where they overlap.
+    /// The distance between them, in metres; negative where they overlap.
     pub value: f64,
     /// The lower bench, counted from 0.
     pub bench_a: usize,
@@ -115,7 +115,7 @@ pub struct ClearanceMonitor {
     last_pair: Option<(usize, usize)>,
     table: Option<Box<BoundTable>>,
     carried: CarriedBounds,
-    /// Metres that a link of a frame may be off its length.
+    /// The length, in metres, by which a link of a frame may be off.
     link_error: f64,
     counters: ClearanceCounters,
 }

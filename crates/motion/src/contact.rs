@@ -75,16 +75,16 @@ pub use ground::{ObstacleClearance, Touch};
 pub struct Found<T> {
     /// The result.
     pub value: Option<T>,
-    /// Metres of travel of the head up to which that is proved: the whole request, unless the budget was spent.
+    /// The travel of the head up to which that is proved, in metres: the whole request, unless the budget was spent.
     pub searched_until: f64,
 }
 
 /// The least clearance of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastClearance {
-    /// Metres between the two boards; negative where they overlap.
+    /// The distance between the two boards, in metres; negative where they overlap.
     pub value: f64,
-    /// Metres that the head has travelled.
+    /// The distance that the head has travelled, in metres.
     pub travelled: f64,
     /// The lower bench, counted from 0.
     pub bench_a: u32,

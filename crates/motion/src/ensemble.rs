@@ -27,7 +27,7 @@ use crate::{CONTACT_BUDGET, Choice, Motion};
 pub struct Dragon {
     /// Its name, unique in the show.
     pub name: String,
-    /// Seconds of the show during which it stands at its start.
+    /// The time of the show, in seconds, during which it stands at its start.
     pub delay: f64,
     /// Its motion, in its own time.
     pub motion: Motion,

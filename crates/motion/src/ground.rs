@@ -18,7 +18,7 @@ pub struct Obstacle {
     pub name: String,
     /// The shape.
     pub shape: Shape,
-    /// Metres that every board has to stay away.
+    /// The distance that every board has to keep, in metres.
     pub keep_out: f64,
 }
 

@@ -47,11 +47,11 @@ pub struct Singularities {
     pub stall: Option<Event>,
     /// The lock, or the path's end if no link locks. `None` if the search ended before either.
     pub end: Option<Event>,
-    /// Metres of travel of the head up to which the search is complete: those of `end`, if there is one.
+    /// The travel of the head up to which the search is complete, in metres: that of `end`, if there is one.
     pub searched_until: f64,
-    /// Metres of travel of the head at which the first link's rear handle turns round, in order.
+    /// The places of the head, in metres of travel, at which the first link's rear handle turns round, in order.
     pub head_turns: Vec<f64>,
-    /// Metres of travel of a body link's front handle at which its rear handle turns round, in order.
+    /// The places of a body link's front handle, in metres of travel, at which its rear handle turns round, in order.
     pub body_turns: Vec<f64>,
 }
 

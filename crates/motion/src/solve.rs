@@ -18,11 +18,11 @@ use crate::linkage::NoFollower;
 /// All arrays have one length, the number of handles. Without velocities, `speed`, `vx` and `vy` hold NaN.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chain {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: Vec<f64>,
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: Vec<f64>,
-    /// Radians in (-pi, pi], the direction of the bench this handle leads; the last handle takes the last bench's.
+    /// The direction of the bench this handle leads, in radians in (-pi, pi]; the last handle has the last bench's.
     pub heading: Vec<f64>,
     /// Signed speed along the path, metres per second, positive in the direction of travel.
     pub speed: Vec<f64>,
@@ -62,17 +62,17 @@ impl Chain {
 /// The handles of a chain, or some of a longer chain's, to write to. The arrays are those of [`Chain`].
 #[derive(Debug)]
 pub struct ChainMut<'a> {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: &'a mut [f64],
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: &'a mut [f64],
-    /// Radians in (-pi, pi].
+    /// The heading, in radians in (-pi, pi].
     pub heading: &'a mut [f64],
-    /// Metres per second along the path.
+    /// The speed along the path, in metres per second.
     pub speed: &'a mut [f64],
-    /// Metres per second along x.
+    /// The velocity along x, in metres per second.
     pub vx: &'a mut [f64],
-    /// Metres per second along y.
+    /// The velocity along y, in metres per second.
     pub vy: &'a mut [f64],
 }
 
@@ -111,9 +111,9 @@ impl ChainMut<'_> {
 /// The positions of the handles of a chain, metres.
 #[derive(Debug, Clone, Copy)]
 pub struct Positions<'a> {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: &'a [f64],
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: &'a [f64],
 }
 

@@ -82,7 +82,7 @@ pub fn sweep(
 
 /// A board in its position.
 struct Position {
-    /// Metres of the path to its front handle.
+    /// The length of path to its front handle, in metres.
     front: f64,
     corners: [Point; 4],
 }
@@ -91,7 +91,7 @@ struct Position {
 struct Boards<'a> {
     motion: &'a Motion,
     benches: Range<usize>,
-    /// Metres of the path to each front handle at the beginning.
+    /// The length of path to each front handle at the beginning, in metres.
     begun: Vec<f64>,
     /// True if handles may go backward.
     turn_back: bool,

@@ -49,10 +49,10 @@ pub(super) enum PathEnd {
 /// The whole path.
 pub(super) struct Path {
     segments: Vec<Segment>,
-    /// Metres from the start to each segment's start; for the first segment, to its end.
+    /// The travel from the start to each segment's start, in metres; for the first segment, to its end.
     travelled: Vec<Interval>,
     path_end: PathEnd,
-    /// Metres from the start to the path's end.
+    /// The travel from the start to the path's end, in metres.
     pub length: Interval,
 }
 

@@ -18,7 +18,7 @@ const THREE_QUARTERS: f64 = 4.712_388_980_384_7;
 
 /// The consequences of the lines so far.
 pub(super) struct Pitch {
-    /// Metres from the centre that the head is to reach.
+    /// The radius that the head is to reach, in metres from the centre.
     radius: f64,
     /// The least pitch of the first interval, and the greatest of the last: with every pitch between, the head does not
     /// reach the radius.
@@ -34,7 +34,7 @@ pub(super) struct Pitch {
 /// A pitch with which Lemma 8 holds far out, and the steps from there.
 struct Free {
     pitch: f64,
-    /// Metres from the centre from which on Lemma 8 holds.
+    /// The distance from the centre, in metres, from which on Lemma 8 holds.
     far: f64,
     scene: Scene,
     steps: Steps,

@@ -54,8 +54,8 @@ pub(super) enum Claim<'c> {
 /// The section of two dragons.
 pub(super) struct Pair {
     pub dragons: [usize; 2],
-    /// Seconds up to which stretches follow one another from the start. The first flag is true if all stretches were
-    /// clear, the second if all have a number `apart`.
+    /// The time, in seconds, up to which stretches follow one another from the start. The first flag is true if all
+    /// stretches were clear, the second if all have a number `apart`.
     end: Option<f64>,
     all_clear: bool,
     all_apart: bool,

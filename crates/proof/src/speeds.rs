@@ -90,7 +90,7 @@ struct Link<'a> {
     /// r and r' with the front handle at its place, r' only where neither span has a junction.
     at_place: Interval,
     rate_at_place: Interval,
-    /// Metres of the front handle from its place at tau = 0.
+    /// The travel of the front handle from its place at tau = 0, in metres.
     offset: Interval,
 }
 

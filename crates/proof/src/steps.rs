@@ -42,7 +42,7 @@ pub(super) struct Steps {
     pub all_moving: bool,
     pub all_clear: bool,
     pub all_apart: bool,
-    /// Metres by which boards were apart in all steps up to `apart_end`.
+    /// The distance that boards kept at least in all steps up to `apart_end`, in metres.
     pub apart: f64,
     /// By obstacle: the end of the last step that stays clear of it, and true if all steps did.
     free: Vec<(Option<Place>, bool)>,

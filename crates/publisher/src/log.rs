@@ -32,7 +32,7 @@ use hash::{HANDLE_WORDS, HEADER_WORDS, columns, header_words};
 use lines::ShowLine;
 use writer::LogWriter;
 
-/// Seconds of frames that the thread may fall behind before frames are lost.
+/// The time, in seconds of frames, by which the thread may fall behind before frames are lost.
 const QUEUED_SECONDS: f64 = 5.0;
 /// Frames that the queue holds at least.
 const LEAST_FRAMES: usize = 4;

@@ -20,7 +20,7 @@ use crate::live::{
 };
 use crate::transports::{self, Transport, TransportConfig, TransportError};
 
-/// Nanoseconds between two calls of [`Publisher::maintain`] before the first frame.
+/// The time between two calls of [`Publisher::maintain`] before the first frame, in nanoseconds.
 const LEAD_INTERVAL_NS: u64 = 10_000_000;
 
 /// The longest wait for [`Publishing::awaited`].
@@ -65,13 +65,13 @@ pub struct Publishing<'a> {
     pub scheduling: Scheduling,
     /// The run's number.
     pub run_id: u64,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
-    /// Seconds of wall time after which the loop ends.
+    /// The wall time after which the loop ends, in seconds.
     pub duration: Option<f64>,
     /// The scene's name in the status.
     pub scene: &'a str,
-    /// Nanoseconds that waiting subscribers have to connect before the first frame.
+    /// The time that waiting subscribers have to connect before the first frame, in nanoseconds.
     pub lead_ns: u64,
     /// A flag that is set when the process of ROS 2 is connected. The first frame waits for the flag, 5 s at most.
     pub awaited: Option<&'a AtomicBool>,

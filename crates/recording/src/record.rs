@@ -21,7 +21,8 @@ use bench_dragon_messages::{
 const MAINTAIN_INTERVAL: Duration = Duration::from_millis(50);
 /// The interval at which the feed's end polls for room.
 const ROOM_INTERVAL: Duration = Duration::from_millis(1);
-/// Seconds after which a disk that accepts nothing is given up at the end. A slow disk needs seconds for its buffers.
+/// The time, in seconds, after which a disk that accepts nothing is given up at the end. A slow disk needs seconds for
+/// its buffers.
 const STUCK_SECONDS: u64 = 30;
 /// The interval at which the end of a recording polls the thread.
 const FINISH_INTERVAL: Duration = Duration::from_millis(10);

@@ -29,7 +29,7 @@ use bench_dragon_show::Outcome;
 use bench_dragon_show::convert::Stamps;
 use pass::{Pass, Recorded, Start};
 
-/// Seconds of frames that are read ahead.
+/// The time, in seconds of frames, that is read ahead.
 const QUEUED_SECONDS: f64 = 2.0;
 /// The least number of frames in that queue.
 const QUEUED_FRAMES: usize = 4;

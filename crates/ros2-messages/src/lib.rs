@@ -23,9 +23,9 @@ pub const FRAME_ID: &str = "stage";
 /// builtin_interfaces/Time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Time {
-    /// Seconds since 1970, or simulated seconds.
+    /// The whole seconds since 1970, or the simulated seconds.
     pub sec: i32,
-    /// Nanoseconds of that second.
+    /// The nanoseconds of that second.
     pub nanosec: u32,
 }
 
@@ -164,11 +164,11 @@ impl HasStamp for HandlePoses {
 /// geometry_msgs/Point and Vector3.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Xyz {
-    /// Metres.
+    /// The x coordinate, in metres.
     pub x: f64,
-    /// Metres.
+    /// The y coordinate, in metres.
     pub y: f64,
-    /// Metres.
+    /// The z coordinate, in metres.
     pub z: f64,
 }
 

@@ -14,9 +14,9 @@ use bench_dragon_motion::model::board::Board;
 /// builtin_interfaces/Duration.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Duration {
-    /// Seconds.
+    /// The whole seconds.
     pub sec: i32,
-    /// Nanoseconds.
+    /// The nanoseconds of that second.
     pub nanosec: u32,
 }
 
@@ -85,7 +85,7 @@ pub struct Marker {
     pub action: i32,
     /// The pose.
     pub pose: Pose,
-    /// Metres along, across and up.
+    /// The lengths along, across and up, in metres.
     pub scale: Xyz,
     /// The colour.
     pub color: Color,

@@ -179,7 +179,7 @@ impl DiagnosticLimits {
 /// The ROS 2 settings of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ros2Settings {
-    /// Frames per second on ROS 2; by default the smaller of 60 and the loop's rate.
+    /// The rate on ROS 2, in frames per second; by default the smaller of 60 and the loop's rate.
     pub rate: Option<f64>,
     /// The topics and the quality of service of each.
     pub topics: BTreeMap<Topic, Qos>,

@@ -11,13 +11,13 @@ pub struct Playback {
     pub start: f64,
     /// Simulated seconds per second of wall time.
     pub time_scale: f64,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
     /// The reaction to a contact.
     pub on_contact: OnContact,
     /// The behaviour at the end of the show.
     pub at_end: AtEnd,
-    /// Seconds of wall time for which a looping show stands at its end.
+    /// The wall time for which a looping show stands at its end, in seconds.
     pub end_hold: f64,
     /// True if the show waits at its start for [`Command::Go`](bench_dragon_messages::control::Command::Go).
     pub paused: bool,

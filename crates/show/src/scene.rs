@@ -90,7 +90,7 @@ pub enum AtEnd {
 pub struct AlertRules {
     /// Simulated seconds before an event.
     pub approach_time: f64,
-    /// Metres between two boards.
+    /// The distance between two boards, in metres.
     pub approach_clearance: f64,
 }
 
@@ -126,13 +126,13 @@ pub struct Scene {
     pub on_contact: OnContact,
     /// The behaviour at the end of the show.
     pub at_end: AtEnd,
-    /// Seconds of wall time for which a looping show stands at its end.
+    /// The wall time for which a looping show stands at its end, in seconds.
     pub end_hold: f64,
     /// The cues, in the order of the file.
     pub cues: Vec<Cue>,
     /// The limits for warnings; `None` for a scene without alerts.
     pub alerts: Option<AlertRules>,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
     /// The velocities: computed or not.
     pub velocities: Velocities,

@@ -19,7 +19,7 @@ use bench_dragon_publisher::live::statistics::{Durations, Sample};
 
 /// The header of every interval log.
 const LEGEND: &str = "\"StartTimestamp\",\"Interval_Length\",\"Interval_Max\",\"Interval_Compressed_Histogram\"\n";
-/// Seconds of an interval: short enough to find a bad minute, long enough for a small log of a night.
+/// The length of an interval, in seconds: short enough to find a bad minute, long enough for a small log of a night.
 const INTERVAL_S: f64 = 10.0;
 
 /// The log of a run's distributions.

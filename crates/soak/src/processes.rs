@@ -38,7 +38,7 @@ pub struct Plan {
 pub struct ConductPlan {
     /// The seed of the commands.
     pub seed: u64,
-    /// Frames per second, if not the scene's.
+    /// The rate, in frames per second, if not the scene's.
     pub rate: Option<f64>,
     /// Further clients of the control service, each killed during a request and started again.
     pub flaky_clients: usize,

@@ -107,7 +107,7 @@ pub struct DisplayMeasurement {
     pub delay_s: f64,
     /// The greatest distance of a displayed handle from its true position at the simulated time of the display, metres.
     pub max_position_error: f64,
-    /// Bytes of headers and poses per second, without the overhead of a transport.
+    /// The bytes of headers and poses per second, without the overhead of a transport.
     pub bytes_per_second: f64,
     /// The precision of the poses.
     pub precision: Precision,

@@ -43,16 +43,16 @@ pub struct Measurement {
     /// True if the requested accuracy is met, except where the motion itself amplifies rounding: see
     /// [`Measurement::noise`].
     pub meets: Option<bool>,
-    /// Nanoseconds per frame: the median over the motion, without the time of reading the clock.
+    /// The time of a frame, in nanoseconds: the median over the motion, without the time of reading the clock.
     pub frame_ns: f64,
-    /// Nanoseconds per frame: the 99th percentile.
+    /// The time of a frame, in nanoseconds: the 99th percentile.
     pub frame_ns_p99: f64,
     /// Number of timed frames, in runs evenly over the motion.
     pub frames_timed: usize,
     /// The greatest distance of a handle from its true position, metres.
     pub max_position_error: f64,
-    /// Metres below which errors are rounding: the greatest 8 eps (r + distance travelled) max(1, ratio of the handle's
-    /// speed to the head's) at any sample. The same for all solvers.
+    /// The error, in metres, below which errors are rounding: the greatest 8 eps (r + distance travelled) max(1, ratio
+    /// of the handle's speed to the head's) at any sample. It is the same for all solvers.
     pub noise: f64,
     /// The greatest relative error of a handle's speed; `None` without velocities.
     pub max_speed_error: Option<f64>,
@@ -78,7 +78,7 @@ pub struct Measurement {
 pub struct CollisionMeasurement {
     /// The method.
     pub method: String,
-    /// Nanoseconds per frame for the least clearance; `None` for a search.
+    /// The time of a frame for the least clearance, in nanoseconds; `None` for a search.
     pub frame_ns: Option<f64>,
     /// Time to find the contact from the start of the scene, seconds.
     pub search_s: Option<f64>,

@@ -10,10 +10,10 @@ use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::singularities::Singularities;
 
-/// Turns outside the radius, or outside the longest link, within which most teams touch if they ever do.
+/// The number of turns outside the radius, or outside the longest link, within which most teams touch if they ever do.
 const TURNS_BEFORE: f64 = 3.0;
 
-/// Turns outside a touch at which a trial starts that follows it.
+/// The number of turns outside a touch at which the trial that follows it starts.
 const TURNS_ABOUT: f64 = 1.0;
 
 /// Factor of the pitch from one trial to the next while the same two boards touch.

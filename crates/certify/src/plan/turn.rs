@@ -25,7 +25,7 @@ pub struct LeastTurn {
     /// Least radius with which the ordinary search finds no event, metres. It is within 1e-9 m of `value_lo`, and equal
     /// to `value_hi` if that is within a nanometre too. `None` if the search was given up before.
     pub value: Option<f64>,
-    /// Metres of the S with the radius `value`.
+    /// The length of the S with the radius `value`, in metres.
     pub length: Option<f64>,
     /// The least radius that is tested, metres.
     pub from: f64,
@@ -37,7 +37,7 @@ pub struct LeastTurn {
     pub proved: bool,
     /// Number of intervals into which the radii from `from` to `value_lo` are divided.
     pub intervals: u64,
-    /// Metres of path before and after the S that the proof for `value_hi` covers.
+    /// The lengths of path before and after the S that the proof for `value_hi` covers, in metres.
     pub leads: Option<[f64; 2]>,
 }
 
@@ -50,8 +50,8 @@ pub struct TurnLimit {
     pub bench_a: u32,
     /// The other of two benches that touch.
     pub bench_b: Option<u32>,
-    /// Metres of path past the beginning of the S, negative before the S. They lead to the rear handle of a lock, the
-    /// front handle of a stall, or the head at a contact.
+    /// The place of the rear handle of a lock, of the front handle of a stall, or of the head at a contact, in metres
+    /// of path past the beginning of the S. It is negative before the S.
     pub past: f64,
 }
 

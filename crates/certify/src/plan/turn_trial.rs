@@ -14,12 +14,12 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::singularities::Singularities;
 use bench_dragon_show::scene::Accepted;
 
-/// Turns outside the turn or the longest link at which a trial of the links starts. The trial ends a number of lengths
-/// of the longest link after the turn.
+/// The number of turns outside the turn or the longest link at which a trial of the links starts. The trial ends a
+/// number of lengths of the longest link after the turn.
 const TURNS_BEFORE: f64 = 2.0;
 const LINKS_AFTER: f64 = 6.0;
 
-/// Turns outside the turn at which a trial of the boards starts.
+/// The number of turns outside the turn at which a trial of the boards starts.
 const BOARDS_BEFORE: f64 = 3.0;
 
 /// Work for one trial, in units of [`Budget`]: some seconds.

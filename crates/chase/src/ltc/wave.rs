@@ -27,7 +27,7 @@ pub enum WaveError {
 pub struct Format {
     /// Samples per second and channel.
     pub sample_rate: u32,
-    /// Bytes of the samples of all channels at one time.
+    /// The number of bytes of the samples of all channels at one time.
     pub block_bytes: usize,
     sample_bytes: usize,
     is_float: bool,

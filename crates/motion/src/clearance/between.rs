@@ -26,7 +26,7 @@ use crate::model::team::Team;
 use crate::model::{Point, Vector};
 use crate::solve::Chain;
 
-/// Metres beyond the limit up to which boards are listed.
+/// The distance beyond the limit up to which boards are listed, in metres.
 const SKIN: f64 = 1.0;
 
 /// The most boards in the list of a bench.
@@ -35,7 +35,8 @@ const MOST_LISTED: usize = 12;
 /// Error of a place in single precision, as a share of it; twice as much, for the sum of the places.
 const SINGLE_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
 
-/// Metres of approach after which all bounds are computed again, so that their rounding stays within its allowance.
+/// The approach, in metres, after which all bounds are computed again, so that their rounding stays within its
+/// allowance.
 const MOST_MOVED: f64 = 100.0;
 
 /// Margin for rounding: metres, and as a share of the coordinates.
@@ -136,7 +137,7 @@ impl Listed {
 /// The moment of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment<'a> {
-    /// Seconds of the show.
+    /// The time of the show, in seconds.
     pub time: f64,
     /// By dragon: the metres that its head has travelled.
     pub travelled: &'a [f64],
@@ -146,7 +147,8 @@ pub struct Moment<'a> {
 #[derive(Debug, Clone)]
 pub struct BetweenMonitor {
     parts: Vec<Part>,
-    /// Metres by which a dragon's points may be outside the box about its handles, and the radius of the largest board.
+    /// The distance, in metres, by which a dragon's points may be outside the box about its handles, and the radius of
+    /// the largest board.
     beyond: f64,
     /// Greatest approach of two boards per metre of displacement of their handles.
     reach: f64,

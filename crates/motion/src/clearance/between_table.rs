@@ -56,7 +56,7 @@ pub struct TabledDragon<'a> {
     pub placement: Placement,
     /// The table of its frames, in the path's own coordinates.
     pub table: &'a FollowerTable,
-    /// Metres per second.
+    /// The speed of the head, in metres per second.
     pub head_speed: f64,
 }
 

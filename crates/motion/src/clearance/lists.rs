@@ -14,8 +14,8 @@ const MOST_ENTRIES: usize = 24;
 /// Boards farther than the nearest by more than this, in links, have no entry.
 const ALLOWANCE: f64 = 0.02;
 
-/// Nanoseconds on a processor of 2025 for a row's handle, for its list, for a visited board, and for a bound of its
-/// distance.
+/// The work for a row's handle, for its list, for a visited board, and for a bound of its distance, in nanoseconds on a
+/// processor of 2025.
 const WORK_OF_HANDLE: usize = 400;
 const WORK_OF_LIST: usize = 300;
 const WORK_OF_VISIT: usize = 15;
@@ -72,7 +72,7 @@ pub(super) struct ListBuilder<'a> {
     candidates: Vec<(usize, f64)>,
     /// All lists.
     pub neighbours: Vec<Neighbour>,
-    /// Nanoseconds of work so far, on a processor of 2025.
+    /// The work so far, in nanoseconds on a processor of 2025.
     pub work: usize,
 }
 

@@ -21,7 +21,8 @@ const MOST_SCANS: usize = 16;
 /// Margin of carried bounds beyond the limit, in lengths of a body board.
 const SKIN: f64 = 0.05;
 
-/// Metres of approach after which carried bounds are computed again, so that their rounding stays within its allowance.
+/// The approach, in metres, after which carried bounds are computed again, so that their rounding stays within its
+/// allowance.
 const MOST_MOVED: f64 = 100.0;
 
 /// For every bench a lower bound of its distance to those behind it, carried from frame to frame.
@@ -86,7 +87,7 @@ pub(super) struct ClearanceSearch<'a> {
     first: ((usize, usize), f64),
     /// A body board's length over its link's.
     board_per_link: f64,
-    /// Metres that a link may be off its length.
+    /// The length, in metres, by which a link may be off.
     link_error: f64,
     /// Pairs tested.
     pub tested: u64,

@@ -27,7 +27,7 @@ pub struct MovingDragon<'a> {
     placement: Placement,
     delay: f64,
     head_speed: f64,
-    /// Metres of travel at which it stands or the motion ends, and from which on rounding may prevent a solution.
+    /// The travel, in metres, at which it stands or the motion ends, and from which on rounding may prevent a solution.
     end: f64,
     rounding_from: f64,
 }
@@ -61,9 +61,9 @@ impl<'a> MovingDragon<'a> {
 /// Boards of two dragons at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meeting {
-    /// Seconds of the show.
+    /// The time of the show, in seconds.
     pub time: f64,
-    /// Metres between the boards; 0 or less at a contact.
+    /// The distance between the boards, in metres; 0 or less at a contact.
     pub value: f64,
     /// The bench of each dragon, counted from 0 within it.
     pub benches: [usize; 2],

@@ -17,7 +17,7 @@ use super::stepped_search::Halt;
 /// The motion of one handle in a step.
 #[derive(Debug, Clone, Copy)]
 struct HandleMotion {
-    /// Metres of path that it passed over, forth and back: an upper bound of its total variation.
+    /// The length of path that it passed over, back and forth, in metres: an upper bound of its total variation.
     length: f64,
     /// Handles with one number, and all handles between them, went one way.
     run: u32,

@@ -40,7 +40,7 @@ use super::stepped_search::{GUESS_SHARE, Goal, Halt, MOST_GUESSES, SearchState, 
 pub struct Touch {
     /// The obstacle's number on its ground.
     pub obstacle: usize,
-    /// Metres that the head has travelled.
+    /// The distance that the head has travelled, in metres.
     pub travelled: f64,
     /// The bench that touches, counted from 0; of several the one deepest within the keep-out.
     pub bench: u32,
@@ -51,9 +51,9 @@ pub struct Touch {
 /// The least clearance of an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObstacleClearance {
-    /// Metres; negative if a board is within the keep-out.
+    /// The clearance, in metres; negative if a board is within the keep-out.
     pub value: f64,
-    /// Metres that the head has travelled.
+    /// The distance that the head has travelled, in metres.
     pub travelled: f64,
     /// The bench, counted from 0.
     pub bench: u32,
@@ -78,7 +78,7 @@ struct GroundSearch<'s, 'a, 'b> {
     best: Vec<Option<ObstacleClearance>>,
     /// Place of handle 1 at the beginning.
     second_handle: Param,
-    /// Metres of travel from which on rounding may prevent a solution.
+    /// The travel, in metres, from which on rounding may prevent a solution.
     rounding_from: f64,
 }
 

@@ -13,7 +13,7 @@ use crate::model::team::Team;
 pub(super) struct Reach {
     pub centre: Point,
     pub radius: f64,
-    /// Metres from the origin to the outermost point of the boards.
+    /// The distance from the origin to the outermost point of the boards, in metres.
     pub outermost: f64,
 }
 

@@ -46,9 +46,9 @@ impl Param {
 pub struct Disjoint {
     /// The later of the two segments, counted from 0.
     pub segment: usize,
-    /// Metres between the end of one and the start of the other.
+    /// The distance between the end of one and the start of the other, in metres.
     pub gap: f64,
-    /// Radians between their directions.
+    /// The angle between their directions, in radians.
     pub corner: f64,
 }
 
@@ -56,9 +56,9 @@ pub struct Disjoint {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Placed {
     segment: Segment,
-    /// Metres of travel at which it begins; minus infinity for the first.
+    /// The travel at which it begins, in metres; minus infinity for the first.
     begin: f64,
-    /// Metres of travel at which it ends.
+    /// The travel at which it ends, in metres.
     end: f64,
     /// Coordinate of its beginning. For the first segment: of the head's start or of the segment's end, whichever is
     /// earlier. And the metres of travel there.

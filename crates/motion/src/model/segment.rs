@@ -86,7 +86,7 @@ pub struct SegmentOutline {
     pub start: Point,
     /// Direction of travel there, radians counter-clockwise from x.
     pub heading: f64,
-    /// Metres along it.
+    /// The length along it, in metres.
     pub length: f64,
 }
 
@@ -104,7 +104,7 @@ pub enum OutlineKind {
     Spiral {
         /// Towards the centre or away from it.
         direction: Direction,
-        /// Metres per turn.
+        /// The pitch, in metres per turn.
         pitch: f64,
         /// Polar angle of its beginning on the unturned spiral, radians.
         first: f64,

@@ -38,7 +38,7 @@ pub struct Shape {
     kind: ShapeKind,
     /// The corners, or the centre of a circle.
     points: Vec<Point>,
-    /// Metres; 0 unless the shape is a circle.
+    /// The radius, in metres; 0 unless the shape is a circle.
     radius: f64,
     /// The sense of a convex shape: 1 if its corners stand counter-clockwise, -1 if clockwise, 0 for a circle or a
     /// segment.

@@ -6,13 +6,13 @@
 pub struct Team {
     /// The number of benches, at least 1; one less than the number of handles.
     pub benches: usize,
-    /// Metres along the head's board.
+    /// The length of the head's board, in metres.
     pub head_length: f64,
-    /// Metres along every other board.
+    /// The length of every other board, in metres.
     pub body_length: f64,
-    /// Metres across every board.
+    /// The width of every board, in metres.
     pub width: f64,
-    /// Metres from the centre of a handle's hole to the nearest end of the board.
+    /// The distance from the centre of a handle's hole to the nearest end of the board, in metres.
     pub hole_inset: f64,
 }
 

@@ -41,16 +41,16 @@ use crate::model::{Point, Vector};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Link<'a> {
     pub path: &'a Path,
-    /// Metres between its handles.
+    /// The distance between its handles, in metres.
     pub length: f64,
 }
 
 /// A link with its front handle at one place.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Configuration {
-    /// Metres of travel of the front handle.
+    /// The travel of the front handle, in metres.
     pub front: f64,
-    /// Metres of travel of the rear handle.
+    /// The travel of the rear handle, in metres.
     pub rear: f64,
     /// t . b at the front handle: 0 is a stall.
     pub front_cosine: f64,

@@ -31,7 +31,7 @@ use super::certificate::{Configuration, Link};
 /// The singular configurations of a link while its front handle is on the inward spiral.
 #[derive(Debug, Default)]
 pub(super) struct InwardSingularities {
-    /// Metres of travel of the front handle at which the rear one turns round.
+    /// The places of the front handle, in metres of travel, at which the rear one turns round.
     pub turns: Vec<f64>,
     /// The last place of the front handle with a follower.
     pub lock: Option<f64>,
@@ -68,7 +68,7 @@ pub(super) fn singularities(link: &Link) -> InwardSingularities {
 
 struct Inward<'a> {
     link: &'a Link<'a>,
-    /// Metres of travel at which the segment ends.
+    /// The travel at which the segment ends, in metres.
     end: f64,
     /// The polar angle of the front handle at which the follower vanishes.
     fold: Option<f64>,

@@ -18,11 +18,11 @@ use crate::model::team::Team;
 /// The parameters of the paper, which a scene may change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperRules {
-    /// Seconds of one Euler step of the head.
+    /// The time of one Euler step of the head, in seconds.
     pub time_step: f64,
-    /// Seconds over which a speed is a difference of positions.
+    /// The interval over which a speed is a difference of positions, in seconds.
     pub difference_interval: f64,
-    /// Radians at which the bisection for a follower stops.
+    /// The angle at which the bisection for a follower stops, in radians.
     pub bisection_tolerance: f64,
 }
 

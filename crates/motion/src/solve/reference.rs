@@ -27,9 +27,9 @@ use crate::model::team::Team;
 /// One handle of the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceHandle {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: DoubleDouble,
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: DoubleDouble,
     /// Signed speed along the path, metres per second.
     pub speed: f64,
@@ -40,9 +40,9 @@ pub struct ReferenceHandle {
 pub struct Piece {
     /// Towards the centre or away from it.
     pub direction: Direction,
-    /// Metres per turn.
+    /// The pitch, in metres per turn.
     pub pitch: f64,
-    /// Metres from the centre to its beginning.
+    /// The distance from the centre to its beginning, in metres.
     pub radius: f64,
 }
 

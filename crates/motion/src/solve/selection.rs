@@ -67,9 +67,9 @@ pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
 pub struct Selection {
     /// The solver.
     pub table: FollowerTable,
-    /// Metres: the requested accuracy, or a thousandth of the shortest link if that is less.
+    /// The requested accuracy, in metres, or a thousandth of the shortest link if that is less.
     pub accuracy: f64,
-    /// Metres: the largest distance of a handle from the safe solver's.
+    /// The largest distance of a handle from the safe solver's, in metres.
     pub error: f64,
     /// Greatest measured error that is accepted, metres: the share of the requested accuracy, or the rounding of
     /// doubles if that is more.

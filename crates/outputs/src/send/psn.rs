@@ -35,15 +35,15 @@ const PACKET_COUNT_AT: usize = 4 + 4 + 11;
 pub struct Tracker {
     /// Its number.
     pub id: u16,
-    /// Metres.
+    /// The position, in metres.
     pub position: [f32; 3],
-    /// Metres per second; left out of the packet if it is not known.
+    /// The speed, in metres per second; left out of the packet if it is not known.
     pub speed: Option<[f32; 3]>,
     /// The axis of its rotation; the length of the vector is the angle in radians.
     pub orientation: [f32; 3],
     /// 1 if the position is valid, 0 if it is not known any more.
     pub status: f32,
-    /// Microseconds from the sender's start to the moment of the position.
+    /// The time from the sender's start to the moment of the position, in microseconds.
     pub timestamp_us: u64,
 }
 

@@ -36,7 +36,7 @@ pub struct ClearanceCurve {
 pub struct LeastOfShow {
     /// Simulated seconds.
     pub time: f64,
-    /// Metres.
+    /// The clearance, in metres.
     pub clearance: f64,
     /// The lower bench, from 0.
     pub bench_a: u32,

@@ -24,7 +24,7 @@ pub use accumulator::{Accumulator, Durations, Percentiles, Sample, Summary};
 const QUEUED_SAMPLES: usize = 1 << 16;
 /// Alerts and cues that their queue holds.
 const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
-/// Nanoseconds between two polls of the queues.
+/// The time between two polls of the queues, in nanoseconds.
 const POLL_INTERVAL_NS: u64 = 20_000_000;
 
 /// Creates the queues between the loop and this thread.

@@ -69,9 +69,9 @@ pub struct Verdict {
     pub instructions: String,
     /// True if this machine computes the same bits.
     pub same_arithmetic: bool,
-    /// Metres: the greatest distance of a sampled handle from the second solver's; `None` if bits were compared.
+    /// The greatest distance of a sampled handle from the second solver's, in metres; `None` if bits were compared.
     pub max_difference: Option<f64>,
-    /// Metres: the tolerance of that distance.
+    /// The tolerance of that distance, in metres.
     pub tolerance: Option<f64>,
 }
 

@@ -22,7 +22,7 @@ struct Inner {
     file: File,
     /// The bytes since the last flush.
     buffer: Vec<u8>,
-    /// Bytes in the file.
+    /// The number of bytes in the file.
     flushed: u64,
     /// The size of the file with the reserved space.
     reserved: u64,

@@ -95,7 +95,7 @@ pub struct Contents {
     pub scene: Option<String>,
     /// The played topics with messages, in order.
     pub topics: Vec<Topic>,
-    /// Frames per second of the publisher's loop.
+    /// The rate of the publisher's loop, in frames per second.
     pub rate: f64,
     /// The number of frames; `None` if the file does not count them.
     pub frames: Option<u64>,

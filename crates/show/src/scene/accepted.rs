@@ -20,7 +20,7 @@ impl Accepted {
     pub const START_TURN: Self = Self { least: 1e-9, greatest: 1e7, unit: "turns" };
     /// The first radius of a turnaround divided by the second.
     pub const ARC_RATIO: Self = Self { least: 1e-3, greatest: 1e3, unit: "metres per metre" };
-    /// Metres of path before or after a turnaround.
+    /// The length of path before or after a turnaround, in metres.
     pub const ROUTE: Self = Self { least: 0.0, greatest: 1e9, unit: "metres" };
     /// A line or arc of a route.
     pub const LEG: Self = Self { least: 1e-3, greatest: 1e9, unit: "metres" };
@@ -38,7 +38,7 @@ impl Accepted {
     pub const ROTATION: Self = Self { least: -1e3, greatest: 1e3, unit: "turns" };
     /// Speed of the head.
     pub const SPEED: Self = Self { least: 1e-9, greatest: 1e6, unit: "metres per second" };
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub const RATE: Self = Self { least: 0.1, greatest: 20_000.0, unit: "frames per second" };
     /// Simulated seconds per second of wall time.
     pub const TIME_SCALE: Self = Self { least: 1e-6, greatest: 1e6, unit: "simulated seconds per second" };
@@ -50,7 +50,7 @@ impl Accepted {
     pub const CUE: Self = Self { least: 0.0, greatest: 1e20, unit: "seconds" };
     /// Wall time at the end of a show before it starts again.
     pub const END_HOLD: Self = Self { least: 0.0, greatest: 1e6, unit: "seconds" };
-    /// Seconds of the paper's time step and difference interval, radians of its tolerance.
+    /// The paper's time step and difference interval, in seconds, and its tolerance, in radians.
     pub const PAPER_RULE: Self = Self { least: 1e-15, greatest: 1e3, unit: "seconds or radians" };
     /// The number of benches.
     pub const BENCHES: Self = Self { least: 1.0, greatest: 1e6, unit: "benches" };

@@ -127,7 +127,7 @@ pub(super) struct AnswerCheck {
     /// Tick and simulated time of the latest response.
     tick: u64,
     time: f64,
-    /// Frames per second.
+    /// The rate, in frames per second.
     frame_rate: f64,
 }
 

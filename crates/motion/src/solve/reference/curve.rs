@@ -201,7 +201,7 @@ pub(super) struct RealPiece {
     pub curve: Curve,
     /// Its first coordinate.
     pub first: Real,
-    /// Metres along it.
+    /// The length along it, in metres.
     pub length: Real,
     /// Direction of travel at its end, radians from x.
     pub heading: Real,

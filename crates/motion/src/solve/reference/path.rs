@@ -14,11 +14,11 @@ pub(super) struct Segment {
     pub curve: Curve,
     /// Its first place; on the first segment, which has no beginning, the place from which it is measured.
     pub first: RealParam,
-    /// Metres of travel at `first`.
+    /// The travel at `first`, in metres.
     pub begin: Real,
     /// Its last place.
     pub last: RealParam,
-    /// Metres of travel at `last`.
+    /// The travel at `last`, in metres.
     pub end: Real,
 }
 

@@ -62,7 +62,7 @@ struct BandBuilder<'a> {
     needed: usize,
     /// True if the second handle can come here.
     with_centres: bool,
-    /// Bytes that the band may take.
+    /// The number of bytes that the band may take.
     budget: usize,
 }
 

@@ -47,7 +47,7 @@ const AT_END: f64 = 1e-11;
 /// A stretch of travel, metres, on which all quantities are polynomials.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
-    /// Metres of travel where beta is 0, and beta per metre.
+    /// The travel where beta is 0, in metres, and beta per metre.
     middle: f64,
     scale: f64,
     /// Alpha is `row` plus the polynomial's value.
@@ -60,7 +60,7 @@ struct Piece {
 #[derive(Debug, Clone, Default)]
 pub(super) struct HeadTable {
     pieces: Vec<Piece>,
-    /// Metres of travel at which each piece begins, and at which the last ends.
+    /// The travel at which each piece begins, and at which the last ends, in metres.
     begins: Vec<f64>,
     /// The piece in which each of equal shares of the travel begins.
     piece_of_share: Vec<u32>,
@@ -70,7 +70,7 @@ pub(super) struct HeadTable {
 /// The table's values for one travel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HeadSample {
-    /// Metres, and radians, the heading not yet within half a turn.
+    /// The place, in metres, and the heading, in radians, not yet within half a turn.
     pub x: f64,
     pub y: f64,
     pub heading: f64,

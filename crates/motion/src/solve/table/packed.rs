@@ -55,9 +55,9 @@ impl std::fmt::Display for Format {
 /// Allowed changes by the packing, besides the errors of the rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Allowed {
-    /// Metres.
+    /// The change of the places, in metres.
     pub place: f64,
-    /// Radians.
+    /// The change of the headings, in radians.
     pub heading: f64,
     /// Relative to a handle's own speed; infinite if velocities are omitted.
     pub speed: f64,
@@ -177,7 +177,7 @@ struct Builder<'a> {
     valid_from: f64,
     format: Format,
     allowed: Allowed,
-    /// Bytes left.
+    /// The number of bytes left.
     budget: usize,
     packed: PackedBand,
 }

@@ -24,7 +24,7 @@ pub(super) struct Track<'a> {
 pub(super) struct Node {
     pub at: Param,
     pub tangent: Vector,
-    /// Metres along the path, against the travel, per unit of alpha.
+    /// The length along the path, against the travel, per unit of alpha, in metres.
     pub spacing: f64,
     /// Direction of the link that the handle leads, radians, and its derivative by alpha.
     pub heading: f64,
@@ -37,7 +37,7 @@ pub(super) struct Pose {
     pub heading: f64,
     /// The speed of the rear handle over that of the front one.
     pub speed_ratio: f64,
-    /// Radians per metre of the front handle's travel.
+    /// The change of heading per metre of the front handle's travel, in radians.
     pub heading_per_metre: f64,
 }
 

@@ -29,9 +29,9 @@ pub struct Sample {
     pub unsolved_frames: u64,
     /// The loop's counts, this frame included.
     pub counts: LoopCounts,
-    /// Nanoseconds from the intended deadline to the wake-up.
+    /// The time from the intended deadline to the wake-up, in nanoseconds.
     pub lateness_ns: u64,
-    /// Nanoseconds from the wake-up until all publishers had the frame.
+    /// The time from the wake-up until all publishers had the frame, in nanoseconds.
     pub step_ns: u64,
     /// Connected subscribers.
     pub subscribers: u32,

@@ -14,7 +14,7 @@ use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::scene::Scene;
 use bench_dragon_show::solve_at_or_just_before;
 
-/// Seconds by which two arithmetics may differ in the times of events, at which a show ends or pauses.
+/// The time, in seconds, by which two arithmetics may differ in the times of events, at which a show ends or pauses.
 const EVENT_TIME: f64 = 1e-9;
 /// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without
 /// bound at a lock. Near a lock the error itself is about sqrt(eps).
@@ -36,10 +36,10 @@ struct OneReference {
     solver: Box<dyn Solver>,
     chain: Chain,
     head_speed: f64,
-    /// Metres from the stage's origin to the origin of the path's own coordinates.
+    /// The distance from the stage's origin to the origin of the path's own coordinates, in metres.
     placed: f64,
     accuracy: f64,
-    /// Metres: the greatest distance so far, and its tolerance.
+    /// The greatest distance so far, and its tolerance, in metres.
     worst: Option<(f64, f64)>,
 }
 
