@@ -1,6 +1,5 @@
-//! Certified contacts of several dragons. The certificate has the events of each dragon alone. Then it has, for each
-//! two dragons, stretches of time in which their boards are apart, up to their first contact. Lemma 12 of
-//! `docs/proofs.md`.
+//! Certified contacts of several dragons. The certificate has the events of each dragon alone, and for each two dragons
+//! stretches of time in which their boards are apart, up to their first contact. Lemma 12 of `docs/proofs.md`.
 
 mod clearance;
 mod side;

@@ -1,5 +1,5 @@
 //! Enclosures of the least clearance of two boards in a show, and of the least clearance of each obstacle. Steps of the
-//! head prove the lower bounds. For each enclosure, one place proves the upper bound. Lemmas 6 and 11 of
+//! head prove the lower bound of each enclosure, and one place proves its upper bound. Lemmas 6 and 11 of
 //! `docs/proofs.md`.
 
 mod apart;
@@ -33,8 +33,8 @@ const WIDTH: f64 = 0.9e-9;
 /// The difference, in metres, by which a new upper bound must be lower than the one before.
 const LOWER: f64 = 1e-3 * WIDTH;
 
-/// Factors of the step length after a step that is shown, after one that is not, and after further ones that are not.
-/// Steps close to the longest cost more attempts, and make the certificate shorter.
+/// Factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and later
+/// shrinks. Steps close to the longest need more attempts, but make the certificate shorter.
 const GROWTH: f64 = 1.1;
 const SHRINK: f64 = 0.8;
 const SHRINK_FURTHER: f64 = 0.5;

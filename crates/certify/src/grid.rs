@@ -1,5 +1,5 @@
 //! Grid points of the search: the handles for one place of the head, in doubles. They are the starting guess of the
-//! spans; correctness does not depend on them.
+//! spans, so correctness does not depend on them.
 
 use super::capsule::Span;
 use super::path::{ExactPath, Place};

@@ -1,5 +1,5 @@
-//! Lemmas 9 and 11 of `docs/proofs.md`. They prove that a board stays clear of the obstacles of a stage over a step, or
-//! further away than a number of metres. They also prove that a board has come to an obstacle.
+//! Proofs that over a step a board stays clear of the obstacles of a stage, or further away than a number of metres,
+//! and that a board has come to an obstacle. Lemmas 9 and 11 of `docs/proofs.md`.
 
 use super::boards::MovingBoard;
 use super::first_order::{FirstOrderBoard, When};

@@ -1,5 +1,4 @@
-//! The lines of a certificate: see "The file" in `docs/proofs.md`. The search writes them; the `events` command prints
-//! their results.
+//! The lines of a certificate: see "The file" in `docs/proofs.md`.
 
 use std::io::{self, Write};
 

@@ -1,8 +1,7 @@
-//! Proofs for teams that come in on inward spirals from any distance. Boards overlap with every pitch of an interval,
-//! or no boards touch with one pitch. [`crate::plan`] calls it. "The least pitch" and Lemma 8 in `docs/proofs.md`.
+//! Proofs for teams that come in on inward spirals from any distance: that boards overlap with every pitch of an
+//! interval, or that no boards touch with one pitch. "The least pitch" and Lemma 8 in `docs/proofs.md`.
 //!
-//! With the spiral's a = pitch / 2 pi as the unit of length, all spirals are equal and the team's lengths are
-//! intervals.
+//! All spirals are equal if the spiral's a = pitch / 2 pi is the unit of length; then the team's lengths are intervals.
 
 mod far;
 

@@ -1,5 +1,5 @@
-//! The search for a certificate: steps of the head from the start to the end of the motion. A step whose claims cannot
-//! be shown is halved. At each event of the ordinary search, the search writes the line that proves the event.
+//! The search for a certificate: steps of the head from the start to the end of the motion. A step is halved if its
+//! claims cannot be shown. At each event of the ordinary search, the search writes the line that proves the event.
 
 use std::io;
 

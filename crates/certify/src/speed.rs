@@ -1,8 +1,8 @@
 //! Enclosure of the greatest ratio of a handle's speed to the head's, by branch and bound over the head's travel. See
 //! "Lemma 7" in `docs/proofs.md`.
 //!
-//! In: a scene's motion, and the end of the travel. Out: two numbers that enclose the greatest ratio; the proof does
-//! not depend on a solver or on samples. `plan` calls it.
+//! In: a scene's motion, and the end of the travel. Out: two numbers that enclose the greatest ratio. The proof does
+//! not depend on a solver or on samples.
 
 mod certificate;
 mod step;

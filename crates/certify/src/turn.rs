@@ -1,5 +1,5 @@
-//! Proofs for all turnarounds whose turn radius is in an interval: a link stalls or locks, or two boards overlap. And
-//! for one turnaround: none of these happens. [`crate::plan`] calls it. Lemma 10 in `docs/proofs.md`.
+//! Proofs for all turnarounds whose turn radius is in an interval, that a link stalls or locks, or that two boards
+//! overlap; and for one turnaround, that none of these happens. Lemma 10 in `docs/proofs.md`.
 
 use std::cell::Cell;
 

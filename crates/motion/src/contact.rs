@@ -100,7 +100,7 @@ pub struct ConservativeAdvancement<'a> {
     head_turns: Vec<Param>,
     /// Places of the front handle of a body link at which its rear handle turns round.
     body_turns: Vec<Param>,
-    /// For each segment the first of the run of lines, or of arcs of one circle, that it belongs to.
+    /// The index, for each segment, of the first segment of the run with the same constant curvature.
     curves: Vec<usize>,
 }
 

@@ -30,8 +30,8 @@ const LEAST_SHARE: f64 = 1e-9;
 /// between its two ends. This is tested at a quarter, a half and three quarters of the step. `progress` receives the
 /// share that is done, from 0 to 1.
 ///
-/// A board whose front handle is at one place of the path lies in one position, whichever bench of its length that is.
-/// So a board is left out from where the board before it, of the same length, began.
+/// All benches of one length lie in the same position when their front handles are at the same place of the path. So a
+/// board is left out from the place on where the board before it, of the same length, began.
 ///
 /// # Errors
 /// [`NoFollower`] if a handle has no place before the end of the stretch.

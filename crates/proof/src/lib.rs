@@ -1,8 +1,8 @@
-//! The checker of certificates: the rules of docs/proofs.md, and nothing else. `verify`, `check
-//! --certificate` and `view --certificate` call it.
+//! The checker of certificates: the rules of docs/proofs.md, and nothing else.
 //!
 //! In: the lines of a certificate. Out: its proved claims, or the first line that does not follow. This crate depends
-//! on no other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
+//! on no other crate of this workspace, because a fault in shared code would be shared too: it has neither geometry,
+//! parsing nor solver in common with the search, only that page.
 
 mod apart;
 mod boards;

@@ -1,4 +1,4 @@
-//! Binary numbers of 128 bits, without a heap. [`super::interval`] calls it.
+//! Binary numbers of 128 bits, without a heap.
 //!
 //! `+`, `-`, `*` and `/` return the exact result rounded to the next number in a given direction. A result without a
 //! value, or with an exponent beyond any that a certificate can need, is NaN. NaN propagates.

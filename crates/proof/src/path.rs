@@ -1,5 +1,5 @@
-//! The path of a certificate, in intervals: its segments, its places and their order. The module also bounds length,
-//! curvature and turning between two places (docs/proofs.md, "Definitions" and "Capsules").
+//! The path of a certificate, in intervals: its segments, its places and their order, and bounds of length, curvature
+//! and turning between two places (docs/proofs.md, "Definitions" and "Capsules").
 
 use std::cmp::Ordering;
 

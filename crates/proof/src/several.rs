@@ -30,7 +30,8 @@ impl Alone {
 const BEFORE_LOCK: f64 = 1e-3;
 
 impl Alone {
-    /// Returns true if the dragon locks, and a time is before the end of its last step by next to nothing.
+    /// Returns true if the dragon locks, and a time is within [`BEFORE_LOCK`] links of travel before the end of its last
+    /// step.
     fn locks_just_after(&self, scene: &Scene, time: f64) -> bool {
         let Some(end) = self.end.filter(|_| self.locks) else { return false };
         let end = scene.time(&scene.path.travelled(end));

@@ -1,6 +1,6 @@
-//! The least clearances of a show of several dragons: first those of each dragon alone, then those of each two. For
-//! each two, stretches of time show that the boards are further apart than a number of metres. One more time shows two
-//! boards that are no further apart. Lemma 12 of `docs/proofs.md`.
+//! The least clearances of a show of several dragons, first of each dragon alone, then of each two. For each two,
+//! stretches of time show that the boards are further apart than a number of metres, and one more time shows two boards
+//! that are no further apart. Lemma 12 of `docs/proofs.md`.
 
 use super::side::{Extent, Side};
 use super::{Aim, PairSearch, Write};

@@ -1,5 +1,5 @@
-//! The least turn radius, enclosed. With every radius up to the lower number a link stalls or locks or boards overlap.
-//! With the upper number none of these happens.
+//! The least turn radius, enclosed: with every radius up to the lower number a link stalls or locks, or boards overlap;
+//! with the upper number none of these happens.
 //!
 //! In: a team, a pitch, the ratio of the arcs. Out: the two numbers. "The least turn" in `docs/proofs.md` has the
 //! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
