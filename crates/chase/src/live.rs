@@ -1,5 +1,5 @@
 //! The chase of a running show: reads a source, follows the frames of the show, sends commands, reports. In: the events
-//! of a feed, and the inputs of a source. Out: commands, the status of the chase. Called by the command `chase`.
+//! of a feed, and the inputs of a source. Out: commands, the status of the chase.
 
 use std::net::IpAddr;
 use std::sync::mpsc::{Receiver, channel};

@@ -1,4 +1,4 @@
-//! Timecode: labels, frame rates, drop frame. Pure. Called by the decoders, the sources, the schedule and the chase.
+//! Timecode: labels, frame rates, drop frame. Pure.
 //!
 //! A label counts frames of a day. Drop frame (SMPTE ST 12-1) leaves out the labels 00 and 01 of each minute, except of
 //! each tenth minute. Thus labels follow the time of day at 30000/1001 frames per second.

@@ -1,7 +1,7 @@
 //! The clocks, and the deadlines of the periods.
 //!
-//! The loop and its statistics take a [`Clock`], so that a test can replace it. Transports and subscribers, which only
-//! stamp and measure, call the functions.
+//! The loop and its statistics have a [`Clock`] as a parameter, so that a test can replace it. Transports and
+//! subscribers only stamp and measure, so they call the functions.
 
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 

@@ -1,8 +1,8 @@
 //! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: the contents of the
 //! queues.
 //!
-//! This layer keeps no counts: the [`feed`](super::feed), which calls this layer, decides when to open, to read and to
-//! disconnect. A service can have more than one publisher: `selected` has the one whose messages are read.
+//! This layer keeps no counts: the [`feed`](super::feed) above it decides when to open, to read and to disconnect. A
+//! service can have more than one publisher, and `selected` has the one whose messages are read.
 
 mod selected;
 mod slices;

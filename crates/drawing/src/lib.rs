@@ -1,7 +1,7 @@
 //! Pictures of the stage: a chain at one time as SVG text, or a stretch of a motion as one animated SVG.
 //!
-//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. `draw` calls it. The plots of `trade` and of
-//! the soak report take their colours from [`palette`].
+//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. The plots of `trade` and of the soak report
+//! take their colours from [`palette`].
 //!
 //! The stage is drawn in metres, y upward, in a group whose transform maps it to the sheet, clipped at the viewport. So
 //! an editor shows true coordinates.

@@ -1,7 +1,7 @@
 //! Alerts in words, for people. Benches are counted from 1, and the sentence states this.
 //!
-//! In: a [`CollisionAlert`] and the [`Stage`] with the names. Out: a sentence. Called by `run`, `watch` and the stage
-//! picture's server, so that all of them print the same.
+//! In: a [`CollisionAlert`] and the [`Stage`] with the names. Out: a sentence, the same for the terminal and for the
+//! page.
 
 use std::fmt::Display;
 use std::io;

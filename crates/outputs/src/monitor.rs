@@ -1,5 +1,5 @@
 //! The figures of a publisher: rate, gaps, latency, state, alert. In: the events of a
-//! [`feed`](bench_dragon_client::feed). Out: an [`IntervalReport`] on request. Called by `watch` and `metrics`.
+//! [`feed`](bench_dragon_client::feed). Out: an [`IntervalReport`] on request.
 
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,7 @@
 //! Start and stop of a publisher: the threads of the loop and of its statistics, and the transports' ends on both.
 //!
-//! In: a [`FrameSource`], the open transports, their command queues, a clock. Out: a [`Published`]. Prints nothing but
-//! warnings through the crate `log`: the caller prints in its [`Hooks`]. Called by the commands `run` and `replay`.
+//! In: a [`FrameSource`], the open transports, their command queues, a clock. Out: a [`Published`]. Except for warnings
+//! through the crate `log`, nothing is printed here: the caller prints in its [`Hooks`].
 
 use std::collections::BTreeMap;
 use std::fs::File;

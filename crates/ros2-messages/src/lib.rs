@@ -1,8 +1,7 @@
 //! The ROS 2 messages on the wire, field for field as `msgs/` and the standard packages define them.
 //!
 //! A message of a header and one of the program's layouts nests the layout: on the wire a nested struct is its fields
-//! in order. Called by the ROS 2 transport and by the recorder, so that a recording has the same messages as a ROS 2
-//! subscriber.
+//! in order.
 
 pub mod diagnostics;
 pub mod markers;

@@ -6,7 +6,7 @@
 //! writer, in our own process, an ACKNACK submessage (RTPS 2.5, section 9.4.5.2). For a best-effort subscriber the
 //! ACKNACK acknowledges all messages. For a reliable subscriber it acknowledges the messages that are older than
 //! [`AGE`] and not among the last `depth`. A reliable subscriber gets a GAP for these messages. RustDDS ignores the
-//! ACKNACK if the subscriber has acknowledged more. Called by the volatile writers.
+//! ACKNACK if the subscriber has acknowledged more.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::{Ipv4Addr, SocketAddr};

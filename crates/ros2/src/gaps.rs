@@ -4,7 +4,7 @@
 //! has no call to withhold them. So this file sends a GAP submessage (RTPS 2.5, section 9.4.5.6) to the subscriber:
 //! these messages are not for it. RustDDS retransmits 5 ms after the subscriber's request. The subscriber accepts a GAP
 //! only when it knows the writer, so the datagram is repeated for some time. If all datagrams come too late, the
-//! subscriber gets old messages first. Called by the matches.
+//! subscriber gets old messages first.
 
 use std::net::SocketAddr;
 use std::ops::RangeInclusive;

@@ -5,7 +5,7 @@
 //! writer yet. The next heartbeat of RustDDS may name an answer that RustDDS has not sent. RustDDS counts a message
 //! from the call that writes it, and answers an ACKNACK before it sends. The client would then wait without end. So
 //! this file sends a HEARTBEAT submessage (RTPS 2.5, section 9.4.5.7) just before the answer is written: this heartbeat
-//! names the earlier answers. Called by the matches.
+//! names the earlier answers.
 
 use rustdds::{DomainParticipant, GUID};
 

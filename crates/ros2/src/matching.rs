@@ -1,8 +1,7 @@
 //! The remote endpoints that RustDDS has matched with the program's own: the endpoints that a message reaches.
 //!
-//! RustDDS reports each match once, in the events of its participant, which only this file reads. Called by the topics,
-//! which hold a message until there is a subscriber, and by the services. A response is lost if it is written before
-//! the client's reply reader is matched.
+//! RustDDS reports each match once, in the events of its participant, which only this file reads. A response is lost if
+//! it is written before the client's reply reader is matched.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};

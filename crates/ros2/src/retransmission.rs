@@ -4,7 +4,7 @@
 //! request if its discovery thread has not matched the client's writer by then. RustDDS then sends an ACKNACK without
 //! requests, which Fast DDS answers after its heartbeat period of 3 s. RustDDS has no call for anything else. So this
 //! file sends datagrams after each match: a NACK_FRAG submessage (RTPS 2.5, section 9.4.5.14) for each of the first
-//! messages of the writer. Called by the matches.
+//! messages of the writer.
 //!
 //! This workaround is needed until RustDDS offers retransmission requests. Without it half of all first calls take 3 s,
 //! and a `hold` must not. The workaround is harmless: a writer retransmits the messages that it has and that are not

@@ -1,7 +1,6 @@
 //! The alert rules: from the timeline and the clearance to a level with hysteresis, and to alerts.
 //!
-//! In: a frame's tick, time and nearest pair, and the events. Out: the level, and the alerts of that frame. The show
-//! calls it once per frame.
+//! In: a frame's tick, time and nearest pair, and the events. Out: the level, and the alerts of that frame.
 
 #[cfg(test)]
 mod tests;

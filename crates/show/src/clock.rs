@@ -1,8 +1,8 @@
 //! The show clock: from ticks and commands to simulated time.
 //!
-//! Pure and computed from the integer tick: sim0 + time_scale * (tick - tick0) / rate. Each loop, and each command that
-//! changes the time or the rate, sets a new (sim0, tick0, time_scale). Such a command can round sim0 once. Between
-//! these changes no error accumulates. The same ticks with the same commands give the same bits. The show calls it.
+//! The time is computed from the integer tick: sim0 + time_scale * (tick - tick0) / rate. Each loop, and each command
+//! that changes the time or the rate, sets a new (sim0, tick0, time_scale), which can round sim0 once. Between these
+//! changes no error accumulates, so the same ticks with the same commands give the same bits. Pure.
 
 #[cfg(test)]
 mod tests;

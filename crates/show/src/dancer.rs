@@ -1,7 +1,6 @@
 //! One dragon in play: from its own time to its chain on the stage, with the nearest of its boards.
 //!
-//! In: a motion and its own time. Out: the chain and its clearance. The show calls it, for its one dragon or for each
-//! of several.
+//! In: a motion and its own time. Out: the chain and its clearance.
 
 use crate::scene::Scene;
 use bench_dragon_motion::clearance::{ClearanceMonitor, ObstacleMonitor, PairClearance};

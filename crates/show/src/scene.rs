@@ -1,6 +1,6 @@
 //! The scene file, checked once and converted to the types of the model.
 //!
-//! In: TOML text. Out: a [`Scene`]: all its numbers are in range and its start is legal. Errors name the file, the
+//! In: TOML text. Out: a [`Scene`], whose numbers are all in range and whose start is legal. Errors name the file, the
 //! line, the field and the expected value.
 
 pub mod accepted;

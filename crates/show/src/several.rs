@@ -1,8 +1,8 @@
 //! The frames of a scene with several dragons: one chain with all handles, and the nearest two
 //! boards of all dragons.
 //!
-//! In: the scene and a time of the show. Out: the chain on the stage, the handles of all dragons one after the other,
-//! and its clearance. The show calls it in place of its one dragon.
+//! In: the scene and a time of the show. Out: the chain on the stage, with the handles of all dragons one after the
+//! other, and its clearance.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! A chain as text: rows of a CSV table, or a line of JSON. Called by the command `solve`.
+//! A chain as text: rows of a CSV table, or a line of JSON.
 
 use bench_dragon_messages::sentence::number;
 use bench_dragon_motion::solve::Chain;

@@ -2,7 +2,7 @@
 //! rate in force while playing. The epoch changes exactly at jumps of simulated time.
 //!
 //! In: the frames of a publisher that loops without a hold at its end, as the soak test starts it. A frame is checked
-//! against earlier frames, never against the commands. Called by the [`observer`](super::observer).
+//! against earlier frames, never against the commands.
 
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{FrameHeader, HandlePose};

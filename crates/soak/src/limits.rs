@@ -1,4 +1,4 @@
-//! The limits of a soak test, and their notation. Called by the command `soak`.
+//! The limits of a soak test, and their notation.
 
 /// The limits of a soak test.
 #[derive(Debug, Clone, Copy, PartialEq)]

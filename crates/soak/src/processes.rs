@@ -1,5 +1,4 @@
-//! Starts, signals and reads the processes of a soak test: a thread for each pipe turns its lines into events. Called
-//! by the [`fleet`](super::fleet).
+//! Starts, signals and reads the processes of a soak test: a thread for each pipe turns its lines into events.
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};

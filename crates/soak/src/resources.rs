@@ -1,4 +1,4 @@
-//! The resources of a process, read from /proc. Called by the soak test for its publisher and the process of ROS 2.
+//! The resources of a process, read from /proc.
 
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;

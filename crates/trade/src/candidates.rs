@@ -1,5 +1,5 @@
 //! The solvers to measure: the selections for several requested accuracies, on all instruction sets; the safe solver;
-//! the paper's solver. Only [`super::measure`] calls it.
+//! the paper's solver.
 
 use std::time::Instant;
 

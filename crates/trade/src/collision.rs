@@ -1,5 +1,5 @@
 //! The cost of collision search on a scene: per frame, the live clearance and all pairs; per show, the exact search and
-//! sampled searches. Only [`super::measure`] calls it.
+//! sampled searches.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! Gaps in the frames of a publisher, and the beginnings of runs. Pure; the feed calls it once for each frame.
+//! Gaps in the frames of a publisher, and the beginnings of runs. Pure.
 
 /// Follows the `sequence` of received frames, which counts a run's frames without gaps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

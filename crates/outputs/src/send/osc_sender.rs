@@ -1,5 +1,4 @@
-//! The times at which OSC messages are sent. In: the events of a feed. Out: datagrams by [`osc`](super::osc). Called by
-//! `send osc`.
+//! The times at which OSC messages are sent. In: the events of a feed. Out: datagrams by [`osc`](super::osc).
 
 use std::time::{Duration, Instant};
 

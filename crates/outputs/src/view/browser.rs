@@ -1,4 +1,4 @@
-//! Sends the newest picture to one browser, at the browser's pace. Called by the server.
+//! Sends the newest picture to one browser, at the browser's pace.
 //!
 //! A socket's buffers hold seconds of frames, so a writable socket does not show that the browser has read. Each frame
 //! is therefore followed by a ping, which every WebSocket answers when it has read that far. At most [`MAX_IN_FLIGHT`]

@@ -1,8 +1,8 @@
 //! Statistics of the loop: percentiles of lateness and step cost, the status once a second, the summary at the end.
 //!
 //! In: samples, alerts and cues from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts and cues to the
-//! caller, a [`Summary`]. Runs on its own thread, so that the loop's thread computes no percentile, reads no file and
-//! prints no line. [`accumulator`] does the arithmetic.
+//! caller, a [`Summary`]. All this runs on a thread of its own, so that the loop's thread computes no percentile, reads
+//! no file and prints no line. [`accumulator`] does the arithmetic.
 
 pub mod accumulator;
 #[cfg(test)]

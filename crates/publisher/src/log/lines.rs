@@ -1,7 +1,7 @@
 //! The lines of a log: JSON objects, each with a check over all bytes before it.
 //!
-//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged. Such a line is
-//! reported by its number, before anything is computed from it.
+//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged, and is reported by its
+//! number before anything is computed from it.
 
 use serde::{Deserialize, Serialize};
 

@@ -2,8 +2,8 @@
 //!
 //! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The code of `run` computes the
 //! show, with the instructions that the log names. If this machine lacks these instructions, or has another
-//! architecture or other elementary functions, different bits prove nothing. Then, for each second with other bits, the
-//! handles in its line are compared with those of a second solver ([`mod@reference`]).
+//! architecture or other elementary functions, different bits prove nothing. Then the handles in the line of each
+//! second with other bits are compared with those of a second solver ([`mod@reference`]).
 
 mod player;
 pub mod reference;

@@ -1,4 +1,4 @@
-//! The index at the end of a recording: its channels and chunks. Called by the [`reader`](super::reader).
+//! The index at the end of a recording: its channels and chunks.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;

@@ -1,7 +1,6 @@
 //! Records a show into files: the messages of each topic, the splitting, the counts.
 //!
-//! In: the messages of a subscriber, in the order of reception. Out: files of one run each. Called by the subscriber
-//! that records, on its thread.
+//! In: the messages of a subscriber, in the order of reception. Out: files of one run each.
 
 use std::fs::{File, OpenOptions};
 use std::io;

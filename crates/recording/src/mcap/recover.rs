@@ -3,7 +3,7 @@
 //! In: the bytes of the file. Out: a complete file with the messages of the finished chunks, in order, the attachments
 //! and the metadata. A file without chunks keeps its messages. Records are read one after another. Behind a damaged
 //! length the next record is the next chunk or attachment whose own lengths and check agree: the repair needs no
-//! readable summary. Called by the command `record --recover`.
+//! readable summary.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom, Write};

@@ -2,7 +2,7 @@
 //!
 //! A recorder may receive an alert a little before or after its frame. Frames of a chunk are therefore returned after
 //! the next chunk has been read. A later file of a bag may begin with the alert and the cue that hold: they are not
-//! sent twice. Called by the [`replay`](super).
+//! sent twice.
 
 use std::collections::VecDeque;
 

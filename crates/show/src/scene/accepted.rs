@@ -1,4 +1,4 @@
-//! The ranges of numbers that a scene, or the command line, may request. Called by the scene and the commands.
+//! The ranges of numbers that a scene, or the command line, may request.
 
 use bench_dragon_messages::sentence;
 

@@ -1,6 +1,6 @@
 //! Cues: named times of a show that are announced, with an optional pause: `[[cues]]`.
 //!
-//! In: the tables of the file. Out: checked [`Cue`]s. The scene calls it; the show computes their times.
+//! In: the tables of the file. Out: checked [`Cue`]s, whose times the show computes.
 
 use serde::Deserialize;
 use toml::Spanned;

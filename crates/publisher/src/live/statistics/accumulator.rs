@@ -1,6 +1,6 @@
 //! The arithmetic of the statistics: samples and times in, a [`LoopStatus`] a second and a [`Summary`] out.
 //!
-//! Pure: the statistics thread calls it and adds the figures of the process.
+//! Pure: the statistics thread adds the figures of the process.
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};

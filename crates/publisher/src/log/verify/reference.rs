@@ -1,7 +1,6 @@
 //! A second solver that judges handles computed elsewhere: by a machine with other bits, or before they were recorded.
 //!
-//! In: a time and handles. Out: a sentence for the first handle outside of the tolerance. Called by the verification of
-//! logs and of recordings.
+//! In: a time and handles. Out: a sentence for the first handle outside of the tolerance.
 
 use std::f64::consts::PI;
 

@@ -1,7 +1,6 @@
 //! A service of frames, and the publisher's port to it: a header, and a slice of poses of one kind.
 //!
-//! In: a header and poses. Out: a sample, written where subscribers read it. Called by
-//! [`SharedMemoryPublisher`](super::SharedMemoryPublisher), on the loop's thread.
+//! In: a header and poses. Out: a sample, written where subscribers read it, on the loop's thread.
 
 use std::fmt::Debug;
 
