@@ -1,5 +1,5 @@
-//! The chase of a running show: reads a source, follows the frames of the show, sends commands, reports. In: the events
-//! of a feed, and the inputs of a source. Out: commands, the status of the chase.
+//! The chase of a running show: it reads a source, follows the frames of the show, sends commands and reports. In: the
+//! events of a feed, and the inputs of a source. Out: commands, the status of the chase.
 
 use std::net::IpAddr;
 use std::sync::mpsc::{Receiver, channel};

@@ -1,7 +1,7 @@
 //! Linear timecode (SMPTE ST 12-1): timecode as sound. In: samples. Out: labels with the sample at which each ends.
 //! Pure.
 //!
-//! A frame is 80 bits, least significant first, in biphase mark code. The signal changes at the beginning of each bit,
+//! A frame is 80 bits, least significant first, in biphase mark code: the signal changes at the beginning of each bit,
 //! and once more in the middle of a 1. The last 16 bits are a pattern that also shows the direction.
 
 pub mod wave;

@@ -1,8 +1,8 @@
 //! From the time that a show should have to commands: rate, seek, pause, resume. Pure: frames and answers in, at most
 //! one command at a time out.
 //!
-//! Each frame contains the simulated time of the show at a moment. The rate takes up an error; a larger error is a
-//! seek. During a hold, and after a pause or a seek of another client, the chase waits until the show plays again.
+//! Each frame contains the simulated time of the show at a moment. A small error is corrected by the rate, a larger one
+//! by a seek. During a hold, and after a pause or a seek of another client, the chase waits until the show plays again.
 
 use bench_dragon_messages::FrameHeader;
 use bench_dragon_messages::control::{Code, Command, RATES};

@@ -1,8 +1,8 @@
 //! Lock, jump, drift, freewheel: the motion of a source of timecode, from its readings alone. Pure; called with
 //! simulated time by tests.
 //!
-//! A reading is a position and the moment of its arrival. Arrival can only be late, by jitter or by a stall of the
-//! network; after a stall the waiting packets come at once. Positions that run evenly at another place are a jump.
+//! A reading is a position and the moment of its arrival. An arrival can only be late, by jitter or by a stall of the
+//! network, after which the waiting packets come at once. Positions that run evenly at another place are a jump.
 
 use std::collections::VecDeque;
 

@@ -1,6 +1,6 @@
 //! The dragon's head and tail in three dimensions for the look from a seat: balls of lit paper and tapered tufts.
 //!
-//! Metres along the board, to its left, and upward, as in `crates/outputs/src/view/dragon_figure.js`.
+//! Lengths are metres along the board, to its left, and upward, as in `crates/outputs/src/view/dragon_figure.js`.
 
 use svg::node::element::{Circle, Group, Path};
 

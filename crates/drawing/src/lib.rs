@@ -3,8 +3,8 @@
 //! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. The plots of `trade` and of the soak report
 //! take their colours from [`palette`].
 //!
-//! The stage is drawn in metres, y upward, in a group whose transform maps it to the sheet, clipped at the viewport. So
-//! an editor shows true coordinates.
+//! The stage is drawn in metres, y upward, in a group whose transform maps it to the sheet, so that an editor shows
+//! true coordinates. It is clipped at the viewport.
 
 pub mod animation;
 mod benches;

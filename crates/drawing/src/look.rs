@@ -1,4 +1,4 @@
-//! The look of a picture: colours, framing, surroundings, size. `draw` reads it from its options.
+//! The look of a picture: colours, framing, surroundings, size.
 
 use super::WIDTH;
 use super::palette::{self, Palette};

@@ -1,7 +1,7 @@
 //! The colours of all pictures of this program: those of the stage page's style sheet, light and dark.
 //!
 //! `tests/commands/draw` compares them with the page's `style.css`. Drawings use one palette. Plots are made in the
-//! light palette and get the dark one by [`with_dark_rules`], which a viewer that prefers dark applies.
+//! light palette, and [`with_dark_rules`] adds the dark one, which a viewer that prefers dark applies.
 
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! The colour of a bench: its mean speed over one link passage, on a scale about the head's speed.
 //!
-//! The page has the same scale (`SpeedScale` of `crates/outputs/src/view/palette.js`). So a colour means the same speed
-//! on the page, in a picture of `draw` and in the documents. `draw` calls [`mean_speeds`].
+//! The page has the same scale (`SpeedScale` of `crates/outputs/src/view/palette.js`), so a colour means the same speed
+//! on the page, in a picture of `draw` and in the documents.
 
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::solve::{Chain, Solver};

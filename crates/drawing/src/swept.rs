@@ -1,7 +1,7 @@
 //! [`SweptArea`]: the ground that boards cover during a stretch of a motion, as polygons. `draw --swept` and `check
 //! --swept` call it.
 //!
-//! Boards ride on the path: a tail that whips by momentum covers more.
+//! Because boards ride on the path here, a tail that whips by its momentum covers more.
 
 use std::ops::Range;
 

@@ -1,9 +1,9 @@
 //! A subscriber that records: from the feed through a queue to a thread that compresses and writes.
 //!
 //! The feed's end copies each frame, so that a slow disk does not delay it. If the thread is 64 MB behind, the feed's
-//! end waits with the next frame. Frames then stay in the shared memory until the oldest are overwritten, which is a
-//! gap in the recording. The publisher and this process's memory are not affected. Event-driven messages are small and
-//! never wait.
+//! end waits with the next frame. Frames then stay in the shared memory until the oldest are overwritten, which makes a
+//! gap in the recording, but affects neither the publisher nor the memory of this process. Event-driven messages are
+//! small and never wait.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};

@@ -2,8 +2,8 @@
 //!
 //! In: a [`Recording`] and [`ReplayOptions`]. Out: a [`Replay`], the loop's [`FrameSource`], and a thread that reads
 //! ahead into a queue of bounded size. With [`Pace::Recorded`] a frame is due as many periods after the first as in the
-//! recording. With [`Pace::Even`] each period has a frame. If the loop skips periods, or the disk is late, all later
-//! frames shift. Thus no frame is skipped, and none is sent in a burst.
+//! recording; with [`Pace::Even`] each period has a frame. If the loop skips periods, or the disk is late, all later
+//! frames shift, so that no frame is skipped and none is sent in a burst.
 
 mod pass;
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Compares the frames of a recording with its scene.
 //!
 //! In: a [`Recording`] and the [`Scene`] that it holds. Out: a [`RecordingVerdict`]. A second solver computes the
-//! handles of each frame at the frame's own simulated time. A recording has no commands: only a log proves that
+//! handles of each frame at the frame's own simulated time. Because a recording has no commands, only a log proves that
 //! simulated time advanced as commanded.
 
 use serde::Serialize;

@@ -1,7 +1,8 @@
 //! The ROS 2 messages on the wire, field for field as `msgs/` and the standard packages define them.
 //!
-//! A message of a header and one of the program's layouts nests the layout: on the wire a nested struct is its fields
-//! in order.
+//! A message of a header and one of the program's layouts nests the layout, because on the wire a nested struct is its
+//! fields in order. The ROS 2 transport and the recorder share these messages, so that a recording has the same
+//! messages as a ROS 2 subscriber.
 
 pub mod diagnostics;
 pub mod markers;

@@ -2,9 +2,8 @@
 //!
 //! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, with two lines for
 //! each ten seconds. Their tags are `lateness` and `step`, their values nanoseconds. Each histogram is encoded as V2
-//! and compressed. HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read the file.
-//! The sum over all lines of a tag is the distribution of the percentiles in the run's summary. The command `run` calls
-//! this module for `soak`.
+//! and compressed, so that HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read the
+//! file. The sum over all lines of a tag is the distribution of the percentiles in the run's summary.
 
 use std::fs::File;
 use std::io::{self, Write};

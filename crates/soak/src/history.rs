@@ -1,4 +1,4 @@
-//! A soak test's figures over time, in bounded memory. Filled once a second, read by the report.
+//! A soak test's figures over time, in bounded memory.
 
 use serde::Serialize;
 

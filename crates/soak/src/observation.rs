@@ -1,7 +1,7 @@
 //! The observation of a subscriber process, which the process prints once a second and the soak test reads.
 //!
 //! In: counts and percentiles from the [`observer`](super::observer). Out: JSON through a pipe; sums over the processes
-//! of a subscriber. Used by the [`fleet`](super::fleet), the verdict and the report.
+//! of a subscriber.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
-//! The error at the time of display against bytes per second. This is the gain of a publishing rate for readers that
+//! The error at the time of display against bytes per second: the gain of a higher publishing rate, for readers that
 //! hold, and for readers with linear or Hermite interpolation.
 //!
 //! In: a scene, its timeline, a display. Out: one [`DisplayMeasurement`] per reader, rate and precision. The stream is
-//! simulated: every frame arrives at its deadline, so transport adds neither delay nor jitter. No clock is read: the
+//! simulated: every frame arrives at its deadline, so transport adds neither delay nor jitter. No clock is read, so the
 //! same scene gives the same errors.
 
 use serde::Serialize;

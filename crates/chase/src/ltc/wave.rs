@@ -1,7 +1,7 @@
 //! Sound as `arecord`, `ffmpeg` and files have it: RIFF WAVE. In: a stream of bytes. Out: samples of the first channel.
 //!
-//! A program that records into a pipe does not know the length of its sound, and writes 0 or the greatest number. So
-//! the samples continue to the end of the stream.
+//! A program that records into a pipe does not know the length of its sound, and writes 0 or the greatest number
+//! instead. So the samples continue to the end of the stream, whatever length is stated.
 
 use std::io::{self, ErrorKind, Read};
 

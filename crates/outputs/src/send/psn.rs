@@ -1,9 +1,9 @@
 //! The packets of PosiStageNet 2.03 (VYV and MA Lighting, "PosiStageNet protocol description v2.03", 2019). In:
-//! trackers, names, timestamps. Out: the bytes of UDP packets. Pure; called by the [`sender`](super::psn_sender).
+//! trackers, names, timestamps. Out: the bytes of UDP packets. Pure.
 //!
 //! All is little-endian. A chunk is a header of 32 bits and its content. Bits 0 to 15 of the header are its id, and
 //! bits 16 to 30 the length of the content. Bit 31 is set if the content is chunks. A frame is split into packets that
-//! all have its number and their count. A receiver puts them together, so they are sent back to back.
+//! all have its number and their count. They are sent back to back, because a receiver puts them together.
 
 /// The greatest size of a packet: an Ethernet frame of 1,500 bytes without the headers of IP and UDP. The protocol
 /// allows 1,500 bytes, which would be fragmented.

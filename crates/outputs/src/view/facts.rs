@@ -1,7 +1,7 @@
-//! Facts about scenes that no publisher sends, since they take time to compute.
+//! Facts about scenes that no publisher sends, because they take time to compute.
 //!
-//! In: the text of a scene, and the function that computes. Out: the facts, by the hash of the text. The command has
-//! the function, so that this crate needs no solver; the reader of each publisher requests the facts of its scene.
+//! In: the text of a scene, and the function that computes. Out: the facts, by the hash of the text. The function is a
+//! parameter, so that this crate needs no solver. The reader of each publisher requests the facts of its scene.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError, RwLock};

@@ -1,6 +1,6 @@
-//! The output file of a recording. A failed flush leaves the file as it was before the flush. A kill during a flush can
-//! leave a part of its bytes. Disk space is reserved in advance, so that a full disk still has room for the end of the
-//! file.
+//! The output file of a recording. A failed flush leaves the file as it was before the flush, while a kill during a
+//! flush can leave a part of its bytes. Disk space is reserved in advance, so that a full disk still has room for the
+//! end of the file.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};

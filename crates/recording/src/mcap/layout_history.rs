@@ -1,5 +1,5 @@
-//! The layouts of earlier versions, found by the fields of a recording's types: a bag of `ros2 bag record` names no
-//! version of this program.
+//! The layouts of earlier versions, found by the fields of a recording's types, because a bag of `ros2 bag record`
+//! names no version of this program.
 //!
 //! In: the type of a topic, as a recording describes it. Out: the name of its layout.
 

@@ -2,7 +2,8 @@
 //!
 //! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics, or a bag of several. Out:
 //! a [`Recording`], which has frames of a known type; then [`Item`]s, chunk by chunk, in the order of the files. That
-//! is the order of reception: log times decrease if the recording machine's clock was set back.
+//! is the order of reception, which can differ from the order of log times if the recording machine's clock was set
+//! back.
 
 use std::collections::HashMap;
 use std::fmt::Display;

@@ -2,7 +2,7 @@
 //!
 //! In: the bytes of the file. Out: a complete file with the messages of the finished chunks, in order, the attachments
 //! and the metadata. A file without chunks keeps its messages. Records are read one after another. Behind a damaged
-//! length the next record is the next chunk or attachment whose own lengths and check agree: the repair needs no
+//! length the next record is the next chunk or attachment whose own lengths and check agree, so the repair needs no
 //! readable summary.
 
 use std::collections::BTreeMap;

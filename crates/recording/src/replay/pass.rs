@@ -1,8 +1,8 @@
 //! The frames of a recording from a start to its end, each with its alerts and cues.
 //!
-//! A recorder may receive an alert a little before or after its frame. Frames of a chunk are therefore returned after
-//! the next chunk has been read. A later file of a bag may begin with the alert and the cue that hold: they are not
-//! sent twice.
+//! A recorder may receive an alert a little before or after its frame, so the frames of a chunk are returned after the
+//! next chunk has been read. A later file of a bag may begin with the alert and the cue that hold; they are not sent
+//! twice.
 
 use std::collections::VecDeque;
 
