@@ -16,7 +16,7 @@ use super::{CommandError, Common, Output, number};
 pub struct ControlArguments {
     #[command(subcommand)]
     action: Action,
-    /// Longest wait for the answer, seconds; by default 30, and for a step as long as it makes progress
+    /// The longest wait for the answer, in seconds; by default 30, and for a step as long as it makes progress
     #[arg(long, value_name = "SECONDS", global = true, allow_negative_numbers = true)]
     timeout: Option<f64>,
 }
@@ -38,7 +38,7 @@ enum Action {
     },
     #[command(about = Command::Seek(1.0).entry().help, allow_negative_numbers = true)]
     Seek {
-        /// Seconds since the start of the scene
+        /// The time in seconds since the start of the scene
         time: f64,
     },
     #[command(about = Command::Step(1).entry().help, allow_negative_numbers = true)]

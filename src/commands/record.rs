@@ -54,7 +54,7 @@ pub struct RecordArguments {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
-    /// Mend a recording that was cut: keep every finished chunk, in FILE-recovered.mcap or the --output
+    /// Repair a recording that was cut: keep every finished chunk, in FILE-recovered.mcap or the --output
     #[arg(long, value_name = "FILE")]
     recover: Option<PathBuf>,
 }

@@ -33,7 +33,7 @@ pub struct ReplayArguments {
     /// The recording (MCAP) to play, or the directory that `ros2 bag record` wrote
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Send the frames evenly at this rate, in place of at their recorded times
+    /// Send the frames evenly at this rate, instead of at their recorded times
     #[arg(
         long,
         value_name = "HZ",
@@ -51,7 +51,7 @@ pub struct ReplayArguments {
     /// Wall time after which to end: 60, 90s, 5m, 8h
     #[arg(long, value_name = "TIME", value_parser = super::wall_seconds, help_heading = "The show")]
     duration: Option<f64>,
-    /// Begin again whenever the recording is over
+    /// Begin again whenever the recording has ended
     #[arg(long = "loop", help_heading = "The show")]
     looping: bool,
     /// Publish ROS 2 topics too, those of --scene's [publish.ros2], or of the recorded scene, or the default ones

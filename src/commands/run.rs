@@ -32,13 +32,13 @@ const LEAD_NS: u64 = 100_000_000;
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
 pub struct RunArguments {
-    /// Frames per second; by default the scene's
+    /// The rate in frames per second; by default the scene's
     #[arg(long, value_name = "HZ", help_heading = "The show", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Simulated seconds per second of wall time
     #[arg(long, value_name = "X", default_value_t = 1.0, help_heading = "The show", allow_negative_numbers = true)]
     time_scale: f64,
-    /// Simulated seconds at which the show begins
+    /// The simulated time at which the show begins, in seconds
     #[arg(
         long,
         value_name = "SECONDS",

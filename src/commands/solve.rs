@@ -16,7 +16,7 @@ pub struct SolveArguments {
     /// Simulated seconds, or contact, obstacle, stall, lock, path_end; several separated by commas
     #[arg(long, value_name = "TIMES", value_delimiter = ',', group = "times", allow_negative_numbers = true)]
     at: Vec<String>,
-    /// Simulated seconds between two rows; with --until
+    /// The simulated time between two rows, in seconds; with --until
     #[arg(long, value_name = "SECONDS", group = "times", requires = "until", allow_negative_numbers = true)]
     every: Option<f64>,
     /// The first time of --every

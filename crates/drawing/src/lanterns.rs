@@ -1,8 +1,8 @@
 //! The lantern look: the stage at night in the light of the dragon's lanterns, without script and without filter.
 //!
 //! The look is that of the page's show (`crates/outputs/src/view/lanterns.js`). Light on the ground is a mask over
-//! paving. Pools of light are white circles in the mask, because circles that cover one another look as if their light
-//! added up. The boards are the true rectangles.
+//! paving. Pools of light are white circles in the mask, which cover one another in the way that light adds up.
+//! The boards are the true rectangles.
 
 use svg::node::element::{
     Circle, Definitions, Ellipse, Group, Line, Mask, Path, Pattern, RadialGradient, Rectangle, Stop, Use,
