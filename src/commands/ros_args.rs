@@ -109,7 +109,8 @@ fn name_option(own: &[OsString]) -> String {
 /// Returns the parameters of a node in a file as launch_ros writes it, each with its line, as `NAME:=VALUE`.
 ///
 /// # Errors
-/// Bad input: no file, another form of YAML. As in rclcpp, a file for other nodes is none.
+/// Bad input: a file that cannot be read, or another form of YAML. As in rclcpp, a file for other nodes sets no
+/// parameters.
 fn parameters(file: &str, node: &str) -> Result<Vec<(usize, String)>, CommandError> {
     let bad = |sentence: String| CommandError::BadInput(format!("{BEGIN} --params-file: {file}{sentence}"));
     let text = read(file).map_err(|error| bad(format!(": {error}, expected a file of parameters (YAML)")))?;

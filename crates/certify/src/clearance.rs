@@ -300,7 +300,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         };
         self.latest = match event.kind {
             EventKind::PathEnd => self.end,
-            // The certificate ends by a time that is rounded down. A place after it would show nothing.
+            // The certificate ends by a time that is rounded down, so a place after that time would show nothing.
             _ => {
                 let last = self.chain.exact.travelled(self.grid_point(self.end).head).lo.min(self.end);
                 let delayed = self.part.delay * motion.head_speed();

@@ -70,7 +70,7 @@ impl Serialize for Place {
 }
 
 /// A curve of the path. The coordinate of a spiral is the polar angle. `shift` is the distance from the centre in units
-/// of a, minus the polar angle. It is 0 except for turnarounds that are turned, see [`ExactPath::turnaround`].
+/// of a, minus the polar angle, which is 0 except for turnarounds that are turned: see [`ExactPath::turnaround`].
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Curve {
     Inward { a: Interval, shift: Interval, frame: Option<Frame> },
@@ -458,8 +458,8 @@ impl ExactPath {
         Place(segment, if curve.grows() { end.lo.next_down() } else { end.hi.next_up() }, 0.0)
     }
 
-    /// Returns a place between two: the middle on one segment, else the end of the earlier segment or the beginning of
-    /// the later one. `None` if there is none.
+    /// Returns a place between two: the middle if both are on one segment, and otherwise the end of the earlier segment
+    /// or the beginning of the later one. Returns `None` if there is none.
     pub fn between(&self, x: Place, y: Place) -> Option<Place> {
         if x.0 == y.0 {
             let middle = x.middle(y);

@@ -57,8 +57,8 @@ impl<'a> Turns<'a> {
         Self { team, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
     }
 
-    /// Returns true if, with every radius, a link that passes over `pivot` with one handle surely stalls or locks. The
-    /// other handle is between `pivot` and `end`. A lock has `end` ahead of `pivot`, a stall has `end` behind it.
+    /// Returns true if, with every radius, a link that passes over `pivot` with one handle is certain to stall or lock.
+    /// The other handle is between `pivot` and `end`. For a lock `end` is ahead of `pivot`, for a stall behind it.
     pub fn fold(&self, link: usize, pivot: Place, end: Place) -> bool {
         let exact = &self.exact;
         if !exact.is_inside(pivot) || !exact.is_inside(end) || pivot == end {

@@ -443,8 +443,8 @@ impl Connection {
         first.or_else(|| self.poses.receive().ok().flatten())
     }
 
-    /// Selects the publisher of the next frame, if none is selected and a frame has come. Every publisher sends frames
-    /// all the time, also while paused.
+    /// Selects the publisher of the next frame, if none is selected and a frame has come. This always finds a publisher
+    /// that runs, because publishers send frames all the time, also while paused.
     fn decide(&mut self) {
         if matches!(self.selection, Selection::Undecided { .. })
             && let Some(sample) = self.next_frame()

@@ -105,9 +105,9 @@ pub struct ClearanceCounters {
 /// The live method: the same result as [`least_clearance_all_pairs`], from a few pairs.
 ///
 /// The present clearance of the previous nearest pair is the first limit. With a table, only pairs whose bound is
-/// within the limit are tested: most often none. The bounds hold for every frame, so that jumps of the show do no harm.
-/// Without a table, every bench carries a bound from frame to frame, lowered by the displacement of the handles. All
-/// memory is reserved by the constructor.
+/// within the limit are tested, which are most often none. The bounds hold for every frame, so jumps of the show do no
+/// harm. Without a table, every bench carries a bound from frame to frame, lowered by the displacement of the handles.
+/// All memory is reserved by the constructor.
 #[derive(Debug, Clone)]
 pub struct ClearanceMonitor {
     team: Team,

@@ -105,9 +105,9 @@ pub struct ConservativeAdvancement<'a> {
 }
 
 impl<'a> ConservativeAdvancement<'a> {
-    /// Creates the searches for `team` on `path`. `head_turns` are the metres of travel of the head at which handle 1
-    /// turns round. `body_turns` are the metres of travel of a body link's front handle at which its rear handle does.
-    /// Both are in order.
+    /// Creates the searches for `team` on `path`. `head_turns` are the places of the head, in metres of travel, at
+    /// which handle 1 turns round, and `body_turns` the places of a body link's front handle at which its rear handle
+    /// does. Both are in order.
     pub fn new(path: &'a Path, team: &'a Team, head_turns: &[f64], body_turns: &[f64]) -> Self {
         let places = |turns: &[f64]| turns.iter().map(|travelled| path.param_at(*travelled)).collect();
         let mut curves = Vec::with_capacity(path.segments());

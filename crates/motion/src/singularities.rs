@@ -32,8 +32,8 @@ use super::event::{Budget, Event};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
 
-/// Units in the last place before a lock. Rounding can make a handle jump within the last `JUMP_DIGITS`. `SAFE_DIGITS`
-/// more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
+/// Margins before a lock, in units in the last place. Rounding can make a handle jump within the last `JUMP_DIGITS`;
+/// `SAFE_DIGITS` more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
 const JUMP_DIGITS: u32 = 256;
 const SAFE_DIGITS: u32 = 32;
 const UNTOUCHED_DIGITS: u32 = 1024;

@@ -17,7 +17,7 @@ const ROUNDS: usize = 3;
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
 
-/// A handle: `point` + tau `velocity`, and an error. For two dragons tau is a time, and rates are metres per second.
+/// A handle: `point` + tau `velocity`, and an error. For two dragons tau is a time, so rates are in metres per second.
 #[derive(Debug, Clone)]
 pub(super) struct Handle {
     /// p(m), t(m).

@@ -82,8 +82,8 @@ struct Together {
     links: u64,
 }
 
-/// Returns true if a head is surely in a span from one time to another. The head stands at the start before its delay
-/// has passed, and at the path's end.
+/// Returns true if a head is certain to be in a span from one time to another. The head stands at the start until its
+/// delay has passed, and then again at the path's end.
 fn is_in_span(scene: &Scene, Span(lo, hi): Span, from: &Interval, to: &Interval) -> bool {
     scene.path.travelled(lo).is_at_most(&scene.travelled_at(from))
         && (scene.path.is_at_end(hi) || scene.travelled_at(to).is_at_most(&scene.path.travelled(hi)))

@@ -239,7 +239,7 @@ impl Reports {
 
 /// Publishes one frame in each period until `stop` is set or the periods are over.
 ///
-/// A frame is computed in its period, however late. A period that has wholly passed is skipped and counted. Later
+/// A frame is computed in its period, however late. A period that has wholly passed is skipped and counted, and later
 /// deadlines do not shift.
 ///
 /// # Errors

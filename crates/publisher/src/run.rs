@@ -186,7 +186,7 @@ impl Publishing<'_> {
     }
 
     /// Waits for [`lead_ns`](Self::lead_ns) and for [`awaited`](Self::awaited), or until `stop` is set. Returns false
-    /// if the wait for `awaited` was in vain.
+    /// if `awaited` did not come.
     fn wait_for_subscribers(
         &self,
         clock: &impl Clock,

@@ -261,8 +261,8 @@ impl Scene {
     }
 }
 
-/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is no TOML has none: its errors
-/// are the errors of a scene of one dragon.
+/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is not TOML has none, so its
+/// errors are those of a scene of one dragon.
 fn several(text: &str) -> Option<Spanned<serde::de::IgnoredAny>> {
     // Most scenes have one dragon, and are read once.
     text.contains("dragons").then(|| toml::from_str::<Probe>(text).ok()?.dragons).flatten()

@@ -123,7 +123,7 @@ fn written(found: &LeastPitch, proof: Proof, radius: f64, scene: &str, write: Wr
 /// A function that proposes the least pitch between two with which the radius might be reached.
 type Propose<'p> = &'p mut dyn FnMut(f64, f64, &mut dyn FnMut(f64)) -> Proposal;
 
-/// Encloses the least pitch with any proposals. Wrong proposals only cost time. `keeps` requests the lines of the
+/// Encloses the least pitch with any proposals; wrong proposals only cost time. `keeps` requests the lines of the
 /// intervals.
 fn decided(
     team: &Team,

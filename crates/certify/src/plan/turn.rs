@@ -12,8 +12,8 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
-/// The least radius of a turnaround with which a team turns round. The head comes in from any distance. Until the last
-/// handle has left the turn, no two boards touch that share no handle, and no link stalls or locks. Radii above
+/// The least radius of a turnaround with which a team turns round, when the head comes in from any distance: until the
+/// last handle has left the turn, no two boards that share no handle touch, and no link stalls or locks. Radii above
 /// `value_hi` are not covered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastTurn {

@@ -117,7 +117,7 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
     fn clearance(&self, at: &Self::Bodies, pair: Self::Pair) -> f64;
 
     /// Records the deepest pair if it touches, or the nearest pair if it is below the least clearance so far. With
-    /// obstacles, the pair of each obstacle is recorded. Returns true if nothing is left to search.
+    /// obstacles, the pair of each obstacle is recorded. Returns true if the search is finished.
     fn record(&mut self, at: &Self::Bodies, pairs: &[Self::Pair]) -> Result<bool, Halt>;
 
     /// Searches from one coordinate to another. Returns the coordinate up to which the result is proved.
@@ -130,8 +130,8 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
         }
     }
 
-    /// Goes from `start` to `to` in steps, until nothing is left to search. A step without uncertain pairs doubles the
-    /// next; others are halved, and shorten it.
+    /// Goes from `start` to `to` in steps, until the search is finished. After a step without uncertain pairs the next
+    /// is twice as long; other steps are halved, and the next ones are shorter.
     fn advance(&mut self, start: Self::Bodies, to: f64) -> Result<(), Halt> {
         let (from, unit) = (Self::coordinate(&start), self.step_unit());
         let least = self.state().goal == Goal::Least;
@@ -165,7 +165,7 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
     }
 
     /// Halves a step, the earlier half first, until its pairs are certain or the doubles are exhausted. Returns true if
-    /// nothing is left to search.
+    /// the search is finished.
     fn narrow(&mut self, before: &Self::Bodies, after: &Self::Bodies, pairs: &[Self::Pair]) -> Result<bool, Halt> {
         if pairs.is_empty() {
             return Ok(false);

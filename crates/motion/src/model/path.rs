@@ -60,8 +60,8 @@ struct Placed {
     begin: f64,
     /// The travel at which it ends, in metres.
     end: f64,
-    /// Coordinate of its beginning. For the first segment: of the head's start or of the segment's end, whichever is
-    /// earlier. And the metres of travel there.
+    /// The coordinate of its beginning and the travel there, in metres. For the first segment this is the head's start
+    /// or the segment's end, whichever is earlier.
     anchor: Coordinate,
     anchor_travelled: f64,
     /// Coordinate of its end.

@@ -310,9 +310,9 @@ impl Curve for Spiral {
     }
 
     /// On the outward spiral, let the front handle be at theta and the rear one at theta - d. Then chord^2 = (a d)^2 +
-    /// 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta for fixed d. So
-    /// where that inequality holds at the follower it holds at all smaller d; d falls as theta grows, and it continues
-    /// to hold. The rear cosine is positive there, and the front one (see `pose`) is larger.
+    /// 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta for fixed d. So if
+    /// that inequality holds at the follower, it holds at all smaller d; and because d falls as theta grows, it
+    /// continues to hold. There the rear cosine is positive, and the front one (see `pose`) is larger.
     fn is_steady(&self, front: Coordinate, rear: Coordinate) -> bool {
         let d = front.minus(rear);
         self.direction == Direction::Outward && d < PI && tan(0.5 * d) < rear.high

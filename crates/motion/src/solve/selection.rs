@@ -94,8 +94,8 @@ impl Selection {
     }
 }
 
-/// Returns the cheapest table for `accuracy` metres, or the most exact table if none meets the accuracy. Returns `None`
-/// if there is no table for this team and path.
+/// Returns the cheapest table for `accuracy` metres, or the most exact table if none meets the accuracy, or `None` if
+/// there is no table for this team and path.
 ///
 /// Positions are within max(accuracy, 8 eps (r + distance travelled)), headings within 2 accuracy / link, and
 /// velocities within 10 accuracy / link of a handle's speed. So extrapolation over a tenth of a link adds one accuracy.

@@ -40,8 +40,8 @@ pub enum VerifyError {
 /// The result of `verify`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// `same`: every bit. `close`: on a machine with another arithmetic, every position within the tolerance.
-    /// `differs`. `nothing`: the log has no second to compare.
+    /// `same`: every bit is the same. `close`: the machine has another arithmetic, and every position is within the
+    /// tolerance. `differs`: neither. `nothing`: the log has no second to compare.
     pub verdict: &'static str,
     /// The first difference.
     pub difference: Option<Difference>,

@@ -134,7 +134,7 @@ impl Pass {
         Ok(self.frames.pop_front())
     }
 
-    /// Reads a chunk. Keeps nothing of a damaged chunk.
+    /// Reads a chunk. If the chunk is damaged, nothing of it is kept.
     fn read_chunk(&mut self, recording: &mut Recording) {
         let (mut frames, mut alerts, mut cues) = (VecDeque::new(), Vec::new(), Vec::new());
         let read = recording.read_chunk(self.next_chunk, &mut |item| match item {

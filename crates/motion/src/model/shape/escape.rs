@@ -234,8 +234,8 @@ impl Avoided<'_> {
 }
 
 impl Shape {
-    /// Returns the length of the least translation that frees a board, metres; infinite if there is none. The board and
-    /// the shape overlap. Returns a length of at most `limit` if the least one is.
+    /// Returns the length of the least translation that frees a board, in metres, or infinity if there is none. The
+    /// board and the shape overlap. If the least length is at most `limit`, the result is at most `limit`.
     pub(super) fn least_escape(&self, board: &Board, limit: f64) -> f64 {
         match self.convex {
             Some(sense) => self.convex_escape(board, sense),

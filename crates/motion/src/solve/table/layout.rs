@@ -93,9 +93,9 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize)
     kinks
 }
 
-/// Returns the metres that the head has travelled when a handle behind it crosses a junction. The list covers every
-/// junction and these handles, as far as handles have one place each. At these places frames have kinks. The list does
-/// not depend on a table.
+/// Returns the places of the head, in metres of travel, at which a handle behind it crosses a junction, because frames
+/// have kinks there. The list covers every junction and all handles that have only one place each. It does not depend
+/// on a table.
 pub(super) fn crossings(track: &Track, team: &Team) -> Vec<f64> {
     let path = track.path;
     let of_segment = |segment: usize| {

@@ -106,9 +106,9 @@ impl Durations {
         Self { lateness: histogram(), step: histogram() }
     }
 
-    /// Records a sample. A late wake-up counts for each period that it covers, with the lateness that remains there:
-    /// HdrHistogram's correction for coordinated omission. In a very late wake-up, neighbouring periods share an
-    /// entry, so that a stop of an hour costs little time here.
+    /// Records a sample. A late wake-up counts for each period that it covers, with the lateness that remains there,
+    /// which is HdrHistogram's correction for coordinated omission. In a very late wake-up neighbouring periods share
+    /// an entry, so that a stop of an hour costs little time here.
     pub fn record(&mut self, sample: &Sample, period_ns: u64) {
         let values = (sample.lateness_ns / period_ns).max(1);
         let stride = values.div_ceil(MOST_ENTRIES);

@@ -26,7 +26,7 @@ pub(super) struct FrameService {
     pub(super) service: &'static str,
     /// Poses in a frame.
     pub(super) poses: usize,
-    /// The decimation of the handles, which becomes the service's attribute [`EVERY`]. `None` for all handles. A
+    /// The decimation of the handles, which becomes the service's attribute [`EVERY`], or `None` for all handles. A
     /// service that others keep open must have the same attribute.
     pub(super) every: Option<usize>,
 }
