@@ -185,8 +185,8 @@ struct Records<Input> {
     body: Vec<u8>,
     /// No chunk that is still to be found begins before this byte.
     searched: u64,
-    /// Bytes of possible chunks that may still be read in vain: a search costs no more than another reading of the
-    /// file.
+    /// Bytes of possible chunks that may still be read without success: a search costs no more than another reading of
+    /// the file.
     allowed: u64,
 }
 
