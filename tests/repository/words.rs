@@ -77,8 +77,8 @@ const PHRASES: [(&str, &str); 17] = [
 /// Words that stand in the place of a noun at the beginning of a paragraph.
 const NOT_NOUNS: [&str; 7] = ["What", "Whatever", "Those", "How", "Which", "Whose", "Who"];
 
-/// The most words of a sentence. A code span is one word. This is no aim: a reason keeps its "because" and a consequence
-/// its "so". The limit only finds sentences that have run away.
+/// The most words of a sentence. A code span is one word. Shorter is no aim: a reason keeps its "because", and a
+/// consequence its "so". The limit only finds sentences that have run away.
 const MOST_WORDS: usize = 35;
 
 /// Returns all files below a folder.

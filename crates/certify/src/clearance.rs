@@ -27,14 +27,14 @@ use bench_dragon_motion::timeline::{TimedEvent, TimedObstacleClearance};
 use beside::{Beside, UpperBeside};
 pub(super) use certificate::first_line as clearance_first_line;
 
-/// Width of the enclosure in metres, with room for the rounding of both ends.
+/// The width of the enclosure in metres, with room for the rounding of both ends.
 const WIDTH: f64 = 0.9e-9;
 
 /// The difference, in metres, by which a new upper bound must be lower than the one before.
 const LOWER: f64 = 1e-3 * WIDTH;
 
-/// Factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and later
-/// shrinks. Steps close to the longest need more attempts, but make the certificate shorter.
+/// The factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and
+/// later shrinks. Steps close to the longest need more attempts, but make the certificate shorter.
 const GROWTH: f64 = 1.1;
 const SHRINK: f64 = 0.8;
 const SHRINK_FURTHER: f64 = 0.5;
@@ -45,37 +45,37 @@ const LEAST_STEP: f64 = 1e-14;
 /// Rounding error of the show's end, as a share of the path length in metres.
 const END_SLACK: f64 = 1e-13;
 
-/// Margin of an upper bound before the end of a show, unless the show ends with the path. The margin is the sum of a
-/// share of the travel and a number of distances of grid points.
+/// The margin of an upper bound before the end of a show, unless the show ends with the path. The margin is the sum of
+/// a share of the travel and a number of distances of grid points.
 const BEFORE_TIME: f64 = 4e-14;
 const GRID: f64 = 8.0;
 
-/// Distances in metres before a lock at which the search may stop, tried in this order. The nearer the stop, the less
-/// the lost handle can still move.
+/// The distances in metres before a lock at which the search may stop, tried in this order. The nearer the stop, the
+/// less the lost handle can still move.
 const BEFORE_LOCK: [f64; 3] = [1e-9, 3e-11, 1e-12];
 
-/// Distance behind a contact, in links, at which boards are expected to overlap surely.
+/// The distance behind a contact, in links, at which boards are expected to overlap surely.
 const TOUCH: f64 = 1e-3;
 
-/// Default limit of steps.
+/// The default limit of steps.
 pub const MOST_CLEARANCE_STEPS: u64 = 100_000;
 
 /// An enclosure of the least clearance of a show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClearanceEnclosure {
-    /// Lower bound in metres, for all boards that share no handle, from the start up to `until`.
+    /// The lower bound in metres, for all boards that share no handle, from the start up to `until`.
     pub lo: f64,
-    /// Upper bound in metres: two boards are as near at one place of the show.
+    /// The upper bound in metres: two boards are as near at one place of the show.
     pub hi: f64,
-    /// Travel of the head at that place in metres, approximate.
+    /// The travel of the head at that place in metres, approximate.
     pub travelled: f64,
     /// The bench of the two that is nearer the head, counted from 0.
     pub bench_a: usize,
     /// The other bench.
     pub bench_b: usize,
-    /// Travel in metres up to which `lo` is proved, if not up to the show's end.
+    /// The travel in metres up to which `lo` is proved, if not up to the show's end.
     pub until: Option<f64>,
-    /// Number of steps tried.
+    /// The number of steps tried.
     pub steps: u64,
 }
 
@@ -84,24 +84,24 @@ pub struct ClearanceEnclosure {
 pub struct ObstacleEnclosure {
     /// The obstacle's number on the stage, the boundary last.
     pub obstacle: usize,
-    /// Lower bound in metres, for all boards, from the start up to `until`.
+    /// The lower bound in metres, for all boards, from the start up to `until`.
     pub lo: f64,
-    /// Upper bound in metres: the bench's clearance is no more at one place of the show.
+    /// The upper bound in metres: the bench's clearance is no more at one place of the show.
     pub hi: f64,
-    /// Travel of the head at that place in metres, approximate.
+    /// The travel of the head at that place in metres, approximate.
     pub travelled: f64,
     /// The bench, counted from 0.
     pub bench: usize,
-    /// Travel in metres up to which `lo` is proved, if not up to the show's end.
+    /// The travel in metres up to which `lo` is proved, if not up to the show's end.
     pub until: Option<f64>,
 }
 
 /// The least clearances that the ordinary search has found. They only suggest where to search.
 #[derive(Debug, Clone, Copy)]
 pub struct ClearanceHints<'h> {
-    /// Least clearance of two boards; `None` to enclose only the clearances of the obstacles.
+    /// The least clearance of two boards; `None` to enclose only the clearances of the obstacles.
     pub boards: Option<&'h LeastClearance>,
-    /// Least clearance of each obstacle.
+    /// The least clearance of each obstacle.
     pub obstacles: &'h [TimedObstacleClearance],
 }
 
@@ -205,9 +205,9 @@ pub(super) struct Descent<'a, 'w> {
     step: f64,
     steps: u64,
     most_steps: u64,
-    /// Travel at the end of the show, metres.
+    /// The travel at the end of the show, in metres.
     end: f64,
-    /// Travel up to which a place may show an upper bound, metres.
+    /// The travel up to which a place may show an upper bound, in metres.
     latest: f64,
     /// The upper bound that is known. Boards are tested only if this or `floor` is set.
     upper: Option<Upper>,

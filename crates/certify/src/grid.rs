@@ -20,7 +20,7 @@ pub(super) struct Handle {
 /// A place of the head, and as many handles as were needed.
 #[derive(Debug, Clone)]
 pub(super) struct GridPoint {
-    /// Travel in metres, approximate.
+    /// The travel in metres, approximate.
     pub travelled: f64,
     pub head: Place,
     pub handles: Vec<Handle>,

@@ -99,7 +99,7 @@ impl Barrier {
         shape.kind() == ShapeKind::Circle || clearance + keep_out > -DEEPEST
     }
 
-    /// Returns an upper bound of the clearance of a board, metres.
+    /// Returns an upper bound of the clearance of a board, in metres.
     pub fn at_most(&self, board: &FirstOrderBoard, when: When) -> f64 {
         let Self { obstacle: Obstacle { shape, keep_out, .. }, rounding } = self;
         let in_doubles = board.in_doubles();

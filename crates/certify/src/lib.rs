@@ -47,7 +47,7 @@ use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::timeline::Timeline;
 
-/// Default limit of steps: some minutes, and hundreds of megabytes.
+/// The default limit of steps: some minutes, and hundreds of megabytes.
 pub const MOST_STEPS: u64 = 400_000;
 
 /// The reason for a missing certificate.

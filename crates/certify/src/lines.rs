@@ -52,7 +52,7 @@ pub enum CertificateLine<'a> {
         to: Place,
         /// The spans of the handles from 1 on.
         spans: Vec<Span>,
-        /// The point, metres.
+        /// The point, in metres.
         point: [f64; 2],
     },
     /// Two boards are no further apart than a number of metres.
@@ -99,7 +99,7 @@ pub enum CertificateLine<'a> {
         to: Place,
         /// The spans of the handles from 1 on.
         spans: Vec<Span>,
-        /// A point of the board, metres.
+        /// A point of the board, in metres.
         point: [f64; 2],
     },
     /// The front product of a link is negative.
@@ -230,7 +230,7 @@ pub enum CertificateLine<'a> {
         from: f64,
         /// The greatest pitch, metres per turn.
         to: f64,
-        /// The polar angle of the head, radians.
+        /// The polar angle of the head, in radians.
         theta: f64,
         /// The two benches, counted from 0.
         benches: [usize; 2],
@@ -422,9 +422,9 @@ pub struct CertifiedEvent {
 pub enum Status {
     /// The first event of this kind is between two times.
     Proved {
-        /// Earliest time, simulated seconds.
+        /// Earliest time, in simulated seconds.
         time_lo: f64,
-        /// Latest time, simulated seconds.
+        /// The latest time, in simulated seconds.
         time_hi: f64,
         /// The bench that stalls or locks, or the first of two that touch, at the latest time; counted from 0.
         bench_a: Option<usize>,

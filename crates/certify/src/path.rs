@@ -107,7 +107,7 @@ pub(super) struct Segment {
     pub curve: Curve,
     pub begin: Interval,
     pub end: Interval,
-    /// Travel of the head at the segment's start, metres; for the first segment, at its end.
+    /// The travel of the head at the segment's start, in metres; for the first segment, at its end.
     travelled: Interval,
 }
 
@@ -534,7 +534,7 @@ impl ExactPath {
         (x.0 == y.0).then(|| self.curve(x).bend_rate(x.coordinate(), y.coordinate()))
     }
 
-    /// Returns the travel of the head at a place, metres.
+    /// Returns the travel of the head at a place, in metres.
     pub fn travelled(&self, place: Place) -> Interval {
         let Segment { curve, begin, end, travelled } = &self.segments[place.0];
         let at = place.coordinate();

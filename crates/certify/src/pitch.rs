@@ -23,11 +23,11 @@ use bench_dragon_motion::model::team::Team;
 pub(crate) struct Pitches<'a> {
     /// The team.
     pub team: &'a Team,
-    /// Least pitch, metres per turn.
+    /// The least pitch, metres per turn.
     pub from: f64,
-    /// Greatest pitch, metres per turn.
+    /// The greatest pitch, metres per turn.
     pub to: f64,
-    /// Polar angle of the head's front handle, radians.
+    /// Polar angle of the head's front handle, in radians.
     pub theta: f64,
     /// Two benches that share no handle, counted from 0, the one nearer the head first.
     pub benches: [usize; 2],

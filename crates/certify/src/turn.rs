@@ -166,7 +166,7 @@ impl<'a> Turns<'a> {
         (first.0 + 1 == last.0).then(|| [hull(0), hull(1)])
     }
 
-    /// Returns an upper bound of the distance of a radius from the middle one, metres.
+    /// Returns an upper bound of the distance of a radius from the middle one, in metres.
     fn half_width(&self) -> f64 {
         (self.radius - Interval::point(self.radius.middle())).magnitude()
     }
@@ -192,7 +192,7 @@ struct Fold<'a> {
     /// The tangent at the pivot, towards the other handle.
     tangent: Vector,
     square: Interval,
-    /// Number of stretches that may still be tested.
+    /// The number of stretches that may still be tested.
     left: Cell<u32>,
 }
 
@@ -229,7 +229,7 @@ pub(crate) struct Passage {
     description: PathDescription,
 }
 
-/// Factor by which the way out grows until the whole team has turned.
+/// The factor by which the way out grows until the whole team has turned.
 const LONGER: f64 = 1.1;
 
 /// Limit of the steps of a proof.

@@ -98,7 +98,7 @@ pub struct TrackerLeader {
     pub tracker: u16,
     /// The path and the filter.
     pub track: Track,
-    /// From the sender's axes to the stage, metres.
+    /// From the sender's axes to the stage, in metres.
     pub to_stage: Box<dyn Fn([f64; 3]) -> [f64; 2]>,
     /// BLAKE3 of the text of the scene whose path this is.
     pub scene_hash: [u8; 32],

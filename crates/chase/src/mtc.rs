@@ -30,7 +30,7 @@ pub enum Event {
         /// The rate.
         rate: FrameRate,
     },
-    /// Bytes that are no valid message about timecode.
+    /// Bytes that are not a valid message about timecode.
     Malformed,
 }
 

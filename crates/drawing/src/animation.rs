@@ -15,7 +15,7 @@ use bench_dragon_motion::solve::Chain;
 /// The time for which the last sample stays before the picture starts again, in seconds.
 const HOLD: f64 = 4.0;
 
-/// Number of colours of a board.
+/// The number of colours of a board.
 const COLOURS: usize = 16;
 
 /// The greatest number of values in a countdown.
@@ -23,7 +23,7 @@ const MOST_NUMBERS: f64 = 200.0;
 
 /// The times of an animation.
 struct KeyTimes {
-    /// Number of samples, and the number of further steps for which the last one stays.
+    /// The number of samples, and the number of further steps for which the last one stays.
     samples: usize,
     held: usize,
     /// The time between samples, in seconds.

@@ -29,7 +29,7 @@ const SKULL: [[f64; 3]; 9] = [
     [1.04, 2.11, 0.215],
     [1.19, 2.13, 0.165],
 ];
-/// Places along a tuft.
+/// The places along a tuft.
 const STEPS: u32 = 6;
 
 /// The shapes of a figure with their depths.

@@ -43,7 +43,7 @@ pub use scale::mean_speeds;
 use scale::{ColourScale, Speeds};
 use swept::SweptArea;
 
-/// Width of a sheet in its own units, for any size in print or on a screen.
+/// The width of a sheet in its own units, for any size in print or on a screen.
 const WIDTH: f64 = 960.0;
 
 /// The font of all text, the same as on the page.

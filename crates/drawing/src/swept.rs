@@ -14,12 +14,12 @@ use i_overlay::core::overlay::IntOverlayOptions;
 use i_overlay::core::simplify::Simplify;
 use i_overlay::i_float::int::point::IntPoint;
 
-/// Greatest distance of the outline from the true one, metres.
+/// The greatest distance of the outline from the true one, in metres.
 pub const TOLERANCE: f64 = 1e-3;
 
-/// Greatest distance of a corner from the straight line of its step, metres. An edge that turns by an angle a within
-/// the step bulges beyond the step's polygons by up to its length times a^2 / 8. Its corners leave their lines by as
-/// much.
+/// The greatest distance of a corner from the straight line of its step, in metres. An edge that turns by an angle a
+/// within the step bulges beyond the step's polygons by up to its length times a^2 / 8. Its corners leave their lines
+/// by as much.
 const STRAIGHT: f64 = 0.1 * TOLERANCE;
 
 /// The step of the grid to which corners are rounded, in metres. On a grid, the union has no corner but the corners of

@@ -120,7 +120,7 @@ pub struct ClearanceMonitor {
     counters: ClearanceCounters,
 }
 
-/// Upper bound of the error of a link of an exact frame, metres.
+/// An upper bound of the error of a link of an exact frame, in metres.
 const EXACT_LINK_ERROR: f64 = 1e-9;
 
 impl ClearanceMonitor {

@@ -96,9 +96,9 @@ pub struct LeastClearance {
 pub struct ConservativeAdvancement<'a> {
     path: &'a Path,
     team: &'a Team,
-    /// Places of the head at which handle 1 turns round.
+    /// The places of the head at which handle 1 turns round.
     head_turns: Vec<Param>,
-    /// Places of the front handle of a body link at which its rear handle turns round.
+    /// The places of the front handle of a body link at which its rear handle turns round.
     body_turns: Vec<Param>,
     /// The index, for each segment, of the first segment of the run with the same constant curvature.
     curves: Vec<usize>,

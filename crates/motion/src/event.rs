@@ -22,7 +22,7 @@ use crate::model::Point;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Kind of the event.
+    /// The kind of the event.
     pub kind: EventKind,
     /// The distance that the head has travelled along the path since the scene's start, in metres.
     pub travelled: f64,

@@ -23,7 +23,7 @@ pub struct Obstacle {
 }
 
 impl Obstacle {
-    /// Returns the clearance of a board, metres: the signed distance to the shape minus the keep-out.
+    /// Returns the clearance of a board, in metres: the signed distance to the shape minus the keep-out.
     pub fn clearance(&self, board: &Board) -> f64 {
         self.shape.signed_distance(board) - self.keep_out
     }

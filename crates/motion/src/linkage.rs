@@ -64,7 +64,7 @@ fn march(path: &Path, from: Param, front: Point, link: f64) -> Result<Param, NoF
     Err(NoFollower)
 }
 
-/// Steps after which the search for a follower gives up: many more than a path of sensible segments needs.
+/// The steps after which the search for a follower gives up: many more than a path of sensible segments needs.
 const MOST_STEPS: usize = 100_000;
 
 /// Returns the units of the coordinate that a segment has behind a place.

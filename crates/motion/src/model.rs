@@ -19,7 +19,7 @@ pub mod shape;
 pub mod spiral;
 pub mod team;
 
-/// A place on the stage, metres.
+/// A place on the stage, in metres.
 pub type Point = nalgebra::Point2<f64>;
 /// A displacement on the stage, metres, or a direction.
 pub type Vector = nalgebra::Vector2<f64>;

@@ -32,12 +32,12 @@ use super::event::{Budget, Event};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
 
-/// Margins before a lock, in units in the last place. Rounding can make a handle jump within the last `JUMP_DIGITS`;
-/// `SAFE_DIGITS` more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
+/// The margins before a lock, in units in the last place. Rounding can make a handle jump within the last
+/// `JUMP_DIGITS`; `SAFE_DIGITS` more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
 const JUMP_DIGITS: u32 = 256;
 const SAFE_DIGITS: u32 = 32;
 const UNTOUCHED_DIGITS: u32 = 1024;
-/// Least displacement of a handle that jumps, in links: towards any other lock it moves less over those digits.
+/// The least displacement of a handle that jumps, in links: towards any other lock it moves less over those digits.
 const JUMP: f64 = 0.05;
 
 /// The singular configurations of a motion, up to the one that ends it.

@@ -26,9 +26,9 @@ pub struct Chain {
     pub heading: Vec<f64>,
     /// Signed speed along the path, metres per second, positive in the direction of travel.
     pub speed: Vec<f64>,
-    /// Velocity along x, metres per second.
+    /// Velocity along x, in metres per second.
     pub vx: Vec<f64>,
-    /// Velocity along y, metres per second.
+    /// Velocity along y, in metres per second.
     pub vy: Vec<f64>,
 }
 
@@ -108,7 +108,7 @@ impl ChainMut<'_> {
     }
 }
 
-/// The positions of the handles of a chain, metres.
+/// The positions of the handles of a chain, in metres.
 #[derive(Debug, Clone, Copy)]
 pub struct Positions<'a> {
     /// The coordinate to the right of the centre, in metres.

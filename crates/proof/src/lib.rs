@@ -80,11 +80,11 @@ pub struct Proved {
     /// The least pitch, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_pitch: Option<ProvedPitch>,
-    /// Number of steps checked.
+    /// The number of steps checked.
     pub steps: u64,
-    /// Number of links checked, in all steps.
+    /// The number of links checked, in all steps.
     pub links: u64,
-    /// Number of pairs of boards checked, in all steps.
+    /// The number of pairs of boards checked, in all steps.
     pub pairs: u64,
 }
 
@@ -183,7 +183,7 @@ struct Checker {
     /// True in the section of a dragon.
     is_in_section: bool,
     between: Option<Pair>,
-    /// Number of results before the section.
+    /// The number of results before the section.
     before: usize,
     steps: Steps,
     events: Events,

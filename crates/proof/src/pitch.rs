@@ -13,7 +13,7 @@ use super::steps::{Step, Steps};
 /// Limit of pieces on which a distance is bounded for one lock. A certificate that the search has written needs some
 /// hundred.
 const MOST_PIECES: usize = 20_000;
-/// A number above 3 pi / 2, radians.
+/// A number above 3 pi / 2, in radians.
 const THREE_QUARTERS: f64 = 4.712_388_980_384_7;
 
 /// The consequences of the lines so far.

@@ -30,8 +30,8 @@ impl Alone {
 const BEFORE_LOCK: f64 = 1e-3;
 
 impl Alone {
-    /// Returns true if the dragon locks, and a time is within [`BEFORE_LOCK`] links of travel before the end of its last
-    /// step.
+    /// Returns true if the dragon locks, and a time is within [`BEFORE_LOCK`] links of travel before the end of its
+    /// last step.
     fn locks_just_after(&self, scene: &Scene, time: f64) -> bool {
         let Some(end) = self.end.filter(|_| self.locks) else { return false };
         let end = scene.time(&scene.path.travelled(end));
@@ -60,11 +60,11 @@ pub(super) struct Pair {
     end: Option<f64>,
     all_clear: bool,
     all_apart: bool,
-    /// The end of the last stretch with a number `apart`, and the least of these numbers, metres.
+    /// The end of the last stretch with a number `apart`, and the least of these numbers, in metres.
     apart: Option<(f64, f64)>,
     /// Two benches that overlap, and seconds.
     meeting: Option<([usize; 2], f64)>,
-    /// Two benches that are no further apart than some metres at a time, seconds.
+    /// Two benches that are no further apart than some metres at a time, in seconds.
     near: Option<([usize; 2], Interval, f64)>,
     /// Counts for the report.
     pub steps: u64,

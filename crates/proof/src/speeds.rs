@@ -7,7 +7,7 @@ use super::interval::Interval;
 use super::path::{Place, Span};
 use super::scene::Scene;
 
-/// Number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
+/// The number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
 const ROUNDS: usize = 2;
 
 /// Ratios of speeds to the head's.

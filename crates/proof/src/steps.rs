@@ -25,7 +25,7 @@ pub(super) struct Step {
     pub apart: Option<f64>,
     /// Claim by obstacle: its clearance is more than these metres.
     pub beside: Vec<Option<f64>>,
-    /// Places of all listed handles with the head at one place.
+    /// The places of all listed handles with the head at one place.
     pub at: Vec<Place>,
 }
 

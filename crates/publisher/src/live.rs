@@ -30,7 +30,7 @@ const MAINTENANCE_NS: u64 = 100_000_000;
 /// Counts of a show since its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ShowCounts {
-    /// Times the show began again after its end.
+    /// The number of times that the show began again after its end.
     pub shows_played: u64,
     /// Contacts that no search had found.
     pub unforeseen_contacts: u64,

@@ -20,9 +20,9 @@ pub struct RecordingVerdict {
     pub frames: u64,
     /// The first difference.
     pub difference: Option<FrameDifference>,
-    /// The greatest distance of a handle so far, metres.
+    /// The greatest distance of a handle so far, in metres.
     pub max_difference: Option<f64>,
-    /// The tolerance of that handle, metres.
+    /// The tolerance of that handle, in metres.
     pub tolerance: Option<f64>,
 }
 

@@ -24,9 +24,9 @@ pub struct ShowTime {
     pub playback: PlaybackState,
     /// Jumps of simulated time so far: loops, seeks, restarts.
     pub epoch: u32,
-    /// Number of times that the show has ended and started again.
+    /// The number of times that the show has ended and started again.
     pub shows_played: u64,
-    /// Number of cues passed, in the order of their times.
+    /// The number of cues passed, in the order of their times.
     pub cues_passed: usize,
 }
 
@@ -109,7 +109,7 @@ impl ShowClock {
         clock
     }
 
-    /// Returns the simulated time at which the show ends, seconds.
+    /// Returns the simulated time at which the show ends, in seconds.
     pub fn freeze_time(&self) -> f64 {
         self.freeze_time
     }

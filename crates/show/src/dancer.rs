@@ -14,7 +14,7 @@ pub(crate) struct Dancer {
     /// Solves in the path's own coordinates, where the clearance has more digits.
     solver: Box<dyn Solver>,
     velocities: Velocities,
-    /// Travel of the head per second, metres; NaN if the method does not follow the path exactly.
+    /// The travel of the head per second, in metres; NaN if the method does not follow the path exactly.
     metres_per_second: f64,
     clearance: Option<ClearanceMonitor>,
     obstacles: Option<ObstacleMonitor>,
@@ -23,7 +23,7 @@ pub(crate) struct Dancer {
     pub solved: Option<(f64, bool)>,
     /// The name of the solver and the reason for its choice.
     pub reason: String,
-    /// Greatest error of a clearance, metres.
+    /// The greatest error of a clearance, in metres.
     pub clearance_error: f64,
 }
 

@@ -7,7 +7,7 @@ use bench_dragon_messages::state::EventKind;
 /// The settings for playing a scene that the command line may override.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
-    /// Start of the show, simulated seconds.
+    /// Start of the show, in simulated seconds.
     pub start: f64,
     /// Simulated seconds per second of wall time.
     pub time_scale: f64,
@@ -39,9 +39,9 @@ impl Playback {
     kind.name()
 )]
 pub struct StartError {
-    /// The requested start, simulated seconds.
+    /// The requested start, in simulated seconds.
     pub start: f64,
-    /// The end of the motion, simulated seconds.
+    /// The end of the motion, in simulated seconds.
     pub end: f64,
     /// The event that ends the motion.
     pub kind: EventKind,

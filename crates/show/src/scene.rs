@@ -43,9 +43,9 @@ use bench_dragon_ros2_messages::settings::Ros2Settings;
 
 /// The paper's scene, built into the program.
 const PAPER: &str = include_str!("../../../config/paper.toml");
-/// Default limit of subscribers of each iceoryx2 service.
+/// The default limit of subscribers of each iceoryx2 service.
 const DEFAULT_SUBSCRIBERS: usize = 8;
-/// Default wall time for which a looping show stands at its end, seconds.
+/// The default wall time for which a looping show stands at its end, in seconds.
 const DEFAULT_END_HOLD: f64 = 5.0;
 
 /// Invalid input, in one sentence that names the place and the expected value.

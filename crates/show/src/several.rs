@@ -53,12 +53,12 @@ impl Several {
         reasons.join("; ")
     }
 
-    /// Returns the greatest error of a clearance, metres.
+    /// Returns the greatest error of a clearance, in metres.
     pub(crate) fn clearance_error(&self) -> f64 {
         self.members.iter().map(|member| member.dancer.clearance_error).fold(0.0, f64::max)
     }
 
-    /// Returns the longest link of any dragon, metres.
+    /// Returns the longest link of any dragon, in metres.
     pub(crate) fn longest_link(&self) -> f64 {
         self.members.iter().map(|member| member.dragon.motion.team().longest_link()).fold(0.0, f64::max)
     }

@@ -122,7 +122,7 @@ pub struct Model<T> {
     periods_at_end: u64,
     /// Jumps of simulated time.
     pub epoch: u32,
-    /// Times the show has begun again.
+    /// The number of times that the show has begun again.
     pub shows_played: u64,
     /// Cues passed, in the order of their times.
     pub passed: usize,

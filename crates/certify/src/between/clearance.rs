@@ -13,7 +13,7 @@ use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::timeline::TimedEvent;
 
-/// Width of an enclosure in metres, with room for the rounding of both ends.
+/// The width of an enclosure in metres, with room for the rounding of both ends.
 pub(super) const WIDTH: f64 = 0.9e-9;
 
 /// The difference, in metres, by which a new upper bound must be lower than the one before.
@@ -53,9 +53,9 @@ pub struct SeveralClearances {
 pub struct BetweenEnclosure {
     /// The dragons.
     pub dragons: [usize; 2],
-    /// Lower bound in metres for all boards of the two; `None` if nothing is proved.
+    /// The lower bound in metres for all boards of the two; `None` if nothing is proved.
     pub lo: Option<f64>,
-    /// Upper bound in metres.
+    /// The upper bound in metres.
     pub hi: Option<f64>,
     /// The time of the show at which two boards are that near, in seconds.
     pub time: f64,

@@ -16,10 +16,10 @@ const TURNS_BEFORE: f64 = 3.0;
 /// The number of turns outside a touch at which the trial that follows it starts.
 const TURNS_ABOUT: f64 = 1.0;
 
-/// Factor of the pitch from one trial to the next while the same two boards touch.
+/// The factor of the pitch from one trial to the next while the same two boards touch.
 const GROWTH: f64 = 1.005;
 
-/// Distance from a touch, in links, within which the same two boards are followed.
+/// The distance from a touch, in links, within which the same two boards are followed.
 const WINDOW: f64 = 0.3;
 
 /// Work for one trial of a pitch, in units of [`Budget`]: some seconds.
@@ -131,11 +131,11 @@ impl Obstacle {
 /// The least clearance of two boards while the head is near a radius.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nearest {
-    /// Clearance in metres, negative for an overlap.
+    /// The clearance in metres, negative for an overlap.
     pub clearance: f64,
     /// The two benches, counted from 0.
     pub pair: (u32, u32),
-    /// Distance of the head from the centre at that moment, metres.
+    /// The distance of the head from the centre at that moment, in metres.
     pub head_radius: f64,
 }
 
@@ -165,7 +165,7 @@ struct Trial {
     team: Team,
     path: Path,
     singularities: Singularities,
-    /// Travel at which the radius is reached, metres.
+    /// The travel at which the radius is reached, in metres.
     limit: f64,
 }
 

@@ -80,9 +80,9 @@ pub enum OpenError {
     OtherLayout {
         /// The service.
         service: String,
-        /// Names of the service's layouts.
+        /// The names of the service's layouts.
         theirs: String,
-        /// Names of this program's layouts.
+        /// The names of this program's layouts.
         own: String,
     },
     /// A service of this name exists with other attributes.

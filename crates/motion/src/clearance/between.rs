@@ -32,14 +32,14 @@ const SKIN: f64 = 1.0;
 /// The most boards in the list of a bench.
 const MOST_LISTED: usize = 12;
 
-/// Error of a place in single precision, as a share of it; twice as much, for the sum of the places.
+/// The error of a place in single precision, as a share of it; twice as much, for the sum of the places.
 const SINGLE_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
 
 /// The approach, in metres, after which all bounds are computed again, so that their rounding stays within its
 /// allowance.
 const MOST_MOVED: f64 = 100.0;
 
-/// Margin for rounding: metres, and as a share of the coordinates.
+/// The margin for rounding: metres, and as a share of the coordinates.
 const ROUNDING: (f64, f64) = (1e-9, 1e-12);
 
 /// The board of no bench.
@@ -84,7 +84,7 @@ impl Part {
 #[derive(Debug, Clone, Copy, Default)]
 struct Listed {
     bench: u32,
-    /// A lower bound of the distance of the boards at the time of the places, metres.
+    /// A lower bound of the distance of the boards at the time of the places, in metres.
     distance: f32,
     /// The handles of the board as seen from the bench.
     places: [[f32; 2]; 2],
@@ -150,14 +150,14 @@ pub struct BetweenMonitor {
     /// The distance, in metres, by which a dragon's points may be outside the box about its handles, and the radius of
     /// the largest board.
     beyond: f64,
-    /// Greatest approach of two boards per metre of displacement of their handles.
+    /// The greatest approach of two boards per metre of displacement of their handles.
     reach: f64,
-    /// Greatest approach of the points of a board while it is a seat: its link may be off its length, metres.
+    /// The greatest approach of the points of a board while it is a seat: its link may be off its length, in metres.
     link_slack: f64,
     /// The handles of the previous frame.
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Greatest approach of two boards since the beginning, metres.
+    /// The greatest approach of two boards since the beginning, in metres.
     closed: f64,
     /// By bench: a bound plus the value of `closed` when the bound was made; infinite where there is no bench.
     sums: Vec<f64>,

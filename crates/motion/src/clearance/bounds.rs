@@ -35,19 +35,19 @@ pub(super) const BLOCK: usize = 64;
 /// Rows at the front that always have lists for every cell: the nearest pairs are most often there.
 const FINE_ROWS: usize = 1024;
 
-/// Greatest number of rows for which the head has lists: about 10 MB.
+/// The greatest number of rows for which the head has lists: about 10 MB.
 const MOST_HEAD_ROWS: usize = 1 << 14;
 
-/// Greatest slack of a block's bounds, in links, if one list is used for all cells of a row.
+/// The greatest slack of a block's bounds, in links, if one list is used for all cells of a row.
 const MOST_SLACK: f64 = 1e-3;
 
-/// Greatest work to make a table, in nanoseconds on a processor of 2025.
+/// The greatest work to make a table, in nanoseconds on a processor of 2025.
 const MOST_WORK: usize = 5_000_000_000;
 
-/// Greatest size of all lists, bytes.
+/// The greatest size of all lists, in bytes.
 const MOST_BYTES: usize = 128 << 20;
 
-/// Place of a frame's second handle in the table.
+/// The place of a frame's second handle in the table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Located {
     /// Its row, which is also the row of the bench it leads.
@@ -61,16 +61,16 @@ pub(super) struct Located {
 #[derive(Debug, Clone, Copy)]
 struct HeadCell {
     track: Quadratic,
-    /// Index of the first entry of its list.
+    /// The index of the first entry of its list.
     begin: u32,
 }
 
-/// Places of the lists of a block.
+/// The places of the lists of a block.
 #[derive(Debug, Clone, Copy)]
 struct Block {
     /// The place of its first row in the table's `bounds` and `begins`, in its first cell.
     begin: usize,
-    /// Number of cells with separate lists.
+    /// The number of cells with separate lists.
     cells: usize,
 }
 
@@ -179,7 +179,7 @@ impl BoundTable {
         Some(false)
     }
 
-    /// Makes the lists of a cell of a block. Returns the greatest slack of a first bound, metres.
+    /// Makes the lists of a cell of a block. Returns the greatest slack of a first bound, in metres.
     fn fill(&mut self, block: usize, cell: usize, present: usize, builder: &mut ListBuilder) -> f64 {
         let (mut least, mut slack) = (f32::INFINITY, 0.0f64);
         // The last row has no board.
@@ -256,7 +256,7 @@ impl BoundTable {
         begin + if cells == 1 { 0 } else { cell * BLOCK }
     }
 
-    /// Returns the size of the table, bytes.
+    /// Returns the size of the table, in bytes.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.least.as_slice())
             + size_of_val(self.blocks.as_slice())

@@ -17,11 +17,11 @@ pub(super) struct HeadGridPoint {
     place: Vector,
     /// Its derivative by the cell's time.
     slope: Vector,
-    /// Error bound of the place, metres.
+    /// The error bound of the place, in metres.
     error: f64,
 }
 
-/// Error bound of the head's place at the end of the first cell, in links: the path's start is within the cell.
+/// The error bound of the head's place at the end of the first cell, in links: the path's start is within the cell.
 const ERROR_BEHIND_START: f64 = 1e-3;
 
 /// Returns the first row for which T is known while the phase goes from `begin` to `end`. Returns also the handles from

@@ -32,7 +32,7 @@ impl Grid {
         }
     }
 
-    /// Empties the grid and sets the side of a square, metres.
+    /// Empties the grid and sets the side of a square, in metres.
     pub(super) fn clear(&mut self, side: f64) {
         self.squares_per_metre = side.recip();
         self.last.fill(NONE);

@@ -24,9 +24,9 @@ const WORK_OF_BOUND: usize = 250;
 /// Benches that can be near another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbour {
-    /// Lower bound of their signed distance, metres.
+    /// A lower bound of their signed distance, in metres.
     pub bound: f32,
-    /// Number of benches further behind; [`Neighbour::ALL`] for all benches without an entry.
+    /// The number of benches further behind; [`Neighbour::ALL`] for all benches without an entry.
     pub behind: u32,
 }
 
@@ -38,11 +38,11 @@ impl Neighbour {
 /// A finished list.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct List {
-    /// Index of its first entry.
+    /// The index of its first entry.
     pub begin: u32,
-    /// Its first bound, metres.
+    /// Its first bound, in metres.
     pub bound: f32,
-    /// Greatest difference of the distance to the nearest board and that bound, metres.
+    /// The greatest difference of the distance to the nearest board and that bound, in metres.
     pub slack: f64,
 }
 
@@ -57,15 +57,15 @@ pub(super) struct ListBuilder<'a> {
     /// The handles in the cell, from row `first` on.
     handles: Vec<Quadratic>,
     first: usize,
-    /// By row from `first` on: greatest travel of its board and of those behind, metres.
+    /// By row from `first` on: greatest travel of its board and of those behind, in metres.
     travel_behind: Vec<f64>,
     grid: Grid,
-    /// No list is made if boards may move farther, metres.
+    /// The displacement of boards, in metres, above which no list is made.
     longest_reach: f64,
-    /// Greatest error of a handle of a frame, metres: twice the errors of T and the frame.
+    /// The greatest error of a handle of a frame, in metres: twice the errors of T and the frame.
     handle_error: f64,
-    /// Upper limit of every bound, metres. Two benches with one between them are never farther apart than its link, so
-    /// that in every frame some pair is nearer.
+    /// Upper limit of every bound, in metres. Two benches with one between them are never farther apart than its link,
+    /// so that in every frame some pair is nearer.
     farthest: f64,
     /// Rows from a board to its nearest one, in the latest list.
     likely: usize,
@@ -94,7 +94,7 @@ impl<'a> ListBuilder<'a> {
         }
     }
 
-    /// Returns the greatest distance of the front handles of two boards in one list, metres.
+    /// Returns the greatest distance of the front handles of two boards in one list, in metres.
     pub(super) fn longest_distance(&self) -> f64 {
         let from_handle = self.team.longest_link() + self.team.hole_inset + self.team.width;
         self.farthest + 2.0 * from_handle

@@ -29,7 +29,7 @@ use crate::model::{Point, Vector};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Quadratic {
     pub terms: [Vector; 3],
-    /// Upper bound of the distance to the true vector, in the vector's unit.
+    /// An upper bound of the distance to the true vector, in the vector's unit.
     pub error: f64,
 }
 
@@ -97,7 +97,7 @@ pub(super) struct MovingBoard {
     axis: Quadratic,
     half_length: f64,
     half_width: f64,
-    /// Upper bound of the distance of its points from their places at 0, metres.
+    /// An upper bound of the distance of its points from their places at 0, in metres.
     pub travel: f64,
 }
 

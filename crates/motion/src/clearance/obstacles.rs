@@ -25,10 +25,10 @@ const CELLS: usize = 32;
 /// Rows of a block, whose least bound is kept, too.
 const BLOCK: usize = 32;
 
-/// Greatest number of rows times obstacles of a table: about a second of work.
+/// The greatest number of rows times obstacles of a table: about a second of work.
 const MOST_ROWS: usize = 1 << 17;
 
-/// Margin of the bounds for rounding, metres and as a share of the coordinates.
+/// The margin of the bounds for rounding, metres and as a share of the coordinates.
 const ROUNDING: (f64, f64) = (1e-9, 1e-12);
 
 /// Lower bounds of the clearance of every body bench, for every place of the second handle.
@@ -130,7 +130,7 @@ impl ObstacleMonitor {
         Self { team, ground, table, last_bench: 0 }
     }
 
-    /// Returns the bench and the obstacle with the least clearance, if it is below `limit`, metres. `bench_b` is the
+    /// Returns the bench and the obstacle with the least clearance, if it is below `limit`, in metres. `bench_b` is the
     /// number of handles plus the obstacle's place on the ground, `point_b` a point of the obstacle. `travelled` is as
     /// in [`ClearanceMonitor::least_clearance`](super::ClearanceMonitor::least_clearance).
     pub fn nearest<'a>(

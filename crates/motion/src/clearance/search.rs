@@ -18,7 +18,7 @@ const DISTANCES_AT_ONCE: usize = 8;
 /// Benches that are tested against all others before a grid is cheaper.
 const MOST_SCANS: usize = 16;
 
-/// Margin of carried bounds beyond the limit, in lengths of a body board.
+/// The margin of carried bounds beyond the limit, in lengths of a body board.
 const SKIN: f64 = 0.05;
 
 /// The approach, in metres, after which carried bounds are computed again, so that their rounding stays within its
@@ -35,7 +35,7 @@ pub(super) struct CarriedBounds {
     /// The handles of the previous frame.
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Greatest approach of two boards since the beginning, metres.
+    /// The greatest approach of two boards since the beginning, in metres.
     closed: f64,
     /// By bench: a bound plus the value of `closed` when the bound was made.
     sums: Vec<f64>,
@@ -243,7 +243,7 @@ impl<'a> ClearanceSearch<'a> {
         bound
     }
 
-    /// Returns an upper bound of the radius of the circle about a body board, metres.
+    /// Returns an upper bound of the radius of the circle about a body board, in metres.
     fn body_radius(&self) -> f64 {
         circle_radius(self.team, 1) + 0.5 * self.link_error
     }

@@ -281,7 +281,7 @@ impl<'s, 'a, 'b> BetweenSearch<'s, 'a, 'b> {
         Ok(steps)
     }
 
-    /// Returns an upper bound of the relative motion of any two boards, metres.
+    /// Returns an upper bound of the relative motion of any two boards, in metres.
     fn most_motion(&self, steps: &[Displacements; 2]) -> f64 {
         let most = |k: usize| {
             let dragon = self.moving[k];

@@ -46,7 +46,7 @@ impl Configuration {
         Ok(())
     }
 
-    /// Returns the signed distance of two boards, metres.
+    /// Returns the signed distance of two boards, in metres.
     pub fn clearance(&self, (a, b): Pair) -> f64 {
         signed_distance_board_board(&self.boards[a], &self.boards[b])
     }

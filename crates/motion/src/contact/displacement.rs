@@ -152,7 +152,7 @@ impl Displacements {
         seen(a).zip(seen(b)).map_or(stage, |(one, other)| stage.min(one + other))
     }
 
-    /// Returns an upper bound of the relative motion of any two of the foremost boards, metres.
+    /// Returns an upper bound of the relative motion of any two of the foremost boards, in metres.
     pub fn most_relative_motion(&self, chain: &ConservativeAdvancement, benches: usize) -> f64 {
         2.0 * (0..benches).map(|bench| self.on_stage(chain, bench, Weights::Additive)).fold(0.0, f64::max)
     }
@@ -206,7 +206,7 @@ impl Displacements {
         (stays && self.handles[bench].run == self.handles[bench + 1].run).then_some(curvature)
     }
 
-    /// Returns an upper bound of the displacement of a board's points on the stage, metres.
+    /// Returns an upper bound of the displacement of a board's points on the stage, in metres.
     pub fn on_stage(&self, chain: &ConservativeAdvancement, bench: usize, weights: Weights) -> f64 {
         weights.board(chain.team, bench, self.handles[bench].length, self.handles[bench + 1].length)
     }
@@ -236,7 +236,7 @@ fn turned((before, after): (&Configuration, &Configuration), handle: usize) -> f
 /// The way in which the displacements of a board's two handles bound the displacements of its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Weights {
-    /// Upper bound for one point of the board: sufficient to exclude a clearance above zero.
+    /// The upper bound for one point of the board: sufficient to exclude a clearance above zero.
     OnePoint,
     /// A bound that is additive over sub-steps, for overlaps.
     Additive,

@@ -76,7 +76,7 @@ struct GroundSearch<'s, 'a, 'b> {
     touches: Vec<Option<Touch>>,
     /// By obstacle: the least clearance so far.
     best: Vec<Option<ObstacleClearance>>,
-    /// Place of handle 1 at the beginning.
+    /// The place of handle 1 at the beginning.
     second_handle: Param,
     /// The travel, in metres, from which on rounding may prevent a solution.
     rounding_from: f64,

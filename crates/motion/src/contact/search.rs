@@ -44,7 +44,7 @@ pub(super) struct ChainSearch<'s, 'a, 'b> {
     contact: Option<Event>,
     /// The least clearance so far.
     best: Option<LeastClearance>,
-    /// Place of handle 1 at the beginning: S of the proof.
+    /// The place of handle 1 at the beginning: S of the proof.
     pub(super) second_handle: Param,
     /// The quiet place, if there is one.
     pub(super) quiet: Option<Param>,

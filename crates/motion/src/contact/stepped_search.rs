@@ -13,7 +13,7 @@ use crate::linkage::NoFollower;
 /// the only part of the least clearance without proof.
 const UNIMODAL_SHARE: f64 = 1e-2;
 
-/// Greatest number of configurations for a first guess of the least clearance.
+/// The greatest number of configurations for a first guess of the least clearance.
 pub(super) const MOST_GUESSES: f64 = 1000.0;
 
 /// The share of a search for the least clearance that its guess takes, for the report of progress.
@@ -113,7 +113,7 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
         pairs: &mut Vec<Self::Pair>,
     ) -> Result<(), Halt>;
 
-    /// Returns the clearance of a pair, metres.
+    /// Returns the clearance of a pair, in metres.
     fn clearance(&self, at: &Self::Bodies, pair: Self::Pair) -> f64;
 
     /// Records the deepest pair if it touches, or the nearest pair if it is below the least clearance so far. With

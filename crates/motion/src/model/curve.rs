@@ -75,7 +75,7 @@ impl Follower {
 pub struct ReachedDisc {
     /// Centre of the disc.
     pub centre: Point,
-    /// Radius of the disc, metres.
+    /// The radius of the disc, in metres.
     pub radius: f64,
     /// Radius, metres, of the circle about the origin with the same property for boards on an inward spiral about it.
     pub about_origin: f64,

@@ -42,7 +42,7 @@ impl DoubleDouble {
         Self { high, low }
     }
 
-    /// Returns the angle of a number of turns, radians.
+    /// Returns the angle of a number of turns, in radians.
     pub fn from_turns(turns: impl Into<Self>) -> Self {
         let Self { high: turns, low } = turns.into();
         let high = TAU * turns;

@@ -64,7 +64,7 @@ struct Placed {
     /// or the segment's end, whichever is earlier.
     anchor: Coordinate,
     anchor_travelled: f64,
-    /// Coordinate of its end.
+    /// The coordinate of its end.
     last: Coordinate,
 }
 

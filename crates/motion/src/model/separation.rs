@@ -72,7 +72,7 @@ pub fn circle_bound_board_board(a: &Board, b: &Board) -> f64 {
     (b.centre - a.centre).norm() - (a.circle_radius() + b.circle_radius())
 }
 
-/// Returns the signed separation by the separating axis theorem, metres: never more than the clearance.
+/// Returns the signed separation by the separating axis theorem, in metres: never more than the clearance.
 ///
 /// The normals of the Minkowski difference's edges are those of the boards. So the largest of the four gaps is minus
 /// the least translation if all are negative (Ericson, Real-Time Collision Detection, section 4.4).
@@ -83,7 +83,7 @@ pub fn separation_board_board(a: &Board, b: &Board) -> f64 {
     along_a.max(across_a).max(along_b.max(across_b))
 }
 
-/// Returns the clearance, metres: the Euclidean distance apart, minus the least translation that parts the boards
+/// Returns the clearance, in metres: the Euclidean distance apart, minus the least translation that parts the boards
 /// overlapping.
 ///
 /// The nearest points of two convex polygons that are apart include a corner of one of them.

@@ -111,7 +111,7 @@ impl Shape {
         &self.points
     }
 
-    /// Returns the radius of a circle, metres; 0 for other kinds.
+    /// Returns the radius of a circle, in metres; 0 for other kinds.
     pub fn radius(&self) -> f64 {
         self.radius
     }
@@ -155,7 +155,7 @@ impl Shape {
         }
     }
 
-    /// Returns a lower bound of [`signed_distance`](Self::signed_distance) from the circle about the board, metres.
+    /// Returns a lower bound of [`signed_distance`](Self::signed_distance) from the circle about the board, in metres.
     pub fn coarse_bound(&self, board: &Board) -> f64 {
         let radius = board.circle_radius();
         if self.kind != ShapeKind::Boundary {
@@ -169,7 +169,7 @@ impl Shape {
         if gap > 0.0 { gap } else { f64::NEG_INFINITY }
     }
 
-    /// Returns the signed distance of a board, metres; negative infinity if no translation frees the board from the
+    /// Returns the signed distance of a board, in metres; negative infinity if no translation frees the board from the
     /// plane outside a boundary.
     pub fn signed_distance(&self, board: &Board) -> f64 {
         self.signed_distance_below(board, f64::INFINITY)
@@ -295,14 +295,15 @@ impl Rectangle {
         hypot(beyond.x.max(0.0), beyond.y.max(0.0))
     }
 
-    /// Returns the signed separation of the box about a segment, metres: never more than the separation of the segment.
+    /// Returns the signed separation of the box about a segment, in metres: never more than the separation of the
+    /// segment.
     fn separation_of_box(&self, from: Vector, to: Vector) -> f64 {
         let gap = |one: f64, other: f64, half: f64| one.min(other).max(-one.max(other)) - half;
         gap(from.x, to.x, self.half.x).max(gap(from.y, to.y, self.half.y))
     }
 
-    /// Returns the signed separation of a segment by the separating axis theorem, metres. The separation is never more
-    /// than the distance. Where the segment and the rectangle overlap, it is minus the least translation.
+    /// Returns the signed separation of a segment by the separating axis theorem, in metres. The separation is never
+    /// more than the distance. Where the segment and the rectangle overlap, it is minus the least translation.
     fn separation(&self, from: Vector, to: Vector) -> f64 {
         let sides = self.separation_of_box(from, to);
         let along = to - from;

@@ -25,7 +25,7 @@ pub enum Direction {
     Outward,
 }
 
-/// The spiral. Its coordinate is the polar angle theta of the unturned spiral, radians.
+/// The spiral. Its coordinate is the polar angle theta of the unturned spiral, in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     pitch: f64,
@@ -62,13 +62,13 @@ impl Spiral {
         self.direction
     }
 
-    /// Returns the distance of a place from the centre, metres.
+    /// Returns the distance of a place from the centre, in metres.
     pub fn radius(&self, at: Coordinate) -> f64 {
         let DoubleDouble { high, low } = self.radius_per_radian;
         at.high.mul_add(high, at.high * low + at.low * high)
     }
 
-    /// Returns the arc length between `theta` and `theta - span`, metres.
+    /// Returns the arc length between `theta` and `theta - span`, in metres.
     ///
     /// The length follows from s = a/2 (theta w + asinh theta), w = sqrt(1 + theta^2). Both differences are written as
     /// products of the span, so that short spans far out keep all digits:
@@ -120,7 +120,7 @@ impl Spiral {
         }
     }
 
-    /// Returns the angle from a handle at radius `r` outward to the first point at the link's distance, radians.
+    /// Returns the angle from a handle at radius `r` outward to the first point at the link's distance, in radians.
     pub(crate) fn follower_angle(&self, r: f64, link: f64) -> Result<f64, NoFollower> {
         let a = self.radius_per_radian.high;
         let residual = self.chord_residual(r, link);

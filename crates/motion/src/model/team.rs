@@ -28,12 +28,12 @@ impl Team {
         board - 2.0 * self.hole_inset
     }
 
-    /// Returns the length of the shorter kind of link, metres.
+    /// Returns the length of the shorter kind of link, in metres.
     pub fn shortest_link(&self) -> f64 {
         self.link(0).min(self.link(1))
     }
 
-    /// Returns the length of the longer kind of link, metres.
+    /// Returns the length of the longer kind of link, in metres.
     pub fn longest_link(&self) -> f64 {
         self.link(0).max(self.link(1))
     }

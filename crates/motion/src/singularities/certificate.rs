@@ -81,14 +81,14 @@ struct FrontCurvature {
     side: f64,
 }
 
-/// Distances from the front handle at both ends of a step to one place behind.
+/// The distances from the front handle at both ends of a step to one place behind.
 struct Distances {
     param: Param,
     /// 1/m, not negative.
     curvature: f64,
     /// The least square of the distance, m^2.
     square: f64,
-    /// The least q = T . (P(s) - P(u)), metres: growth of half the square per metre backward.
+    /// The least q = T . (P(s) - P(u)), in metres: growth of half the square per metre backward.
     slope: f64,
     /// The greatest |q_u|: half the second derivative of the square by u.
     second_derivative_bound: f64,
@@ -119,7 +119,7 @@ impl Link<'_> {
         })
     }
 
-    /// Returns the rounding of a place of the front handle, metres.
+    /// Returns the rounding of a place of the front handle, in metres.
     pub fn resolution(&self, at: &Configuration) -> f64 {
         8.0 * f64::EPSILON * (at.front.abs() + self.length + at.front_point.coords.norm())
     }
@@ -311,7 +311,7 @@ impl Link<'_> {
     }
 }
 
-/// Places between two followers at which a proof of a jump is tried. Nearly all of them succeed: up to the further
+/// The places between two followers at which a proof of a jump is tried. Nearly all of them succeed: up to the further
 /// follower every place is nearer than the link, in one of the two configurations at least.
 const JUMP_SAMPLES: i32 = 32;
 

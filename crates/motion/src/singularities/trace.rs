@@ -31,10 +31,10 @@ pub(super) enum TraceEnd {
     Undecided,
 }
 
-/// Cost of a bisection to the last digit, in links solved.
+/// The cost of a bisection to the last digit, in links solved.
 const BISECTION_WORK: u64 = 64;
 
-/// Cost of each link's length of a winding path, in links solved.
+/// The cost of each link's length of a winding path, in links solved.
 const WINDING_WORK: f64 = 32.0;
 
 /// The longest step that the certificates allow, in links.
@@ -49,9 +49,9 @@ pub(super) struct LinkTrace<'a> {
     at: Configuration,
     /// Configurations further on, the nearest last: the ends of uncertain steps.
     ahead: Vec<Configuration>,
-    /// Length of the next step, metres.
+    /// The length of the next step, in metres.
     step: f64,
-    /// Beginning of the unresolved stretch.
+    /// The beginning of the unresolved stretch.
     unresolved: Option<Configuration>,
     turns: Vec<f64>,
     furthest_rear: f64,
@@ -168,7 +168,7 @@ impl<'a> LinkTrace<'a> {
         self.ahead.pop();
     }
 
-    /// Returns the longest step that may be taken without a proof, metres.
+    /// Returns the longest step that may be taken without a proof, in metres.
     fn finest_step(&self) -> f64 {
         let stretch = self.unresolved.map_or(0.0, |start| self.at.front - start.front);
         stretch.min(LONGEST_UNRESOLVED * self.link.length).max(self.link.resolution(&self.at))

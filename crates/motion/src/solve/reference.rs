@@ -31,7 +31,7 @@ pub struct ReferenceHandle {
     pub x: DoubleDouble,
     /// The coordinate up from the centre, in metres.
     pub y: DoubleDouble,
-    /// Signed speed along the path, metres per second.
+    /// Signed speed along the path, in metres per second.
     pub speed: f64,
 }
 

@@ -18,8 +18,8 @@ use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::team::Team;
 
-/// Greatest numbers of test points: spread over the path, at each junction, where handles cross junctions, and towards
-/// the table's end.
+/// The greatest numbers of test points: spread over the path, at each junction, where handles cross junctions, and
+/// towards the table's end.
 const SPREAD_TEST_POINTS: usize = 200;
 const JUNCTION_TEST_POINTS: usize = 60;
 const KINK_TEST_POINTS: usize = 300;
@@ -71,14 +71,14 @@ pub struct Selection {
     pub accuracy: f64,
     /// The largest distance of a handle from the safe solver's, in metres.
     pub error: f64,
-    /// Greatest measured error that is accepted, metres: the share of the requested accuracy, or the rounding of
+    /// The greatest measured error that is accepted, in metres: the share of the requested accuracy, or the rounding of
     /// doubles if that is more.
     pub allowed: f64,
-    /// Greatest measured error of a velocity, as a part of the accepted error; 0 without velocities.
+    /// The greatest measured error of a velocity, as a part of the accepted error; 0 without velocities.
     pub speed_error: f64,
     /// The number of test points.
     pub test_points: usize,
-    /// Time to make all candidates and to measure them.
+    /// The time to make all candidates and to measure them.
     pub made_in: Duration,
 }
 

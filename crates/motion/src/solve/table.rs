@@ -116,12 +116,12 @@ pub struct FollowerTable {
     head: Arc<HeadTable>,
     newton: Newton,
     fallbacks: u64,
-    /// Greatest error of its frames, metres.
+    /// The greatest error of its frames, in metres.
     accuracy: f64,
     exact_bytes_per_handle: f64,
 }
 
-/// Greatest error of the frames of the most exact table, metres, on any path but the farthest.
+/// The greatest error of the frames of the most exact table, metres, on any path but the farthest.
 pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {

@@ -22,7 +22,7 @@ pub struct SceneFacts {
     pub clearance: Option<ClearanceCurve>,
 }
 
-/// The clearance over a show, metres.
+/// The clearance over a show, in metres.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClearanceCurve {
     /// Points in order of time: simulated seconds, and metres, negative where boards overlap.

@@ -19,7 +19,7 @@ pub struct Scheduling {
     pub realtime: Option<u8>,
     /// The CPU to stay on.
     pub cpu: Option<usize>,
-    /// The longest wake-up latency of all CPUs, microseconds.
+    /// The longest wake-up latency of all CPUs, in microseconds.
     pub cpu_latency: Option<u32>,
 }
 

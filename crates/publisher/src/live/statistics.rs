@@ -64,7 +64,7 @@ pub struct RunSummary {
     pub skipped: u64,
     /// Wake-up lateness against the intended deadlines.
     pub wakeup_ns: Percentiles,
-    /// Cost of a step.
+    /// The cost of a step.
     pub step_ns: Percentiles,
     /// The reason for the end of the loop.
     pub end: End,

@@ -14,7 +14,7 @@ pub struct Accepted {
 }
 
 impl Accepted {
-    /// Pitch and lengths of boards.
+    /// The pitch and lengths of boards.
     pub const LENGTH: Self = Self { least: 1e-3, greatest: 1e4, unit: "metres" };
     /// The turn on which the head starts.
     pub const START_TURN: Self = Self { least: 1e-9, greatest: 1e7, unit: "turns" };
@@ -36,7 +36,7 @@ impl Accepted {
     pub const KEEP_OUT: Self = Self { least: 0.0, greatest: 1e6, unit: "metres" };
     /// The rotation of a path on the stage.
     pub const ROTATION: Self = Self { least: -1e3, greatest: 1e3, unit: "turns" };
-    /// Speed of the head.
+    /// The speed of the head.
     pub const SPEED: Self = Self { least: 1e-9, greatest: 1e6, unit: "metres per second" };
     /// The rate, in frames per second.
     pub const RATE: Self = Self { least: 0.1, greatest: 20_000.0, unit: "frames per second" };
@@ -44,11 +44,11 @@ impl Accepted {
     pub const TIME_SCALE: Self = Self { least: 1e-6, greatest: 1e6, unit: "simulated seconds per second" };
     /// Requested position error.
     pub const ACCURACY: Self = Self { least: 1e-18, greatest: 1e3, unit: "metres" };
-    /// Times and clearances of a warning.
+    /// The times and clearances of a warning.
     pub const WARNING: Self = Self { least: 0.0, greatest: 1e9, unit: "seconds or metres" };
     /// Simulated seconds of a cue.
     pub const CUE: Self = Self { least: 0.0, greatest: 1e20, unit: "seconds" };
-    /// Wall time at the end of a show before it starts again.
+    /// The wall time at the end of a show before it starts again.
     pub const END_HOLD: Self = Self { least: 0.0, greatest: 1e6, unit: "seconds" };
     /// The paper's time step and difference interval, in seconds, and its tolerance, in radians.
     pub const PAPER_RULE: Self = Self { least: 1e-15, greatest: 1e3, unit: "seconds or radians" };

@@ -34,7 +34,7 @@ pub enum CueMoment {
         /// Simulated seconds before it.
         seconds: f64,
     },
-    /// Travel of the head along the path, metres.
+    /// The travel of the head along the path, in metres.
     Travelled(f64),
 }
 

@@ -73,7 +73,7 @@ enum RawSide {
 }
 
 impl RawPath {
-    /// Returns the place where a route starts, metres.
+    /// Returns the place where a route starts, in metres.
     pub(super) fn start(&self, source: &Source) -> Result<Vector, SceneError> {
         source.place("path.start", self.start.as_ref())
     }

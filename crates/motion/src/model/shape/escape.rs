@@ -14,7 +14,7 @@ use super::{MOST_CORNERS, Rectangle, Shape, ShapeKind, in_frame};
 use crate::model::Vector;
 use crate::model::board::Board;
 
-/// Depth within a hexagon, as a share of the board and the translation, up to which a point counts as outside.
+/// The depth within a hexagon, as a share of the board and the translation, up to which a point counts as outside.
 const ROUNDING: f64 = 1e-12;
 
 /// The greatest number of segments of an outline: of a line, two along each side and, where rounding joins corners,

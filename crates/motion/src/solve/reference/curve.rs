@@ -10,7 +10,7 @@ use crate::model::description::RouteStep;
 use crate::model::double_double::DoubleDouble;
 use crate::model::spiral::Direction;
 
-/// The longest step on a spiral, radians: short against the half turns over which the growth of a chord changes its
+/// The longest step on a spiral, in radians: short against the half turns over which the growth of a chord changes its
 /// sign.
 const LONGEST: f64 = 0.05;
 
@@ -203,7 +203,7 @@ pub(super) struct RealPiece {
     pub first: Real,
     /// The length along it, in metres.
     pub length: Real,
-    /// Direction of travel at its end, radians from x.
+    /// The direction of travel at its end, radians from x.
     pub heading: Real,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct Segment {
 /// A path that grows at its end.
 pub(super) struct RealPath {
     segments: Vec<Segment>,
-    /// Direction of travel at its end, radians from x.
+    /// The direction of travel at its end, radians from x.
     heading: Real,
     pub functions: Functions,
 }

@@ -13,10 +13,10 @@ use crate::model::Vector;
 /// The finest step, in links: a shorter stretch outside the link's reach may be overlooked.
 const FINEST: f64 = 1e-9;
 
-/// Least decrease of a distance, in links, that counts as more than rounding.
+/// The least decrease of a distance, in links, that counts as more than rounding.
 const NOISE: f64 = 1e-14;
 
-/// Steps after which the search on one segment gives up.
+/// The steps after which the search on one segment gives up.
 const MOST_STEPS: usize = 10_000_000;
 
 /// The way back along a curve from one of its places, seen from the front handle of a link.

@@ -20,16 +20,16 @@ use crate::model::elementary::hypot;
 use crate::model::path::Param;
 use crate::model::team::Team;
 
-/// Greatest number of halvings between two kinks.
+/// The greatest number of halvings between two kinks.
 const MOST_HALVINGS: usize = 9;
 
-/// Greatest size of a table, bytes.
+/// The greatest size of a table, in bytes.
 const MOST_BYTES: usize = 150 << 20;
 
 /// The part of these bytes that any range of phases may take.
 const LEAST_SHARE: f64 = 0.125;
 
-/// Number of rows from which two threads make a band.
+/// The number of rows from which two threads make a band.
 const PARALLEL_ROWS: usize = 128;
 
 /// Halving continues if the halved piece uses less than this part of its parent's error: a smaller gain is rounding,

@@ -25,16 +25,16 @@ const LARGEST_NODAL: f64 = 0.04;
 /// x, y, heading and alpha.
 const QUANTITIES: usize = 4;
 
-/// Greatest number of pieces, 20 MB. For a longer path the table covers its beginning.
+/// The greatest number of pieces, 20 MB. For a longer path the table covers its beginning.
 const MOST_PIECES: usize = 1 << 16;
 
-/// Greatest length of a piece, in links of travel.
+/// The greatest length of a piece, in links of travel.
 const LONGEST: f64 = 1.0;
 
-/// Greatest length of a piece at the start, metres of travel: places have the rounding of the piece's extent.
+/// The greatest length of a piece at the start, metres of travel: places have the rounding of the piece's extent.
 const LONGEST_METRES: f64 = 100.0;
 
-/// Least length of a piece, in links of travel: at shorter ones the table ends.
+/// The least length of a piece, in links of travel: at shorter ones the table ends.
 const SHORTEST: f64 = 1e-7;
 
 /// Promised error in metres for a short travel, and promised relative error of speeds.
@@ -76,7 +76,7 @@ pub(super) struct HeadSample {
     pub heading: f64,
     /// The head's unit tangent.
     pub tangent: [f64; 2],
-    /// Place of the second handle, and its change per metre of travel; negative while it goes forward.
+    /// The place of the second handle, and its change per metre of travel; negative while it goes forward.
     pub alpha: Alpha,
     pub alpha_per_metre: f64,
 }

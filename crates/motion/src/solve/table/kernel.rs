@@ -10,7 +10,7 @@ use crate::solve::ChainMut;
 /// The input of a frame besides the table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrameInput {
-    /// Place of the second handle in the table.
+    /// The place of the second handle in the table.
     pub alpha: Alpha,
     /// Its derivative by time, 1/s; negative while the handle goes forward.
     pub alpha_per_second: f64,

@@ -12,7 +12,7 @@ use crate::model::team::Team;
 /// Kinks nearer together than this, in links, count as one.
 const SAME_KINK: f64 = 1e-11;
 
-/// Greatest number of rows ahead of the team: for a longer path the table covers its beginning.
+/// The greatest number of rows ahead of the team: for a longer path the table covers its beginning.
 const MOST_ROWS_AHEAD: usize = 1 << 15;
 
 /// Rows of the frontmost band; each further band reaches twice as far back.

@@ -84,11 +84,11 @@ pub(super) struct PackedRows {
     pub bands: Vec<PackedBand>,
 }
 
-/// Greatest number of halvings of a piece of the rows.
+/// The greatest number of halvings of a piece of the rows.
 const MOST_HALVINGS: usize = 7;
 
-/// Greatest size of a packed table: a multiple of the rows' bytes, plus a number of bytes that stay in the processor's
-/// cache.
+/// The greatest size of a packed table: a multiple of the rows' bytes, plus a number of bytes that stay in the
+/// processor's cache.
 const MOST_GROWTH: usize = 2;
 const SMALL: usize = 1 << 18;
 

@@ -30,11 +30,11 @@ pub(crate) struct Lanes(pub [f64; LANES]);
 /// Tolerance of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// Greatest error of a polynomial, metres, besides rounding.
+    /// The greatest error of a polynomial, metres, besides rounding.
     pub place: f64,
     /// The same error as a part of a link.
     pub relative: f64,
-    /// Greatest relative error of a speed.
+    /// The greatest relative error of a speed.
     pub speed: f64,
 }
 
@@ -118,7 +118,7 @@ pub(crate) struct Band {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Local {
     pub offset: Vector,
-    /// Derivative of the place by alpha, metres.
+    /// Derivative of the place by alpha, in metres.
     pub rate: Vector,
 }
 
@@ -142,13 +142,13 @@ impl Band {
         &self.coefficients[(piece * blocks + block) * per_row..][..per_row]
     }
 
-    /// Returns the coefficients of x and y of one row, by power, metres; beyond the band's lengths they are zero.
+    /// Returns the coefficients of x and y of one row, by power, in metres; beyond the band's lengths they are zero.
     pub(crate) fn coordinates(&self, piece: usize, row: usize) -> [[f64; 6]; 2] {
         let length = self.lengths.coordinate;
         [0, length].map(|begin| self.polynomial(piece, row, begin, length))
     }
 
-    /// Returns the coefficients of the heading of one row, by power, radians.
+    /// Returns the coefficients of the heading of one row, by power, in radians.
     pub(super) fn heading(&self, piece: usize, row: usize) -> [f64; 6] {
         self.polynomial(piece, row, 2 * self.lengths.coordinate, self.lengths.heading)
     }

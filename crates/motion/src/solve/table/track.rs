@@ -18,7 +18,7 @@ pub(super) struct Track<'a> {
     last: Vec<Coordinate>,
 }
 
-/// Place of one handle of a chain of equal links, and its change with alpha. Alpha is the number of links, with
+/// The place of one handle of a chain of equal links, and its change with alpha. Alpha is the number of links, with
 /// fraction, behind a fixed place of the chain.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
@@ -26,7 +26,7 @@ pub(super) struct Node {
     pub tangent: Vector,
     /// The length along the path, against the travel, per unit of alpha, in metres.
     pub spacing: f64,
-    /// Direction of the link that the handle leads, radians, and its derivative by alpha.
+    /// The direction of the link that the handle leads, radians, and its derivative by alpha.
     pub heading: f64,
     pub heading_rate: f64,
 }

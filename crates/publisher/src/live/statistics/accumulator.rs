@@ -52,7 +52,7 @@ impl Sample {
     };
 }
 
-/// Percentiles of a duration, nanoseconds.
+/// Percentiles of a duration, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Percentiles {
     /// The median.
@@ -78,17 +78,17 @@ impl Percentiles {
 pub struct Summary {
     /// Wake-up lateness against the intended deadlines; skipped periods count with the lateness they would have had.
     pub wakeup_ns: Percentiles,
-    /// Cost of a step: frame, publishing and waking subscribers.
+    /// The cost of a step: frame, publishing and waking subscribers.
     pub step_ns: Percentiles,
     /// Samples received. The percentiles miss the other frames.
     pub samples: u64,
 }
 
-/// The distributions of lateness and step cost, nanoseconds.
+/// The distributions of lateness and step cost, in nanoseconds.
 pub struct Durations {
     /// Wake-up lateness; skipped periods count with the lateness they would have had.
     pub lateness: Histogram<u64>,
-    /// Cost of a step.
+    /// The cost of a step.
     pub step: Histogram<u64>,
 }
 

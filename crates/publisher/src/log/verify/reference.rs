@@ -19,7 +19,7 @@ const EVENT_TIME: f64 = 1e-9;
 /// bound at a lock. Near a lock the error itself is about sqrt(eps).
 const MOST_GROWTH: f64 = 1e6;
 
-/// The error of an angle in (-pi, pi] from arctangents and sums, radians.
+/// The error of an angle in (-pi, pi] from arctangents and sums, in radians.
 const ROUNDING_OF_ANGLES: f64 = 1e-14;
 
 /// The second solver of a scene: one for each dragon.
@@ -90,7 +90,7 @@ impl Reference {
         Ok(())
     }
 
-    /// Returns the greatest distance so far and its tolerance, metres; `None` before the first comparison.
+    /// Returns the greatest distance so far and its tolerance, in metres; `None` before the first comparison.
     pub fn worst(&self) -> Option<(f64, f64)> {
         let worst = self.parts.iter().filter_map(|(_, part)| part.worst);
         worst.max_by(|one, other| one.0.total_cmp(&other.0))
