@@ -1,7 +1,7 @@
 //! Interval arithmetic in doubles, rounded outward.
 //!
 //! Every operation moves both ends outward by one unit in the last place more than the greatest rounding error in any
-//! IEEE 754 rounding mode, so the result does not depend on the mode in force. Ends may be infinite. An operation
+//! IEEE 754 rounding mode. So the result does not depend on the mode in force. Ends may be infinite. An operation
 //! without a meaning, such as a division by an interval that holds 0, returns the whole line.
 
 use std::ops::{Add, Mul, Neg, Sub};

@@ -1,7 +1,7 @@
 //! A tracked performer: from places on the stage to a place on the path, and from there to a simulated time. Pure.
 //!
-//! A place is projected on the path near the latest place only, because turns of a coil are half a metre apart, and the
-//! nearest point of the whole path would often be on another turn.
+//! A place is projected on the path near the latest place only, because the nearest point of the whole path would often
+//! be on another turn of the coil, half a metre away.
 
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::Point;

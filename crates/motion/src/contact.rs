@@ -11,10 +11,10 @@
 //! two configurations at the ends of the step and by the followers of the turns between them. The path that handle k
 //! passes over, back and forth, has the length m_k (`displacement`).
 //!
-//! **How far boards move.** A point of the board from handle i to i + 1 is rear + s (front - rear) + w n, where n is
-//! the link's unit normal, s is in [-e, 1 + e] with e = inset / link, and |w| <= width / 2. If the handles have
-//! velocities u and v, then n turns at a rate of at most (|u| + |v|) / link. So in a step the point moves along a path
-//! no longer than
+//! **How far boards move.** A point of the board from handle i to i + 1 is rear + s (front - rear) + w n. Here n is the
+//! link's unit normal, s is in [-e, 1 + e] with e = inset / link, and |w| <= width / 2. If the handles have velocities
+//! u and v, then n turns at a rate of at most (|u| + |v|) / link. So in a step the point moves along a path no longer
+//! than
 //! |s| m_i + |1 - s| m_{i+1} + (width / (2 link)) (m_i + m_{i+1}). For any s this length is at most
 //! C = max(m_i, m_{i+1}) + (e + width / (2 link)) (m_i + m_{i+1}).
 //!
@@ -35,20 +35,20 @@
 //! to the last of a pair stay on one line or circle, their distances along it stay the same, and B = 0. On one spiral,
 //! take the frame that turns about the centre with handle i and also moves outward by a d theta_i, in a fixed direction
 //! e of the frame. Let psi_k = theta_k - theta_i. In this frame handle k moves by a d psi_k outward and by r_k d psi_k
-//! around, and also by a d theta_i times the difference between its outward direction and e, which is at most the angle
-//! between the two directions. While the handles from i to k go the same way, psi_k is monotone, and so is the angle of
-//! each link, because the outer handle turns less than the inner one: the product (t . b) sqrt(a^2 + r^2) is larger at
-//! the outer handle, by 2 a (r + r') sin^2(d / 2) / link. Therefore these lengths are determined by the ends of the
-//! step.
+//! around. It also moves by a d theta_i times the difference between its outward direction and e, which is at most the
+//! angle between the two directions. While the handles from i to k go the same way, psi_k is monotone, and so is the
+//! angle of each link, because the outer handle turns less than the inner one. (The product (t . b) sqrt(a^2 + r^2) is
+//! larger at the outer handle, by 2 a (r + r') sin^2(d / 2) / link.) Therefore these lengths are determined by the ends
+//! of the step.
 //!
 //! **Which pairs.** Every link behind the first has the same length, so the place of handle i >= 1 determines all
 //! places behind it. A pair (i, i + k) is therefore where (1, 1 + k) is when handle 1 is at that place. Let S be the
 //! first place of handle 1. If handle i is at S or ahead of it, then handle 1, which is further ahead and has come from
-//! S without a jump, has been at the place of handle i before, and at that time the pair (1, 1 + k) was where (i, i +
-//! k) is now. Hence pairs without boards 0 and 1 matter only in steps in which handle 2 is somewhere behind S, in
-//! either direction of motion. A pair does not matter if its front handles are both behind the quiet place, because
-//! there no two boards ever come within the limit, and no pair matters while the whole team keeps its shape. Followers
-//! are solved only as far back as they can reach the boards that matter (`reach`).
+//! S without a jump, has been at the place of handle i before. At that time the pair (1, 1 + k) was where (i, i + k) is
+//! now. Hence pairs without boards 0 and 1 matter only in steps in which handle 2 is somewhere behind S, in either
+//! direction of motion. A pair does not matter if its front handles are both behind the quiet place, because there no
+//! two boards ever come within the limit. No pair matters while the whole team keeps its shape. Followers are solved
+//! only as far back as they can reach the boards that matter (`reach`).
 
 pub mod between;
 mod broad_phase;

@@ -1,8 +1,7 @@
 //! The show: from a scene and a tick to one [`Frame`], always with the same bits.
 //!
 //! In: a scene, its timeline, and ticks. Out: frames. The show uses the solver, the events and the alert rules, but no
-//! wall clock and no transport, so that the live loop, the verification of logs and the stage page all get the same
-//! frames.
+//! wall clock and no transport. So the live loop, the verification of logs and the stage page all get the same frames.
 
 pub mod alerts;
 pub mod clock;

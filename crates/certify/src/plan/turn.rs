@@ -12,7 +12,7 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
-/// The least radius of a turnaround with which a team turns round, when the head comes in from any distance: until the
+/// The least radius of a turnaround with which a team turns round. The head comes in from any distance, and until the
 /// last handle has left the turn, no two boards that share no handle touch, and no link stalls or locks. Radii above
 /// `value_hi` are not covered.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@
 //! there is one.
 //!
 //! Obstacles stand still, so the clearance of a body bench depends on the place of its front handle alone. A follower
-//! table gives this place as a row and a phase (see [`super::bounds`]). Each row is divided into [`CELLS`] equal cells,
-//! and for each row and cell a table has a lower bound of the clearance of all obstacles: the clearance in the middle
+//! table gives this place as a row and a phase (see [`super::bounds`]). Each row is divided into [`CELLS`] equal cells.
+//! For each row and cell a table has a lower bound of the clearance of all obstacles. It is the clearance in the middle
 //! of the cell, less the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the
 //! benches that the bounds do not exclude.
 

@@ -28,7 +28,7 @@
 //! and t and t' are the parts of the two tangents across the link. Where f' keeps its sign, f has at most one zero.
 //!
 //! All these bounds tighten in proportion to the step. The quantities that they must not exceed are f, c, and the
-//! difference of a nearer point's distance to L, and these fall only in proportion to the distance from a singular
+//! difference of a nearer point's distance to L. These fall only in proportion to the distance from a singular
 //! configuration, even where all of them vanish at once. Therefore the steps shrink in geometric progression towards
 //! it.
 
