@@ -312,7 +312,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         let boards = match event.kind {
             EventKind::Contact | EventKind::Obstacle if is_at_start => self.at_start(hint),
             EventKind::Contact => self.touch(event, progress),
-            // The end is taken as found. The steps go beyond it.
+            // The end is taken as found, so the steps go beyond it.
             EventKind::Obstacle => {
                 let (path, end) = (path.length(), event.travelled);
                 let target = self.beside(end, 1.0, |travelled| travelled.lo >= end && travelled.hi <= path);

@@ -164,7 +164,7 @@ impl Subscription {
     }
 
     /// Closes a connection whose publisher has gone. The remaining publishers count as stale for a while, unless a show
-    /// runs here. Then one of the publishers may belong to the next show, which is about to send.
+    /// runs here, because one of them may then belong to the next show, which is about to send.
     pub fn leave(&self, connection: Connection) {
         let remaining = publishers(&connection.poses_service);
         // In this order: a show serves commands before it has a publisher.

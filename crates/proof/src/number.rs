@@ -79,7 +79,7 @@ impl Number {
         if self.is_nan() {
             return f64::NAN;
         }
-        // 53 bits are exact in a double. Two factors, since one alone may overflow.
+        // 53 bits are exact in a double. There are two factors, because one alone may overflow.
         let (leading, exponent) = ((self.mantissa >> 75) as f64, self.exponent + 75);
         let half = exponent / 2;
         let size = leading * 2f64.powi(half) * 2f64.powi(exponent - half);

@@ -58,9 +58,9 @@ pub(super) struct Proposal {
 
 /// Returns the least pitch between two with which the search finds no obstacle.
 ///
-/// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. The pitch
-/// grows in steps of half a percent. So a pitch is missed if the two boards come free and meet again within one step.
-/// `progress` receives each pitch.
+/// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. Because
+/// the pitch grows in steps of half a percent, a pitch is missed if the two boards come free and meet again within one
+/// step. `progress` receives each pitch.
 pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progress: &mut dyn FnMut(f64)) -> Proposal {
     let (mut pitch, mut proposal) = (from, Proposal::default());
     while let Some(mut found) = obstacle(team, pitch, radius) {

@@ -27,9 +27,9 @@ const MOST_MOVED: f64 = 100.0;
 
 /// For every bench a lower bound of its distance to those behind it, carried from frame to frame.
 ///
-/// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D.
-/// If links have errors, this length is a little more. No two boards are nearer by more than twice this length. So an
-/// earlier bound, less this amount for all movement since, still holds.
+/// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D,
+/// or a little more if links have errors. So no two boards are nearer by more than twice this length, and an earlier
+/// bound, less this amount for all movement since, still holds.
 #[derive(Debug, Clone)]
 pub(super) struct CarriedBounds {
     /// The handles of the previous frame.

@@ -119,8 +119,9 @@ impl Path {
     /// turned by half a turn. Travel starts `lead_in` metres before the turn and ends `lead_out` metres after it.
     ///
     /// With R = `turn_radius` the chords of both arcs lie on the diameter through the two ends. They make the same
-    /// angle atan(R/a) with the tangents there. So both arcs turn by twice that angle. Their radii sum to sqrt(R^2 +
-    /// a^2), and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), for any `arc_ratio`, the first radius over the second.
+    /// angle atan(R/a) with the tangents there, so both arcs turn by twice that angle. Their radii sum to sqrt(R^2 +
+    /// a^2), and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), for any `arc_ratio`, which is the first radius over the
+    /// second.
     ///
     /// # Errors
     /// [`Disjoint`] if the numbers are so extreme that rounding leaves a gap.

@@ -163,7 +163,7 @@ impl Recorder {
         self.event(Event::Stage(Box::new(stage.clone())))
     }
 
-    /// Attaches the text of a run's scene. An empty text is not known.
+    /// Attaches the text of a run's scene. An empty text means that the text is not known.
     ///
     /// # Errors
     /// As [`Recorder::frame`].

@@ -80,7 +80,7 @@ pub struct Summary {
     pub wakeup_ns: Percentiles,
     /// The cost of a step: frame, publishing and waking subscribers.
     pub step_ns: Percentiles,
-    /// Samples received. The percentiles miss the other frames.
+    /// The number of samples received. The percentiles leave out the frames whose samples were not received.
     pub samples: u64,
 }
 
