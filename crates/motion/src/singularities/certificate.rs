@@ -24,8 +24,7 @@
 //! **Turns.** Let f be the front cosine, let the rear cosine be at least c, and let m = max |f| over the step. The rear
 //! handle is at most m / c times as fast as the front handle, so the link turns by at most (1 + m / c) / L per metre.
 //! Hence |f'| <= k + (1 + m / c) / L, and m is at most max(ends) + |f'| h / 2. So f has no zero where |f0| + |f1| > max
-//! |f'| h. Further, with signed curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L, where |v| <= m / c,
-//! and t and t' are the parts of the two tangents across the link. Where f' keeps its sign, f has at most one zero.
+//! |f'| h. Further, f' = K n . b + (1 - f^2 - v t . t') / L, with the signed curvature K and the normal n. Here |v| <= m / c, and t and t' are the parts of the two tangents across the link. Where f' keeps its sign, f has at most one zero.
 //!
 //! All these bounds tighten in proportion to the step. The quantities that they must not exceed are f, c, and the
 //! difference of a nearer point's distance to L. These fall only in proportion to the distance from a singular
