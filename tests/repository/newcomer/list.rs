@@ -74,7 +74,6 @@ pub const INSTEAD: &[(&str, &str, &str)] = &[
     ("--name NAME", "--name mine", "the reader's own name"),
     ("events --certify FILE", "--scene tests/scenes/tiny_1.toml events --certify proof.jsonl", "the reader's own file"),
     ("verify FILE", "verify proof.jsonl", "the reader's own file"),
-    ("--plot FILE.svg", "--plot trade.svg", "the reader's own file"),
 ];
 
 const LIGHT_SCENE: &str = "sed '/^\\[publish\\]/a precision = \"f32\"' config/paper.toml > light.toml";
