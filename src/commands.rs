@@ -1,4 +1,4 @@
-//! The subcommands, one file each: arguments to calls of the library. Called by `main` only.
+//! The subcommands, one file each: arguments to calls of the library.
 
 /// Replaces the standard library's, which panics if standard error is closed.
 macro_rules! eprintln {

@@ -11,7 +11,7 @@
 //! - `motion`: the path, the solvers, the events, the clearance. Pure.
 //! - `show`: the scene file, checked, and its frames by tick. Deterministic.
 //! - `certify`: events, clearances and speeds with a proof; the plans of a choreographer.
-//! - `proof`: the checker of certificates. The checker depends on no other crate of this workspace.
+//! - `proof`: the checker of certificates, which depends on no other crate of this workspace.
 //! - `publisher`: the fixed-rate loop, its shared memory, its log.
 //! - `ros2_messages`, `ros2`: the messages of ROS 2, and its topics and services.
 //! - `recording`: MCAP recordings, their replay, and the verification of logs.

@@ -1,6 +1,4 @@
 //! The program's log: lines on standard error and, with ROS 2, on `/rosout`.
-//!
-//! Called by `main` once.
 
 use super::commands::Common;
 

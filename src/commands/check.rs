@@ -88,7 +88,7 @@ impl ProvedBounds {
     }
 }
 
-/// Returns a time that is surely not after a proved one, although that is rounded.
+/// Returns a proved time rounded down, so that it is not after the exact one.
 fn rounded_down(time: f64) -> f64 {
     time.next_down().max(0.0)
 }

@@ -40,7 +40,7 @@ struct Many {
     /// Simulated time between two pictures, which share one camera and one colour scale; with --until
     #[arg(long, value_name = "TIME", value_parser = seconds, requires = "until", allow_negative_numbers = true, group = "stretch")]
     every: Option<f64>,
-    /// The ground that boards cover, with its area, under the boards of --at
+    /// Draw the ground that the boards cover, with its area, under the boards of --at
     #[arg(long, group = "stretch")]
     swept: bool,
     /// The first time: seconds, or an event
@@ -52,7 +52,7 @@ struct Many {
     /// The benches whose ground is drawn, counted from 1, of several dragons as in gold:1-20; by default all
     #[arg(long, value_name = "FIRST-LAST", requires = "swept", value_parser = benches)]
     benches: Option<Benches>,
-    /// One SVG that moves, in place of many: in real time, about --every seconds between two moments
+    /// Draw one SVG that moves in real time, instead of many pictures, with a moment about every --every seconds
     #[arg(long, requires = "every")]
     animated: bool,
 }
@@ -61,7 +61,7 @@ struct Many {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "The picture")]
 struct LookArguments {
-    /// Metres from the centre of the stage to the edge of the picture; by default all boards are shown
+    /// The distance from the centre of the stage to the edge of the picture, in metres; by default all boards are shown
     #[arg(long, value_name = "METRES", conflicts_with = "view", allow_negative_numbers = true)]
     radius: Option<f64>,
     /// The point in the middle of the picture and its width, metres, as in 1.5,2,4
@@ -80,7 +80,7 @@ struct LookArguments {
     /// The height; by default that of the content
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     height: Option<Length>,
-    /// The stage alone: no axes, title or legend
+    /// Draw the stage alone, without axes, title and legend
     #[arg(long)]
     no_axes: bool,
 }

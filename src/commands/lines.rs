@@ -1,5 +1,5 @@
-//! Non-blocking writer for standard error: a terminal stopped with Ctrl-S, or an unread pipe, can block without limit.
-//! Used by `publishing`, whose statistics must not block.
+//! A non-blocking writer for standard error, because a terminal stopped with Ctrl-S, or an unread pipe, can block
+//! without limit.
 
 use std::io::{self, Write};
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};

@@ -1,5 +1,4 @@
-//! A file that a command writes: it appears under its name when it is complete. Called by the commands with `--output`,
-//! `--certify`, `--plot`, `--report` and `--recover`.
+//! A file that a command writes: it appears under its name when it is complete.
 
 use std::ffi::OsString;
 use std::fs::{File, Metadata, OpenOptions, Permissions};

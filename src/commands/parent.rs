@@ -1,5 +1,4 @@
-//! The option of a process that exits when its parent process exits. Called by `run`, `send`, `soak-subscriber` and
-//! `soak-load-generator`.
+//! The option of a process that exits when its parent process exits.
 
 use nix::sys::signal::{SigSet, Signal};
 

@@ -30,7 +30,7 @@ enum Question {
     /// The least pitch at which the scene's team reaches a radius on a spiral without touching itself
     #[command(arg = scene_argument())]
     Pitch {
-        /// Metres from the centre that the front handle of the head must reach
+        /// The distance from the centre that the front handle of the head must reach, in metres
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
         reach_radius: f64,
         /// Write the certificate of the proof to this file, for `verify`
@@ -40,7 +40,7 @@ enum Question {
     /// The greatest constant speed of the head at which no handle of the show exceeds a limit
     #[command(arg = scene_argument())]
     Speed {
-        /// Metres per second that no handle may exceed
+        /// The speed that no handle may exceed, in metres per second
         #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
         max_handle_speed: f64,
         /// Write the certificate of the proof to this file, for `verify`
@@ -50,7 +50,7 @@ enum Question {
     /// The least turn radius with which the scene's team turns round without contact, stall or lock
     #[command(arg = scene_argument())]
     Turn {
-        /// Radius of the first arc over that of the second; without it, the best that is found
+        /// The radius of the first arc divided by that of the second; by default the best ratio that is found
         #[arg(long, value_name = "K", allow_negative_numbers = true)]
         arc_ratio: Option<f64>,
     },

@@ -54,7 +54,7 @@ pub struct RecordArguments {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
-    /// Mend a recording that was cut: keep every finished chunk, in FILE-recovered.mcap or the --output
+    /// Repair a recording that was cut: keep every finished chunk, in FILE-recovered.mcap or the --output
     #[arg(long, value_name = "FILE")]
     recover: Option<PathBuf>,
 }
@@ -112,8 +112,8 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
 }
 
 /// Passes the feed's events to the thread until the end. After the first frame, obstacles of a later publisher's
-/// services do not end the recording. Without its stage a recording cannot be replayed, and without its scene not
-/// verified, so those that follow the first frames are awaited.
+/// services do not end the recording. The end waits for a stage and a scene that follow the first frames, because a
+/// replay needs the stage, and `verify` the scene.
 fn follow(
     feed: &mut Feed,
     queue: &RecordQueue,

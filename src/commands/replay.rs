@@ -21,7 +21,8 @@ use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::{CommandError, Common, number, stop_on_signals};
 
-/// Nanoseconds that waiting subscribers have before the first frame: unlike a show's, it is not sent again.
+/// The time, in nanoseconds, that waiting subscribers have before the first frame, which, unlike a show's, is not sent
+/// again.
 const LEAD_NS: u64 = 500_000_000;
 /// The most cues for which memory is reserved, whatever a damaged stage states.
 const MOST_CUES: usize = 1000;
@@ -32,7 +33,7 @@ pub struct ReplayArguments {
     /// The recording (MCAP) to play, or the directory that `ros2 bag record` wrote
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Send the frames evenly at this rate, in place of at their recorded times
+    /// Send the frames evenly at this rate, instead of at their recorded times
     #[arg(
         long,
         value_name = "HZ",
@@ -56,7 +57,7 @@ pub struct ReplayArguments {
     /// Wall time after which to end: 60, 90s, 1:30, 1h30m
     #[arg(long, value_name = "TIME", value_parser = super::wall_seconds, help_heading = "The show")]
     duration: Option<f64>,
-    /// Begin again whenever the recording is over
+    /// Begin again whenever the recording has ended
     #[arg(long = "loop", help_heading = "The show")]
     looping: bool,
     /// Publish ROS 2 topics too, those of --scene's [publish.ros2], or of the recorded scene, or the default ones

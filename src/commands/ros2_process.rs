@@ -96,7 +96,7 @@ impl Ros2Request {
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "a program without ROS 2 refuses before it reads them"))]
 pub struct Ros2Show {
-    /// Frames per second of the loop.
+    /// The rate of the loop, in frames per second.
     pub loop_rate: f64,
     /// True if there are alerts.
     pub alerts: bool,

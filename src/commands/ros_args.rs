@@ -1,8 +1,7 @@
 //! The arguments after `--ros-args`, as ROS 2's launch files and `ros2 run` append them: understood, or refused with a
 //! sentence that names what is understood.
 //!
-//! In: the arguments of the process. Out: the program's own arguments, and the names of the node. Called by `main`
-//! before the command line is parsed, and by the commands that publish over ROS 2.
+//! In: the arguments of the process. Out: the program's own arguments, and the names of the node.
 
 mod parameters;
 

@@ -26,13 +26,13 @@ use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
 use super::{CommandError, Common, number, search_timeline, stop_on_signals, warn_of_doubts, warn_of_gap};
 
-/// Nanoseconds that waiting subscribers have before the first frame: each tries to connect every 20 ms.
+/// The time, in nanoseconds, that waiting subscribers have before the first frame: each tries to connect every 20 ms.
 const LEAD_NS: u64 = 100_000_000;
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
 pub struct RunArguments {
-    /// Frames per second; by default the scene's
+    /// The rate in frames per second; by default the scene's
     #[arg(long, value_name = "HZ", help_heading = "The show", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Simulated seconds per second of wall time

@@ -1,6 +1,5 @@
-//! The facts about a scene that the page of `view` shows and that no publisher sends. The facts are whether the scene
-//! loops, and its clearance over the whole show. In: the text of a scene. Out: facts for `outputs`. Computed once for
-//! each scene.
+//! The facts about a scene that the page of `view` shows and that no publisher sends: whether the scene loops, and its
+//! clearance over the whole show. In: the text of a scene. Out: facts for `outputs`, computed once for each scene.
 
 use std::time::{Duration, Instant};
 

@@ -54,16 +54,16 @@ struct PsnArguments {
     /// The stage's axes for the desk's x, y and z: x, y (into the depth) and up, in any order; a minus reverses one
     #[arg(long, value_name = "X,Y,Z", default_value_t = Axes::default(), allow_hyphen_values = true)]
     axes: Axes,
-    /// Number of networks that multicast may pass, this one included
+    /// The number of networks that multicast may pass, including this one
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=255))]
     ttl: u32,
-    /// Frames per second at most, up to 250; a slower publisher sets its own
+    /// The greatest rate in frames per second, up to 250; a slower publisher is sent at its own rate
     #[arg(long, value_name = "HZ", default_value_t = USUAL_RATE, value_parser = rate::<250>)]
     rate: f64,
     /// The tracker number of the head, of the first dragon if there are several
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     first_id: u16,
-    /// Distance between the tracker numbers of the heads of several publishers, or of several dragons of one
+    /// The distance between the tracker numbers of the heads of several publishers, or of several dragons of one
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u16).range(1..))]
     id_step: u16,
     /// The name under which desks list this sender; without it, the publisher's, or bench-dragon for several
@@ -80,7 +80,7 @@ struct OscArguments {
     /// The address of this machine's interface to send by; without it, the machine's routes decide
     #[arg(long, value_name = "IP")]
     interface: Option<Ipv4Addr>,
-    /// Bundles of frames per second at most, up to 60; a slower publisher sets its own
+    /// The greatest rate in bundles of frames per second, up to 60; a slower publisher is sent at its own rate
     #[arg(long, value_name = "HZ", default_value_t = f64::from(MOST_RATE), value_parser = rate::<MOST_RATE>)]
     rate: f64,
 }

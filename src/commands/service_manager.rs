@@ -1,8 +1,9 @@
 //! Messages to the service manager that started this program (systemd, `Type=notify`): ready with the first frame,
 //! alive while the loop turns, stopping. Without `NOTIFY_SOCKET` in the environment nothing is sent.
 //!
-//! Called on the statistics thread, which sees the loop turn: the loop's thread does no system call for it. The loop
-//! turns about ten times a second, also between the frames of a slow scene and while a show is paused or held.
+//! They are sent on the statistics thread, which sees the loop turn, so that the loop's thread makes no system call for
+//! them. The loop turns about ten times a second, also between the frames of a slow scene and while a show is paused or
+//! held.
 
 use std::time::{Duration, Instant};
 

@@ -38,7 +38,7 @@ pub struct SoakArguments {
     /// Wall time after which to end: 60, 90s, 1:30, 1h30m
     #[arg(long, value_name = "TIME", value_parser = wall_seconds, default_value = "8h", help_heading = "The test")]
     duration: f64,
-    /// Frames per second; by default the scene's
+    /// The rate in frames per second; by default the scene's
     #[arg(long, value_name = "HZ", help_heading = "The test", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Subscribers that keep up and must miss nothing
@@ -66,16 +66,17 @@ pub struct SoakArguments {
     report: Option<PathBuf>,
     #[command(flatten)]
     scheduling: RealtimeScheduling,
-    /// Frames that subscribers which keep up may miss, all together
+    /// The number of frames that the subscribers that keep up may miss in all
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Limits")]
     max_missed: u64,
-    /// Share of the periods that may be skipped
+    /// The share of the periods that may be skipped
     #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0.01%", help_heading = "Limits")]
     max_skipped: f64,
-    /// Wake-up lateness, 99.9th percentile: 200us, 1ms
+    /// The wake-up lateness at the 99.9th percentile: 200us, 1ms
     #[arg(long, value_name = "TIME", value_parser = nanoseconds, default_value = "200us", help_heading = "Limits")]
     max_lateness_p999: u64,
-    /// Growth of the publisher's resident memory after the first minute, and of the ROS 2 process's: 500kB, 1MB
+    /// The growth of the publisher's resident memory after the first minute, and of that of the ROS 2 process: 500kB,
+    /// 1MB
     #[arg(long, value_name = "SIZE", value_parser = bytes, default_value = "1MB", help_heading = "Limits")]
     max_rss_growth: u64,
 }

@@ -26,7 +26,7 @@ pub struct TradeArguments {
     /// Draw the error at the moment of display against bytes per second as an SVG
     #[arg(long, value_name = "FILE", help_heading = "The display")]
     pub display_plot: Option<PathBuf>,
-    /// Pictures per second of the display [default: 60]
+    /// The rate of the display in pictures per second [default: 60]
     #[arg(long, value_name = "HZ", value_parser = display_rate, help_heading = "The display")]
     pub display_rate: Option<f64>,
     /// Delay of the display behind the stream [default: 0 for `hold`, else one publishing period]

@@ -16,7 +16,7 @@ use super::{CommandError, Common, Output, progress_bar};
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
 pub struct VerifyArguments {
-    /// A log, as `run --log` writes it, a certificate, as `events --certify` does, or a recording, as `record` does
+    /// A log of `run --log`, a certificate of `events --certify`, or a recording of `record`
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }

@@ -13,9 +13,8 @@
 // `subscribe` prints a JSON line for each sample, one when the subscriber exists, and one when it is matched with a
 // publisher. `subscribe` prints another when the subscriber has ended, with the quality of service that the publisher
 // offers. The subscriber ends after S seconds, or some time after N samples. With --joins that happens N times, each
-// with a participant of its own.
-// `call` makes the first call of N new clients, each with a participant that knows the server before, and prints a JSON
-// line for each. Called by tests/ros2/fast_dds.rs, which builds this file.
+// with a participant of its own. `call` makes the first call of N new clients, each with a participant that knows the
+// server before, and prints a JSON line for each.
 
 #include <algorithm>
 #include <chrono>

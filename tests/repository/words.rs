@@ -1,5 +1,5 @@
-//! The prose of sources, tests, examples and documents. It has no private word where the field has a standard word,
-//! and no phrase that must be read twice. Its sentences have at most 25 words, and its comments begin with a noun.
+//! The prose of sources, tests, examples and documents. It has no private word where the field has a standard word, and
+//! no phrase that must be read twice. Its comments begin with a noun, and no sentence runs away.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -77,8 +77,9 @@ const PHRASES: [(&str, &str); 17] = [
 /// Words that stand in the place of a noun at the beginning of a paragraph.
 const NOT_NOUNS: [&str; 7] = ["What", "Whatever", "Those", "How", "Which", "Whose", "Who"];
 
-/// The most words of a sentence. A code span is one word.
-const MOST_WORDS: usize = 25;
+/// The most words of a sentence. A code span is one word. Shorter is no aim: a reason keeps its "because", and a
+/// consequence its "so". The limit only finds sentences that have run away.
+const MOST_WORDS: usize = 35;
 
 /// Returns all files below a folder.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -263,7 +264,7 @@ fn no_comment_begins_with_a_word_in_the_place_of_a_noun() {
 }
 
 #[test]
-fn no_sentence_has_more_than_25_words() {
+fn no_sentence_runs_away() {
     let (mut found, mut count) = (Vec::new(), 0);
     for (place, paragraph) in all_paragraphs() {
         for sentence in sentences(&paragraph) {

@@ -1,6 +1,5 @@
-//! Certified contacts of several dragons. The certificate has the events of each dragon alone. Then it has, for each
-//! two dragons, stretches of time in which their boards are apart, up to their first contact. Lemma 12 of
-//! `docs/proofs.md`.
+//! Certified contacts of several dragons. The certificate has the events of each dragon alone, and for each two dragons
+//! stretches of time in which their boards are apart, up to their first contact. Lemma 12 of `docs/proofs.md`.
 
 mod clearance;
 mod side;
@@ -114,9 +113,9 @@ struct PairSearch<'a, 'w> {
     upper: Option<UpperBetween>,
     /// The least of the metres that the stretches have shown boards to be apart.
     shown: Option<f64>,
-    /// Seconds up to which stretches have come.
+    /// The time up to which stretches have come, in seconds.
     time: f64,
-    /// Seconds of the next step to try.
+    /// The length of the next step to try, in seconds.
     step: f64,
     steps: u64,
     most_steps: u64,

@@ -7,7 +7,7 @@ use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::closest_points_board_board;
 use bench_dragon_motion::model::team::Team;
 
-/// Size of a board, in intervals.
+/// The size of a board, in intervals.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
     pub inset: Interval,
@@ -20,7 +20,7 @@ pub(super) struct MovingBoard {
     front: Capsule,
     rear: Capsule,
     link: Interval,
-    /// Length of the board beyond each handle, as a share of the link.
+    /// The length of the board beyond each handle, as a share of the link.
     share: Interval,
     half_width: Interval,
     /// A point near the middle, in doubles. The disc of `radius` metres about it holds the board at every moment.
@@ -110,7 +110,7 @@ impl MovingBoard {
             || metres > 0.0 && is_separated(self.towards(other))
     }
 
-    /// Returns about half the extent of the board along a unit vector, metres.
+    /// Returns about half the extent of the board along a unit vector, in metres.
     fn extent(&self, [x, y]: [f64; 2]) -> f64 {
         let [along, across] =
             [x * self.direction[0] + y * self.direction[1], x * self.direction[1] - y * self.direction[0]];

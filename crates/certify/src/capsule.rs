@@ -19,11 +19,11 @@ pub(super) struct Capsule {
     pub point: Vector,
     /// The tangent at m.
     pub tangent: Vector,
-    /// Upper bound of the distance from m to either end, metres.
+    /// An upper bound of the distance from m to either end, in metres.
     pub half: f64,
-    /// Upper bound of the radius of the disc that is added to the tangent's stretch, metres.
+    /// An upper bound of the radius of the disc that is added to the tangent's stretch, in metres.
     pub radius: f64,
-    /// Upper bound of the curvature in the span, 1/m.
+    /// An upper bound of the curvature in the span, 1/m.
     pub curvature: f64,
 }
 

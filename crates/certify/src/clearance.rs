@@ -1,5 +1,5 @@
 //! Enclosures of the least clearance of two boards in a show, and of the least clearance of each obstacle. Steps of the
-//! head prove the lower bounds. For each enclosure, one place proves the upper bound. Lemmas 6 and 11 of
+//! head prove the lower bound of each enclosure, and one place proves its upper bound. Lemmas 6 and 11 of
 //! `docs/proofs.md`.
 
 mod apart;
@@ -27,14 +27,14 @@ use bench_dragon_motion::timeline::{TimedEvent, TimedObstacleClearance};
 use beside::{Beside, UpperBeside};
 pub(super) use certificate::first_line as clearance_first_line;
 
-/// Width of the enclosure in metres, with room for the rounding of both ends.
+/// The width of the enclosure in metres, with room for the rounding of both ends.
 const WIDTH: f64 = 0.9e-9;
 
-/// Metres by which a new upper bound must be lower than the one before.
+/// The difference, in metres, by which a new upper bound must be lower than the one before.
 const LOWER: f64 = 1e-3 * WIDTH;
 
-/// Factors of the step length after a step that is shown, after one that is not, and after further ones that are not.
-/// Steps close to the longest cost more attempts, and make the certificate shorter.
+/// The factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and
+/// later shrinks. Steps close to the longest need more attempts, but make the certificate shorter.
 const GROWTH: f64 = 1.1;
 const SHRINK: f64 = 0.8;
 const SHRINK_FURTHER: f64 = 0.5;
@@ -45,37 +45,37 @@ const LEAST_STEP: f64 = 1e-14;
 /// Rounding error of the show's end, as a share of the path length in metres.
 const END_SLACK: f64 = 1e-13;
 
-/// Margin of an upper bound before the end of a show, unless the show ends with the path. The margin is the sum of a
-/// share of the travel and a number of distances of grid points.
+/// The margin of an upper bound before the end of a show, unless the show ends with the path. The margin is the sum of
+/// a share of the travel and a number of distances of grid points.
 const BEFORE_TIME: f64 = 4e-14;
 const GRID: f64 = 8.0;
 
-/// Distances in metres before a lock at which the search may stop, tried in this order. The nearer the stop, the less
-/// the lost handle can still move.
+/// The distances in metres before a lock at which the search may stop, tried in this order. The nearer the stop, the
+/// less the lost handle can still move.
 const BEFORE_LOCK: [f64; 3] = [1e-9, 3e-11, 1e-12];
 
-/// Distance behind a contact, in links, at which boards are expected to overlap surely.
+/// The distance behind a contact, in links, at which boards are expected to overlap surely.
 const TOUCH: f64 = 1e-3;
 
-/// Default limit of steps.
+/// The default limit of steps.
 pub const MOST_CLEARANCE_STEPS: u64 = 100_000;
 
 /// An enclosure of the least clearance of a show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClearanceEnclosure {
-    /// Lower bound in metres, for all boards that share no handle, from the start up to `until`.
+    /// The lower bound in metres, for all boards that share no handle, from the start up to `until`.
     pub lo: f64,
-    /// Upper bound in metres: two boards are as near at one place of the show.
+    /// The upper bound in metres: two boards are as near at one place of the show.
     pub hi: f64,
-    /// Travel of the head at that place in metres, approximate.
+    /// The travel of the head at that place in metres, approximate.
     pub travelled: f64,
     /// The bench of the two that is nearer the head, counted from 0.
     pub bench_a: usize,
     /// The other bench.
     pub bench_b: usize,
-    /// Travel in metres up to which `lo` is proved, if not up to the show's end.
+    /// The travel in metres up to which `lo` is proved, if not up to the show's end.
     pub until: Option<f64>,
-    /// Number of steps tried.
+    /// The number of steps tried.
     pub steps: u64,
 }
 
@@ -84,24 +84,24 @@ pub struct ClearanceEnclosure {
 pub struct ObstacleEnclosure {
     /// The obstacle's number on the stage, the boundary last.
     pub obstacle: usize,
-    /// Lower bound in metres, for all boards, from the start up to `until`.
+    /// The lower bound in metres, for all boards, from the start up to `until`.
     pub lo: f64,
-    /// Upper bound in metres: the bench's clearance is no more at one place of the show.
+    /// The upper bound in metres: the bench's clearance is no more at one place of the show.
     pub hi: f64,
-    /// Travel of the head at that place in metres, approximate.
+    /// The travel of the head at that place in metres, approximate.
     pub travelled: f64,
     /// The bench, counted from 0.
     pub bench: usize,
-    /// Travel in metres up to which `lo` is proved, if not up to the show's end.
+    /// The travel in metres up to which `lo` is proved, if not up to the show's end.
     pub until: Option<f64>,
 }
 
 /// The least clearances that the ordinary search has found. They only suggest where to search.
 #[derive(Debug, Clone, Copy)]
 pub struct ClearanceHints<'h> {
-    /// Least clearance of two boards; `None` to enclose only the clearances of the obstacles.
+    /// The least clearance of two boards; `None` to enclose only the clearances of the obstacles.
     pub boards: Option<&'h LeastClearance>,
-    /// Least clearance of each obstacle.
+    /// The least clearance of each obstacle.
     pub obstacles: &'h [TimedObstacleClearance],
 }
 
@@ -205,9 +205,9 @@ pub(super) struct Descent<'a, 'w> {
     step: f64,
     steps: u64,
     most_steps: u64,
-    /// Travel at the end of the show, metres.
+    /// The travel at the end of the show, in metres.
     end: f64,
-    /// Travel up to which a place may show an upper bound, metres.
+    /// The travel up to which a place may show an upper bound, in metres.
     latest: f64,
     /// The upper bound that is known. Boards are tested only if this or `floor` is set.
     upper: Option<Upper>,
@@ -226,9 +226,9 @@ pub(super) struct Descent<'a, 'w> {
 pub(super) struct Part {
     /// The dragon; empty in a show of one.
     pub dragons: Vec<usize>,
-    /// Seconds of the show during which it stands at its start.
+    /// The time of the show, in seconds, during which it stands at its start.
     pub delay: f64,
-    /// Seconds at which the show ends, if that is not by itself.
+    /// The time at which the show ends, in seconds, if the dragon does not end it itself.
     pub show_end: Option<f64>,
 }
 
@@ -300,7 +300,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         };
         self.latest = match event.kind {
             EventKind::PathEnd => self.end,
-            // The certificate ends by a time that is rounded down. A place after it would show nothing.
+            // The certificate ends by a time that is rounded down, so a place after that time would show nothing.
             _ => {
                 let last = self.chain.exact.travelled(self.grid_point(self.end).head).lo.min(self.end);
                 let delayed = self.part.delay * motion.head_speed();
@@ -312,7 +312,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         let boards = match event.kind {
             EventKind::Contact | EventKind::Obstacle if is_at_start => self.at_start(hint),
             EventKind::Contact => self.touch(event, progress),
-            // The end is taken as found. The steps go beyond it.
+            // The end is taken as found, so the steps go beyond it.
             EventKind::Obstacle => {
                 let (path, end) = (path.length(), event.travelled);
                 let target = self.beside(end, 1.0, |travelled| travelled.lo >= end && travelled.hi <= path);

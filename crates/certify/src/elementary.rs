@@ -7,7 +7,7 @@ use super::interval::Interval;
 /// Pi / 2 as a sum of three doubles of at most 26 bits each: their products with a whole number below 2^27 are exact.
 const HALF_PI: [f64; 3] = [1.5707963109016418, 1.5893254712295857e-8, 6.123233932053594e-17];
 
-/// Upper bound of pi / 2 minus the sum of [`HALF_PI`].
+/// An upper bound of pi / 2 minus the sum of [`HALF_PI`].
 const HALF_PI_REST: f64 = 6.4e-25;
 
 /// The greatest argument of [`sin_cos`]. Beyond it the result is the whole range.
@@ -76,7 +76,7 @@ fn rounded(x: f64) -> f64 {
     ((x.abs() + 0.5) as i64 as f64).copysign(x)
 }
 
-/// Number of angles in a radian whose sine and cosine are kept.
+/// The number of angles in a radian whose sine and cosine are kept.
 const PER_RADIAN: f64 = 128.0;
 
 /// Sine and cosine of an angle, both off by at most `error`.

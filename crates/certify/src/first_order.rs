@@ -19,24 +19,24 @@ pub(super) struct FirstOrderHandle {
     tangent: Vector,
     /// Velocity along that tangent, metres per metre of the head.
     velocity: Vector,
-    /// Speed of the handle over the step, metres per metre of the head.
+    /// The speed of the handle over the step, metres per metre of the head.
     rate: Interval,
-    /// Upper bound of the metres of path from m to the handle at the middle of the step.
+    /// An upper bound of the metres of path from m to the handle at the middle of the step.
     offset: f64,
-    /// Upper bound of the error at the middle of the step, metres.
+    /// An upper bound of the error at the middle of the step, in metres.
     still: f64,
-    /// Upper bound of the error anywhere in the step, metres.
+    /// An upper bound of the error anywhere in the step, in metres.
     error: f64,
-    /// Upper bound of the curvature in the handle's span, 1/m.
+    /// An upper bound of the curvature in the handle's span, 1/m.
     curvature: f64,
 }
 
 /// The motion of the head over a step. For two dragons, tau is a time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
-    /// Metres of the head per unit of tau.
+    /// The travel of the head per unit of tau, in metres.
     pub rate: Interval,
-    /// Upper bound of the metres of path from the head's place to the head in the middle of the step.
+    /// An upper bound of the metres of path from the head's place to the head in the middle of the step.
     pub offset: f64,
     /// Greatest |tau|.
     pub half_step: f64,
@@ -49,10 +49,10 @@ impl Pace {
     }
 }
 
-/// Number of times that the products of a link are enclosed again from the last enclosure of its rear handle.
+/// The number of times that the products of a link are enclosed again from the last enclosure of its rear handle.
 const REFINEMENTS: u32 = 3;
 
-/// Factor of the errors: the checker of certificates has other capsules, and its errors may be a little greater.
+/// The factor of the errors: the checker of certificates has other capsules, and its errors may be a little greater.
 const SPARE: f64 = 1.01;
 
 /// Moments of a step.

@@ -1,5 +1,5 @@
 //! Handles and boards over a step of the head: spans by Lemma 1, and first-order enclosures by Lemma 6 of
-//! `docs/proofs.md`. [`super::clearance`] and [`super::between`] use it.
+//! `docs/proofs.md`.
 
 use super::capsule::Span;
 use super::first_order::{FirstOrderBoard, FirstOrderHandle, Pace, When};

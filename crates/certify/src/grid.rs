@@ -1,5 +1,5 @@
 //! Grid points of the search: the handles for one place of the head, in doubles. They are the starting guess of the
-//! spans; correctness does not depend on them.
+//! spans, so correctness does not depend on them.
 
 use super::capsule::Span;
 use super::path::{ExactPath, Place};
@@ -20,7 +20,7 @@ pub(super) struct Handle {
 /// A place of the head, and as many handles as were needed.
 #[derive(Debug, Clone)]
 pub(super) struct GridPoint {
-    /// Travel in metres, approximate.
+    /// The travel in metres, approximate.
     pub travelled: f64,
     pub head: Place,
     pub handles: Vec<Handle>,

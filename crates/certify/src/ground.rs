@@ -1,5 +1,5 @@
-//! Lemmas 9 and 11 of `docs/proofs.md`. They prove that a board stays clear of the obstacles of a stage over a step, or
-//! further away than a number of metres. They also prove that a board has come to an obstacle.
+//! Proofs that over a step a board stays clear of the obstacles of a stage, or further away than a number of metres,
+//! and that a board has come to an obstacle. Lemmas 9 and 11 of `docs/proofs.md`.
 
 use super::boards::MovingBoard;
 use super::first_order::{FirstOrderBoard, When};
@@ -13,13 +13,13 @@ use bench_dragon_motion::model::{self, Point};
 /// Rounding of a corner in the path's own coordinates, as a share of the coordinates.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Metres of an overlap with an outline that is no more than a touch.
+/// The depth, in metres, up to which an overlap with an outline is no more than a touch.
 const DEEPEST: f64 = 1e-10;
 
 /// An obstacle in the path's own coordinates.
 pub(super) struct Barrier {
     obstacle: Obstacle,
-    /// Metres by which the rounding of the corners may move them.
+    /// The distance, in metres, by which the rounding of the corners may move them.
     rounding: f64,
 }
 
@@ -99,7 +99,7 @@ impl Barrier {
         shape.kind() == ShapeKind::Circle || clearance + keep_out > -DEEPEST
     }
 
-    /// Returns an upper bound of the clearance of a board, metres.
+    /// Returns an upper bound of the clearance of a board, in metres.
     pub fn at_most(&self, board: &FirstOrderBoard, when: When) -> f64 {
         let Self { obstacle: Obstacle { shape, keep_out, .. }, rounding } = self;
         let in_doubles = board.in_doubles();

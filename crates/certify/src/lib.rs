@@ -1,10 +1,9 @@
-//! Certified events. The search encloses every handle over steps of the head, rounded outward. From the enclosures
-//! follows when contact, stall, lock and path end first happen, or that they do not.
+//! Certified events. The search encloses every handle over steps of the head, rounded outward. The enclosures show when
+//! contact, stall, lock and path end first happen, or that they do not.
 //!
 //! In: a scene's motion, its text, and its events from the ordinary search. Out: the lines of a certificate and the
-//! events that they prove. The `events` command calls it; the crate `proof` checks the lines with code of its own. The
-//! ordinary search only suggests where to search: an event that it misses makes the proof fail. Lemmas and file format:
-//! `docs/proofs.md`.
+//! events that they prove. The crate `proof` checks the lines with code of its own. The ordinary search only suggests
+//! where to search, so an event that it misses makes the proof fail. Lemmas and file format: `docs/proofs.md`.
 
 mod between;
 mod boards;
@@ -48,7 +47,7 @@ use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::timeline::Timeline;
 
-/// Default limit of steps: some minutes, and hundreds of megabytes.
+/// The default limit of steps: some minutes, and hundreds of megabytes.
 pub const MOST_STEPS: u64 = 400_000;
 
 /// The reason for a missing certificate.

@@ -1,5 +1,4 @@
-//! The lines of a certificate: see "The file" in `docs/proofs.md`. The search writes them; the `events` command prints
-//! their results.
+//! The lines of a certificate: see "The file" in `docs/proofs.md`.
 
 use std::io::{self, Write};
 
@@ -12,7 +11,7 @@ use bench_dragon_messages::state::EventKind;
 /// The version of the file format.
 pub const FORMAT: u32 = 2;
 
-/// Seconds between the times of a proved event beyond which the search gives the reason.
+/// The difference of the two times of a proved event, in seconds, beyond which the search gives the reason.
 pub const WIDE: f64 = 1e-9;
 
 /// The links for which a step is shown.
@@ -53,7 +52,7 @@ pub enum CertificateLine<'a> {
         to: Place,
         /// The spans of the handles from 1 on.
         spans: Vec<Span>,
-        /// The point, metres.
+        /// The point, in metres.
         point: [f64; 2],
     },
     /// Two boards are no further apart than a number of metres.
@@ -68,7 +67,7 @@ pub enum CertificateLine<'a> {
         spans: Vec<Span>,
         /// A place of each of these spans, the head's first.
         at: Vec<Place>,
-        /// Metres.
+        /// The bound, in metres.
         most: f64,
     },
     /// The clearance of an obstacle is no more than a number of metres.
@@ -85,7 +84,7 @@ pub enum CertificateLine<'a> {
         spans: Vec<Span>,
         /// A place of each of these spans, the head's first.
         at: Vec<Place>,
-        /// Metres.
+        /// The bound, in metres.
         most: f64,
     },
     /// A board is within the keep-out of an obstacle.
@@ -100,7 +99,7 @@ pub enum CertificateLine<'a> {
         to: Place,
         /// The spans of the handles from 1 on.
         spans: Vec<Span>,
-        /// A point of the board, metres.
+        /// A point of the board, in metres.
         point: [f64; 2],
     },
     /// The front product of a link is negative.
@@ -147,15 +146,15 @@ pub enum CertificateLine<'a> {
     /// No boards of the two dragons touch from one time to another; in a certificate of the least clearance, no link
     /// locks.
     Both {
-        /// Seconds of the show.
+        /// The time of the show at which the stretch begins, in seconds.
         from: f64,
-        /// Seconds of the show.
+        /// The time of the show at which it ends, in seconds.
         to: f64,
         /// The spans of both heads meanwhile.
         heads: [Span; 2],
         /// The spans of the handles from 1 on of each.
         spans: [Vec<Span>; 2],
-        /// Metres that boards of the two are further apart, in a certificate of the least clearance.
+        /// The distance, in metres, that boards of the two keep at least, in a certificate of the least clearance.
         #[serde(skip_serializing_if = "Option::is_none")]
         apart: Option<f64>,
         /// A place of each span of each dragon, the heads' first, for `apart`.
@@ -166,7 +165,7 @@ pub enum CertificateLine<'a> {
     NearBoth {
         /// A bench of each, counted from 0.
         benches: [usize; 2],
-        /// Seconds of the show.
+        /// The time of the show, in seconds.
         time: f64,
         /// The spans of both heads at that time.
         heads: [Span; 2],
@@ -174,14 +173,14 @@ pub enum CertificateLine<'a> {
         spans: [Vec<Span>; 2],
         /// A place of each span of each dragon, the heads' first.
         at: [Vec<Place>; 2],
-        /// Metres.
+        /// The bound, in metres.
         most: f64,
     },
     /// Two boards of the two dragons have a point in common at a time.
     Meeting {
         /// A bench of each, counted from 0.
         benches: [usize; 2],
-        /// Seconds of the show.
+        /// The time of the show, in seconds.
         time: f64,
         /// The spans of both heads at that time.
         heads: [Span; 2],
@@ -220,7 +219,7 @@ pub enum CertificateLine<'a> {
     GreatestSpeed(CertifiedSpeed),
     /// The question about the least pitch.
     Reach {
-        /// Metres from the centre that the head is to reach.
+        /// The radius that the head is to reach, in metres from the centre.
         radius: f64,
         /// The least pitch that is tested, metres per turn.
         from: f64,
@@ -231,7 +230,7 @@ pub enum CertificateLine<'a> {
         from: f64,
         /// The greatest pitch, metres per turn.
         to: f64,
-        /// The polar angle of the head, radians.
+        /// The polar angle of the head, in radians.
         theta: f64,
         /// The two benches, counted from 0.
         benches: [usize; 2],
@@ -249,9 +248,9 @@ pub enum CertificateLine<'a> {
     },
     /// No boards touch further out than a radius. Steps on the spiral of this pitch follow.
     Far {
-        /// Metres per turn.
+        /// The pitch, in metres per turn.
         pitch: f64,
-        /// Metres from the centre.
+        /// The radius, in metres from the centre.
         radius: f64,
     },
     /// The result for the least pitch.
@@ -273,13 +272,14 @@ impl CertificateLine<'_> {
 /// The certified least pitch with which a team reaches a radius.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CertifiedPitch {
-    /// Metres from the centre that the head is to reach.
+    /// The radius that the head is to reach, in metres from the centre.
     pub radius: f64,
     /// The least pitch that is tested, metres per turn.
     pub from: f64,
-    /// Metres per turn: with every pitch from `from` to this, two boards overlap or a link locks before.
+    /// The lower pitch, in metres per turn: with every pitch from `from` to this one, two boards overlap or a link
+    /// locks before.
     pub value_lo: Option<f64>,
-    /// Metres per turn: with this pitch the head reaches the radius.
+    /// The higher pitch, in metres per turn: with it the head reaches the radius.
     pub value_hi: Option<f64>,
 }
 
@@ -298,11 +298,11 @@ pub enum About {
 /// The certified greatest speed of the head at which no handle exceeds a limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CertifiedSpeed {
-    /// Metres per second that no handle may exceed.
+    /// The speed that no handle may exceed, in metres per second.
     pub limit: f64,
-    /// Metres per second: with the head no faster, no handle exceeds the limit.
+    /// The lower speed, in metres per second: if the head is no faster, no handle exceeds the limit.
     pub value_lo: f64,
-    /// Metres per second: with the head any faster, the handle exceeds the limit.
+    /// The higher speed, in metres per second: if the head is any faster, the handle exceeds the limit.
     pub value_hi: f64,
     /// The handle has at least this ratio to the head's speed at one place.
     pub ratio_lo: f64,
@@ -329,9 +329,9 @@ pub enum Until {
 /// The certified least clearance, from the scene's start on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CertifiedClearance {
-    /// Metres: no two boards that share no handle are nearer.
+    /// The lower bound, in metres: no two boards that share no handle are nearer.
     pub lo: Option<f64>,
-    /// Metres: at one place the two benches are no further apart.
+    /// The upper bound, in metres: at one place the two benches are no further apart.
     pub hi: Option<f64>,
     /// The end of the stretch.
     pub until: Until,
@@ -353,9 +353,9 @@ pub struct CertifiedClearance {
 pub struct CertifiedObstacleClearance {
     /// The obstacle's number on the stage, the boundary last.
     pub obstacle: usize,
-    /// Metres: no board's clearance is less.
+    /// The lower bound, in metres: no board's clearance is less.
     pub lo: Option<f64>,
-    /// Metres: at one place the bench's clearance is no more.
+    /// The upper bound, in metres: at one place the bench's clearance is no more.
     pub hi: Option<f64>,
     /// The end of the stretch: the path's end or a time.
     pub until: Until,
@@ -387,7 +387,7 @@ pub struct Step {
     /// The obstacles that all boards avoid in this step and before.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub free: Vec<usize>,
-    /// Metres that boards are further apart in this step.
+    /// The distance that boards keep at least in this step, in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub apart: Option<f64>,
     /// By obstacle: metres that its clearance is more than in this step, if it is claimed.
@@ -422,9 +422,9 @@ pub struct CertifiedEvent {
 pub enum Status {
     /// The first event of this kind is between two times.
     Proved {
-        /// Earliest time, simulated seconds.
+        /// Earliest time, in simulated seconds.
         time_lo: f64,
-        /// Latest time, simulated seconds.
+        /// The latest time, in simulated seconds.
         time_hi: f64,
         /// The bench that stalls or locks, or the first of two that touch, at the latest time; counted from 0.
         bench_a: Option<usize>,

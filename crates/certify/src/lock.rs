@@ -9,12 +9,12 @@ use super::path::Place;
 use super::step::Chain;
 use bench_dragon_motion::model::root::{bisect_predicate, golden_section_min};
 
-/// Number of places between the handles of a link at which a nearer follower is searched for. The distances of these
-/// places from the follower grow by the ratio.
+/// The number of places between the handles of a link at which a nearer follower is searched for. The distances of
+/// these places from the follower grow by the ratio.
 const JUMP_SAMPLES: i32 = 400;
 const JUMP_RATIO: f64 = 1.05;
 
-/// Distances of a window's ends from the follower, as multiples of the distance of the place of greatest distance.
+/// The distances of a window's ends from the follower, as multiples of the distance of the place of greatest distance.
 const WIDER: [f64; 6] = [2.0, 4.0, 16.0, 64.0, 256.0, 1024.0];
 
 /// Limit of halvings of the stretch in which a link that locks has no follower any more.

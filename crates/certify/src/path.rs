@@ -70,7 +70,7 @@ impl Serialize for Place {
 }
 
 /// A curve of the path. The coordinate of a spiral is the polar angle. `shift` is the distance from the centre in units
-/// of a, minus the polar angle. It is 0 except for turnarounds that are turned, see [`ExactPath::turnaround`].
+/// of a, minus the polar angle, which is 0 except for turnarounds that are turned: see [`ExactPath::turnaround`].
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Curve {
     Inward { a: Interval, shift: Interval, frame: Option<Frame> },
@@ -107,7 +107,7 @@ pub(super) struct Segment {
     pub curve: Curve,
     pub begin: Interval,
     pub end: Interval,
-    /// Travel of the head at the segment's start, metres; for the first segment, at its end.
+    /// The travel of the head at the segment's start, in metres; for the first segment, at its end.
     travelled: Interval,
 }
 
@@ -458,8 +458,8 @@ impl ExactPath {
         Place(segment, if curve.grows() { end.lo.next_down() } else { end.hi.next_up() }, 0.0)
     }
 
-    /// Returns a place between two: the middle on one segment, else the end of the earlier segment or the beginning of
-    /// the later one. `None` if there is none.
+    /// Returns a place between two: the middle if both are on one segment, and otherwise the end of the earlier segment
+    /// or the beginning of the later one. Returns `None` if there is none.
     pub fn between(&self, x: Place, y: Place) -> Option<Place> {
         if x.0 == y.0 {
             let middle = x.middle(y);
@@ -534,7 +534,7 @@ impl ExactPath {
         (x.0 == y.0).then(|| self.curve(x).bend_rate(x.coordinate(), y.coordinate()))
     }
 
-    /// Returns the travel of the head at a place, metres.
+    /// Returns the travel of the head at a place, in metres.
     pub fn travelled(&self, place: Place) -> Interval {
         let Segment { curve, begin, end, travelled } = &self.segments[place.0];
         let at = place.coordinate();

@@ -1,8 +1,7 @@
-//! Proofs for teams that come in on inward spirals from any distance. Boards overlap with every pitch of an interval,
-//! or no boards touch with one pitch. [`crate::plan`] calls it. "The least pitch" and Lemma 8 in `docs/proofs.md`.
+//! Proofs for teams that come in on inward spirals from any distance: that boards overlap with every pitch of an
+//! interval, or that no boards touch with one pitch. "The least pitch" and Lemma 8 in `docs/proofs.md`.
 //!
-//! With the spiral's a = pitch / 2 pi as the unit of length, all spirals are equal and the team's lengths are
-//! intervals.
+//! All spirals are equal if the spiral's a = pitch / 2 pi is the unit of length; then the team's lengths are intervals.
 
 mod far;
 
@@ -24,11 +23,11 @@ use bench_dragon_motion::model::team::Team;
 pub(crate) struct Pitches<'a> {
     /// The team.
     pub team: &'a Team,
-    /// Least pitch, metres per turn.
+    /// The least pitch, metres per turn.
     pub from: f64,
-    /// Greatest pitch, metres per turn.
+    /// The greatest pitch, metres per turn.
     pub to: f64,
-    /// Polar angle of the head's front handle, radians.
+    /// Polar angle of the head's front handle, in radians.
     pub theta: f64,
     /// Two benches that share no handle, counted from 0, the one nearer the head first.
     pub benches: [usize; 2],
@@ -124,7 +123,7 @@ const MOST_TURNS: f64 = 1e7;
 /// The proof that a team reaches a radius with one pitch.
 #[derive(Debug, Clone)]
 pub(crate) struct Reached {
-    /// Metres from the centre from which on Lemma 8 holds.
+    /// The distance from the centre, in metres, from which on Lemma 8 holds.
     pub far: f64,
     /// The steps from there to the radius.
     pub steps: Vec<Step>,

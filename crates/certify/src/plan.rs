@@ -4,8 +4,7 @@
 //! - the greatest speed at which no handle is too fast,
 //! - the least radius with which a team turns round.
 //!
-//! In: a team or a scene. Out: two numbers that enclose the answer, proved, and the place that decides it. The `plan`
-//! command prints them.
+//! In: a team or a scene. Out: two numbers that enclose the answer, proved, and the place that decides it.
 
 mod pitch;
 mod speed;

@@ -1,5 +1,5 @@
-//! The search for a certificate: steps of the head from the start to the end of the motion. A step whose claims cannot
-//! be shown is halved. At each event of the ordinary search, the search writes the line that proves the event.
+//! The search for a certificate: steps of the head from the start to the end of the motion. A step is halved if its
+//! claims cannot be shown. At each event of the ordinary search, the search writes the line that proves the event.
 
 use std::io;
 
@@ -15,10 +15,10 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::path::Path;
 
-/// Half width of the proved interval of an event, seconds.
+/// The half width of the proved interval of an event, in seconds.
 pub(super) const AROUND: f64 = 1e-10;
 
-/// Distance that doubles can resolve, as a share of the path length in metres.
+/// The distance that doubles can resolve, as a share of the path length in metres.
 pub(super) const LEAST: f64 = 1e-14;
 
 /// Rounding of a time, as a share of one second and the time.
@@ -27,17 +27,17 @@ const OF_TIMES: f64 = 1e-14;
 /// The shortest step, as a share of the path length in metres.
 pub(super) const LEAST_STEP: f64 = 2e-15;
 
-/// Share of the distance from an event to which the nearest place beyond it is found at which the event is shown.
+/// The share of the distance from an event to which the nearest place beyond it is found at which the event is shown.
 pub(super) const BESIDE: f64 = 0.1;
 
-/// Factors of the step length after a step that is shown, and after a step that is not.
+/// The factors of the step length after a step that is shown, and after a step that is not.
 pub(super) const GROWTH: f64 = 1.3;
 pub(super) const SHRINK: f64 = 0.5;
 
 /// Limit of the spans in the steps about one dragon: some 400 MB.
 pub(super) const MOST_SPANS: usize = 10_000_000;
 
-/// Distance from an event, in links, within which a failed step is explained by the event.
+/// The distance from an event, in links, within which a failed step is explained by the event.
 pub(super) const NEAR: f64 = 1e-3;
 
 pub(super) struct CertificateSearch<'a, 'w> {
@@ -60,7 +60,7 @@ pub(super) struct CertificateSearch<'a, 'w> {
     /// The obstacles that steps still claim to avoid, and the result of each obstacle.
     free: Vec<usize>,
     of_obstacles: Vec<Option<Status>>,
-    /// Length of the next step to try, metres.
+    /// The length of the next step to try, in metres.
     step: f64,
     steps: u64,
     /// Spans that were written.

@@ -1,8 +1,8 @@
 //! Enclosure of the greatest ratio of a handle's speed to the head's, by branch and bound over the head's travel. See
 //! "Lemma 7" in `docs/proofs.md`.
 //!
-//! In: a scene's motion, and the end of the travel. Out: two numbers that enclose the greatest ratio; the proof does
-//! not depend on a solver or on samples. `plan` calls it.
+//! In: a scene's motion, and the end of the travel. Out: two numbers that enclose the greatest ratio. The proof does
+//! not depend on a solver or on samples.
 
 mod certificate;
 mod step;
@@ -18,10 +18,10 @@ use super::path::{ExactPath, Place};
 use super::step::Chain;
 use bench_dragon_motion::Motion;
 
-/// Distance that doubles can resolve, as a share of the path length in metres.
+/// The distance that doubles can resolve, as a share of the path length in metres.
 const LEAST: f64 = 1e-14;
 
-/// Default limit of handles to enclose: half a minute to a minute.
+/// The default limit of handles to enclose: half a minute to a minute.
 pub const MOST_HANDLES: u64 = 8_000_000;
 
 /// The greatest ratio of a handle's speed to the head's.
@@ -29,21 +29,21 @@ pub const MOST_HANDLES: u64 = 8_000_000;
 pub struct GreatestRatio {
     /// Lower bound: the ratio of `handle` at `travelled`.
     pub lo: f64,
-    /// Upper bound for all handles; infinite if the search was given up before it had a bound.
+    /// The upper bound for all handles; infinite if the search was given up before it had a bound.
     pub hi: f64,
     /// The handle, counted from 0.
     pub handle: usize,
-    /// Travel of the head at which the handle has at least the ratio `lo`, metres.
+    /// The travel of the head at which the handle has at least the ratio `lo`, in metres.
     pub travelled: f64,
     /// Approximate ratio of the handle there, inside its enclosure.
     pub ratio: f64,
     /// True if `hi` is within the tolerance of `lo`.
     pub proved: bool,
-    /// Number of steps of the head that were enclosed.
+    /// The number of steps of the head that were enclosed.
     pub steps: u64,
 }
 
-/// A part of the head's travel, metres.
+/// A part of the head's travel, in metres.
 pub(crate) type Stretch = (f64, f64);
 
 impl GreatestRatio {
@@ -94,7 +94,7 @@ struct RatioSearch<'a> {
     speeds: Speeds<'a>,
     end: f64,
     most_handles: u64,
-    /// Distance that doubles can resolve, metres.
+    /// The distance that doubles can resolve, in metres.
     least: f64,
 }
 

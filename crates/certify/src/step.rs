@@ -81,7 +81,7 @@ const PAD: f64 = 64.0 * f64::EPSILON;
 const COARSE: [f64; 3] = [1.0, 16.0, 256.0];
 const FINE: [f64; 11] = [0.015625, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0, 256.0];
 
-/// Length of a step next to an event, in links.
+/// The length of a step next to an event, in links.
 const NEXT_TO_EVENT: f64 = 1e-9;
 
 /// Returns the metres between the handles of the head's bench, and of every other bench.
@@ -171,16 +171,16 @@ impl<'a> Chain<'a> {
 pub(super) struct Listed<'c, 'a> {
     chain: &'c Chain<'a>,
     pub handles: Vec<Spanned>,
-    /// Pad of the last handle, metres.
+    /// Pad of the last handle, in metres.
     pad: f64,
     /// Multiples of the pad to try, and the number of multiples that were too small for the last handle.
     multiples: &'static [f64],
     too_small: usize,
-    /// Metres added to every pad, for a path that is an interval of paths.
+    /// The length added to every pad, in metres, for a path that is an interval of paths.
     slack: f64,
     /// True if every link behind the head's surely goes forward.
     pub body_forward: bool,
-    /// Upper bound of the distance from the centre of boards 0 and 1, once requested. Listed handles do not change.
+    /// An upper bound of the distance from the centre of boards 0 and 1, once requested. Listed handles do not change.
     front_reach: OnceCell<f64>,
 }
 

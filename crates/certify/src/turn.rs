@@ -1,5 +1,5 @@
-//! Proofs for all turnarounds whose turn radius is in an interval: a link stalls or locks, or two boards overlap. And
-//! for one turnaround: none of these happens. [`crate::plan`] calls it. Lemma 10 in `docs/proofs.md`.
+//! Proofs for all turnarounds whose turn radius is in an interval, that a link stalls or locks, or that two boards
+//! overlap; and for one turnaround, that none of these happens. Lemma 10 in `docs/proofs.md`.
 
 use std::cell::Cell;
 
@@ -57,8 +57,8 @@ impl<'a> Turns<'a> {
         Self { team, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
     }
 
-    /// Returns true if, with every radius, a link that passes over `pivot` with one handle surely stalls or locks. The
-    /// other handle is between `pivot` and `end`. A lock has `end` ahead of `pivot`, a stall has `end` behind it.
+    /// Returns true if, with every radius, a link that passes over `pivot` with one handle is certain to stall or lock.
+    /// The other handle is between `pivot` and `end`. For a lock `end` is ahead of `pivot`, for a stall behind it.
     pub fn fold(&self, link: usize, pivot: Place, end: Place) -> bool {
         let exact = &self.exact;
         if !exact.is_inside(pivot) || !exact.is_inside(end) || pivot == end {
@@ -166,7 +166,7 @@ impl<'a> Turns<'a> {
         (first.0 + 1 == last.0).then(|| [hull(0), hull(1)])
     }
 
-    /// Returns an upper bound of the distance of a radius from the middle one, metres.
+    /// Returns an upper bound of the distance of a radius from the middle one, in metres.
     fn half_width(&self) -> f64 {
         (self.radius - Interval::point(self.radius.middle())).magnitude()
     }
@@ -192,7 +192,7 @@ struct Fold<'a> {
     /// The tangent at the pivot, towards the other handle.
     tangent: Vector,
     square: Interval,
-    /// Number of stretches that may still be tested.
+    /// The number of stretches that may still be tested.
     left: Cell<u32>,
 }
 
@@ -222,14 +222,14 @@ impl Fold<'_> {
 pub(crate) struct Passage {
     /// The path.
     pub path: Path,
-    /// Metres of path before the turn. Lemma 8 holds further out.
+    /// The length of path before the turn, in metres. Lemma 8 holds further out.
     pub lead_in: f64,
-    /// Metres of path after it.
+    /// The length of path after it, in metres.
     pub lead_out: f64,
     description: PathDescription,
 }
 
-/// Factor by which the way out grows until the whole team has turned.
+/// The factor by which the way out grows until the whole team has turned.
 const LONGER: f64 = 1.1;
 
 /// Limit of the steps of a proof.

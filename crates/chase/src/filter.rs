@@ -1,8 +1,8 @@
 //! The delay-locked loop: from readings with jitter to the position and the rate of a source. Pure.
 //!
-//! A loop of second order: each reading corrects position and rate by a part of its error. The parts are those of a
-//! Kalman filter of constant rate (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
-//! Navigation, 6.2). The parts begin large and fall to a constant, which for timecode is a loop of about 0.1 rad/s.
+//! The loop is of second order: each reading corrects position and rate by a part of its error. The parts are those of
+//! a Kalman filter of constant rate (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
+//! Navigation, 6.2). They begin large and fall to a constant, which for timecode makes a loop of about 0.1 rad/s.
 
 /// The standard deviations of a source. Units of the position are free: seconds of timecode, metres of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,10 +1,9 @@
 //! Chasing an outside time: a running show follows timecode, or a performer with a tracker.
 //!
-//! [`artnet`], [`mtc`], [`ltc`] and [`psn`] decode bytes from outside, [`timecode`] counts labels.
-//! [`synchronizer`] and [`filter`] turn readings into a position that runs evenly, [`schedule`] turns that into a
-//! simulated time, [`steering`] into commands. All of these are pure.
-//! [`track`] projects a tracked performer on the path. [`sources`] has the sockets and streams, [`live`] the chase
-//! itself, which publishes its status. The command `chase` calls this crate.
+//! [`artnet`], [`mtc`], [`ltc`] and [`psn`] decode bytes from outside, and [`timecode`] counts labels. [`synchronizer`]
+//! and [`filter`] turn readings into a position that runs evenly, [`schedule`] turns that into a simulated time, and
+//! [`steering`] turns it into commands. All of these are pure. [`track`] projects a tracked performer on the path.
+//! [`sources`] has the sockets and streams, and [`live`] the chase itself, which publishes its status.
 
 pub mod artnet;
 pub mod filter;

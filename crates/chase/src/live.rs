@@ -1,5 +1,5 @@
-//! The chase of a running show: reads a source, follows the frames of the show, sends commands, reports. In: the events
-//! of a feed, and the inputs of a source. Out: commands, the status of the chase. Called by the command `chase`.
+//! The chase of a running show: it reads a source, follows the frames of the show, sends commands and reports. In: the
+//! events of a feed, and the inputs of a source. Out: commands, the status of the chase.
 
 use std::net::IpAddr;
 use std::sync::mpsc::{Receiver, channel};
@@ -98,7 +98,7 @@ pub struct TrackerLeader {
     pub tracker: u16,
     /// The path and the filter.
     pub track: Track,
-    /// From the sender's axes to the stage, metres.
+    /// From the sender's axes to the stage, in metres.
     pub to_stage: Box<dyn Fn([f64; 3]) -> [f64; 2]>,
     /// BLAKE3 of the text of the scene whose path this is.
     pub scene_hash: [u8; 32],

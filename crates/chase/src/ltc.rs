@@ -1,7 +1,7 @@
 //! Linear timecode (SMPTE ST 12-1): timecode as sound. In: samples. Out: labels with the sample at which each ends.
 //! Pure.
 //!
-//! A frame is 80 bits, least significant first, in biphase mark code. The signal changes at the beginning of each bit,
+//! A frame is 80 bits, least significant first, in biphase mark code: the signal changes at the beginning of each bit,
 //! and once more in the middle of a 1. The last 16 bits are a pattern that also shows the direction.
 
 pub mod wave;
@@ -21,7 +21,7 @@ const THRESHOLD: f64 = 0.75;
 const HYSTERESIS: f64 = 0.3;
 /// The frames over which the length of a frame is averaged.
 const MOST_AVERAGED: f64 = 32.0;
-/// Frames per second between 24 and 25, between 25 and 30, and between 29.97 and 30.
+/// The rates, in frames per second, between 24 and 25, between 25 and 30, and between 29.97 and 30.
 const ABOVE_24: f64 = 24.5;
 const ABOVE_25: f64 = 27.5;
 const ABOVE_2997: f64 = 29.985;

@@ -1,8 +1,8 @@
 //! MIDI timecode (MIDI 1.0, "MIDI Time Code", quarter frames and full frames). In: the bytes of a MIDI device. Out:
 //! labels. Pure.
 //!
-//! Eight quarter frames carry a label in two frames of time. The label belongs to the moment of piece 0: when piece 7
-//! has come, 7/4 frames have passed. While timecode runs backward the pieces come from 7 to 0.
+//! Eight quarter frames carry a label in two frames of time. The label belongs to the moment of piece 0, so 7/4 frames
+//! have passed when piece 7 has come. While timecode runs backward the pieces come from 7 to 0.
 
 use crate::timecode::{FrameRate, Label};
 
@@ -30,7 +30,7 @@ pub enum Event {
         /// The rate.
         rate: FrameRate,
     },
-    /// Bytes that are no valid message about timecode.
+    /// Bytes that are not a valid message about timecode.
     Malformed,
 }
 

@@ -15,7 +15,7 @@ const STATUS: u16 = 0x0003;
 pub struct Tracker {
     /// Its number.
     pub id: u16,
-    /// Metres, in the sender's axes.
+    /// The position in metres, in the sender's axes.
     pub position: [f32; 3],
     /// 0 if the position is not known any more; its other values are not defined by the protocol.
     pub status: f32,

@@ -7,7 +7,7 @@ use crate::timecode::{FrameRate, Label};
 /// The greatest error that is taken up by the rate, and the greatest change of the rate, for timecode at speed 1.
 const SEEK_ABOVE: f64 = 0.5;
 const TAKE_UP: f64 = 0.1;
-/// Span before the label of simulated time 0 in which a label is before the show and not late in it, seconds.
+/// Span before the label of simulated time 0 in which a label is before the show and not late in it, in seconds.
 const BEFORE: f64 = 6.0 * 3600.0;
 
 /// The label at which a show begins, and its speed.

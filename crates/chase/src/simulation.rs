@@ -33,7 +33,8 @@ struct Part {
 struct Sender {
     rate: FrameRate,
     parts: Vec<Part>,
-    /// Standard deviation of the jitter, seconds; share of lost packets; stalls of the network from a moment, seconds.
+    /// Standard deviation of the jitter, in seconds; share of lost packets; stalls of the network from a moment, in
+    /// seconds.
     jitter: f64,
     loss: f64,
     stalls: Vec<(f64, f64)>,
@@ -183,7 +184,7 @@ fn sender(parts: Vec<Part>) -> Sender {
     Sender { rate: FrameRate::Ebu25, parts, jitter: 0.005, loss: 0.01, stalls: Vec::new(), end: 40.0 }
 }
 
-/// Returns the errors of the published time from a moment on, sorted by size, seconds.
+/// Returns the errors of the published time from a moment on, sorted by size, in seconds.
 fn errors(run: &Run, sender: &Sender, from: f64, until: f64) -> Vec<f64> {
     let within = run.frames.iter().filter(|(moment, _)| (from..until).contains(moment));
     let error = |(moment, header): &Published| (header.sim_time - (sender.position(*moment) - 3600.0)).abs();

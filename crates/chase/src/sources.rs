@@ -21,7 +21,7 @@ use crate::{artnet, ltc, mtc, psn};
 const SOCKET_TIMEOUT: Duration = Duration::from_millis(200);
 /// Greater than any datagram of Art-Net and PosiStageNet.
 const DATAGRAM_BYTES: usize = 2048;
-/// Bytes of sound that are read at once.
+/// The number of bytes of sound that are read at once.
 const SOUND_BYTES: usize = 16_384;
 
 /// A message of a source.

@@ -1,8 +1,8 @@
 //! From the time that a show should have to commands: rate, seek, pause, resume. Pure: frames and answers in, at most
 //! one command at a time out.
 //!
-//! Each frame contains the simulated time of the show at a moment. The rate takes up an error; a larger error is a
-//! seek. During a hold, and after a pause or a seek of another client, the chase waits until the show plays again.
+//! Each frame contains the simulated time of the show at a moment. A small error is corrected by the rate, a larger one
+//! by a seek. During a hold, and after a pause or a seek of another client, the chase waits until the show plays again.
 
 use bench_dragon_messages::FrameHeader;
 use bench_dragon_messages::control::{Code, Command, RATES};
@@ -10,20 +10,20 @@ use bench_dragon_messages::state::PlaybackState;
 
 use crate::filter::seconds_between;
 
-/// The interval of changes of the rate, nanoseconds.
+/// The interval of changes of the rate, in nanoseconds.
 const RATE_INTERVAL_NS: u64 = 100_000_000;
 /// A change of the rate that is too small to be sent, as a part of the rate.
 const LEAST_CHANGE: f64 = 2e-5;
-/// Seconds in which a small error is taken up, and an error above [`SMALL`].
+/// The times in which a small error and an error above [`SMALL`] are corrected, in seconds.
 const TAKE_UP: f64 = 1.0;
 const TAKE_UP_FAST: f64 = 0.25;
-/// Errors that follow from jitter, seconds.
+/// Errors that follow from jitter, in seconds.
 const SMALL: f64 = 0.005;
-/// The distance from its place at which a paused show is moved there, seconds.
+/// The distance from its place at which a paused show is moved there, in seconds.
 const PLACE: f64 = 0.02;
-/// Seconds from a command to its effect, before the first answer.
+/// The time from a command to its effect, in seconds, before the first answer.
 const LATENCY: f64 = 0.012;
-/// The time after which an unanswered command is given up, nanoseconds.
+/// The time after which an unanswered command is given up, in nanoseconds.
 const PATIENCE_NS: u64 = 2_000_000_000;
 
 /// The time that a show should have.
@@ -58,7 +58,7 @@ pub enum Waiting {
 pub struct Limits {
     /// The greatest correction of the rate, simulated seconds per second.
     pub take_up: f64,
-    /// The error above which the show is sent to its time, seconds.
+    /// The error above which the show is sent to its time, in seconds.
     pub seek_above: f64,
     /// False if a playing show is never sent back.
     pub seeks_back: bool,
@@ -78,7 +78,7 @@ pub struct Steering {
     show: Option<Show>,
     /// Simulated seconds at the end of the show.
     end: f64,
-    /// Seconds from a command to its effect.
+    /// The time from a command to its effect, in seconds.
     latency: f64,
     waiting: Option<Waiting>,
     rate_sent_ns: u64,
@@ -111,7 +111,7 @@ impl Steering {
         Self { limits, show: None, end: f64::INFINITY, latency: LATENCY, waiting: None, rate_sent_ns: 0 }
     }
 
-    /// Sets the simulated time at which the show ends, seconds.
+    /// Sets the simulated time at which the show ends, in seconds.
     pub fn set_end(&mut self, end: f64) {
         self.end = end;
     }
@@ -131,7 +131,7 @@ impl Steering {
         (self.show, self.waiting, self.end) = (None, None, f64::INFINITY);
     }
 
-    /// Handles a frame with its deadline on the clock of this process, nanoseconds.
+    /// Handles a frame with its deadline on the clock of this process, in nanoseconds.
     pub fn frame_came(&mut self, header: &FrameHeader, frame_ns: u64) {
         let playback = header.playback_state();
         let Some(show) = self.show.as_mut().filter(|show| show.frame.run_id == header.run_id) else {

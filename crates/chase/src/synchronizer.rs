@@ -1,38 +1,38 @@
 //! Lock, jump, drift, freewheel: the motion of a source of timecode, from its readings alone. Pure; called with
 //! simulated time by tests.
 //!
-//! A reading is a position and the moment of its arrival. Arrival can only be late, by jitter or by a stall of the
-//! network; after a stall the waiting packets come at once. Positions that run evenly at another place are a jump.
+//! A reading is a position and the moment of its arrival. An arrival can only be late, by jitter or by a stall of the
+//! network, after which the waiting packets come at once. Positions that run evenly at another place are a jump.
 
 use std::collections::VecDeque;
 
 use crate::filter::{DelayLockedLoop, Noise, seconds_between};
 
-/// The greatest error of a reading that corrects the loop, seconds.
+/// The greatest error of a reading that corrects the loop, in seconds.
 const GATE: f64 = 0.040;
-/// The greatest difference between the steps of position and of time in readings that run evenly, seconds.
+/// The greatest difference between the steps of position and of time in readings that run evenly, in seconds.
 const EVEN: f64 = 0.025;
-/// The greatest step of position and of time between two readings of one run, seconds.
+/// The greatest step of position and of time between two readings of one run, in seconds.
 const MOST_STEP: f64 = 1.5;
-/// Duration for which evenly late readings count as a stall, seconds.
+/// The duration for which evenly late readings count as a stall, in seconds.
 const LATE: f64 = 0.5;
 /// The time up to which a repeated label is a sender's repetition, seconds, and the least repetitions of a standing
 /// source.
 const STANDING: f64 = 0.15;
 const STANDING_READINGS: u32 = 3;
-/// The errors below which a loop keeps its rate when its source jumps, seconds.
+/// The errors below which a loop keeps its rate when its source jumps, in seconds.
 const SAME_RUN: f64 = 0.5;
-/// The time without a reading that is shown as freewheeling, seconds.
+/// The time without a reading that is shown as freewheeling, in seconds.
 const QUIET: f64 = 0.3;
 
 /// A reading of a source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// Position at the arrival, seconds.
+    /// The position at the arrival, in seconds.
     pub position: f64,
     /// Arrival, CLOCK_MONOTONIC in nanoseconds.
     pub at_ns: u64,
-    /// Seconds after which positions begin again at 0.
+    /// The time, in seconds, after which positions begin again at 0.
     pub day: f64,
 }
 
@@ -45,19 +45,19 @@ pub enum Motion {
     Locking,
     /// The source runs.
     Locked {
-        /// Position, seconds.
+        /// Position, in seconds.
         position: f64,
-        /// Seconds per second.
+        /// The rate, in seconds per second.
         rate: f64,
     },
     /// Readings have stopped; the position continues.
     Freewheeling {
-        /// Position, seconds.
+        /// Position, in seconds.
         position: f64,
-        /// Seconds per second.
+        /// The rate, in seconds per second.
         rate: f64,
     },
-    /// The source stands at a position, seconds.
+    /// The source stands at a position, in seconds.
     Standing(f64),
     /// The source runs backward.
     Backward,
@@ -68,7 +68,7 @@ pub enum Motion {
 /// The options of a synchronizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// The time for which a source without readings continues, seconds.
+    /// The time for which a source without readings continues, in seconds.
     pub freewheel: f64,
     /// Readings in order that lock: 3 for frames, 2 for readings that take several frames.
     pub readings_to_lock: usize,
@@ -111,7 +111,7 @@ impl Synchronizer {
         self.jumps
     }
 
-    /// Returns the time since the latest reading, seconds; infinite before the first.
+    /// Returns the time since the latest reading, in seconds; infinite before the first.
     pub fn quiet_for(&self, now_ns: u64) -> f64 {
         self.latest.map_or(f64::INFINITY, |_| seconds_between(self.latest_ns, now_ns))
     }

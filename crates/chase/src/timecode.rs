@@ -1,7 +1,7 @@
-//! Timecode: labels, frame rates, drop frame. Pure. Called by the decoders, the sources, the schedule and the chase.
+//! Timecode: labels, frame rates, drop frame. Pure.
 //!
 //! A label counts frames of a day. Drop frame (SMPTE ST 12-1) leaves out the labels 00 and 01 of each minute, except of
-//! each tenth minute. Thus labels follow the time of day at 30000/1001 frames per second.
+//! each tenth minute, so that labels follow the time of day at 30000/1001 frames per second.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,7 +1,7 @@
 //! A tracked performer: from places on the stage to a place on the path, and from there to a simulated time. Pure.
 //!
-//! A place is projected on the path near the latest place only. Turns of a coil are half a metre apart, and the nearest
-//! point of the whole path would often be on another turn.
+//! A place is projected on the path near the latest place only, because the nearest point of the whole path would often
+//! be on another turn of the coil, half a metre away.
 
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::Point;
@@ -9,18 +9,18 @@ use bench_dragon_motion::model::Point;
 use crate::filter::{DelayLockedLoop, Noise, seconds_between};
 use crate::steering::{Goal, Limits};
 
-/// Half the length of path that is searched about the latest place, metres.
+/// Half the length of path that is searched about the latest place, in metres.
 const WINDOW: f64 = 3.0;
-/// The distance of the points that are compared first, metres.
+/// The distance of the points that are compared first, in metres.
 const STEP: f64 = 0.25;
-/// Steps along the tangent from the nearest of those points. Each step leaves the part of the error that is the
+/// The steps along the tangent from the nearest of those points. Each step leaves the part of the error that is the
 /// distance from the path divided by the radius of its curve.
 const REFINEMENTS: usize = 8;
-/// The greatest distance from the path, metres.
+/// The greatest distance from the path, in metres.
 pub const MOST_DISTANCE: f64 = 1.0;
 /// Readings that lock.
 const READINGS_TO_LOCK: u32 = 3;
-/// The time without a reading that is shown as freewheeling, seconds.
+/// The time without a reading that is shown as freewheeling, in seconds.
 const QUIET: f64 = 0.3;
 /// The greatest correction of the rate, in simulated seconds per second, and the error above which the show is sent to
 /// its place, in seconds.
@@ -30,9 +30,9 @@ const SEEK_ABOVE: f64 = 2.0;
 /// A place on the path next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
-    /// Metres of path from the start.
+    /// The length of path from the start, in metres.
     pub travelled: f64,
-    /// Metres from the point to the path.
+    /// The distance from the point to the path, in metres.
     pub distance: f64,
 }
 
@@ -65,7 +65,7 @@ pub struct Track {
 
 impl Track {
     /// Creates the track of a motion, whose head follows its path exactly and begins after `delay` simulated seconds of
-    /// the show. `freewheel` is the time for which a performer that is not seen is followed, seconds.
+    /// the show. `freewheel` is the time for which a performer that is not seen is followed, in seconds.
     pub fn new(motion: Motion, delay: f64, freewheel: f64) -> Self {
         Self { motion, delay, freewheel, estimate: None, readings: 0, fitting_ns: None, distance: f64::NAN }
     }
@@ -75,7 +75,7 @@ impl Track {
         Limits { take_up: TAKE_UP, seek_above: SEEK_ABOVE, seeks_back: false }
     }
 
-    /// Returns the latest distance from the path, metres; NaN before the first position.
+    /// Returns the latest distance from the path, in metres; NaN before the first position.
     pub fn distance(&self) -> f64 {
         self.distance
     }
@@ -97,8 +97,8 @@ impl Track {
         Projection { travelled, distance: offset(travelled).norm() }
     }
 
-    /// Handles a position of the tracker on the stage, metres. `show_time` is the simulated time of the show: the first
-    /// search for a performer is near the head at that time.
+    /// Handles a position of the tracker on the stage, in metres. `show_time` is the simulated time of the show: the
+    /// first search for a performer is near the head at that time.
     pub fn read(&mut self, point: Point, at_ns: u64, show_time: f64) {
         let head_speed = self.motion.head_speed();
         let near = self

@@ -1,7 +1,7 @@
 //! The clocks, and the deadlines of the periods.
 //!
-//! The loop and its statistics take a [`Clock`], so that a test can replace it. Transports and subscribers, which only
-//! stamp and measure, call the functions.
+//! The loop and its statistics have a [`Clock`] as a parameter, so that a test can replace it. Transports and
+//! subscribers only stamp and measure, so they call the functions.
 
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
@@ -52,7 +52,7 @@ pub fn realtime_ns() -> u64 {
 /// clocks with different names cannot be compared.
 pub fn monotonic_clock_name() -> String {
     // Both parts are the same in every container of a machine, unless the container has its own time namespace. In a
-    // sandbox without either file, nothing distinguishes the processes.
+    // sandbox that has neither file, processes cannot be told apart.
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
     let namespace = std::fs::read_link("/proc/self/ns/time").unwrap_or_default();
     format!("{} {}", boot.trim(), namespace.display())

@@ -1,8 +1,8 @@
 //! A subscriber's ends of a publisher's services: the thin layer over iceoryx2. In: a name. Out: the contents of the
 //! queues.
 //!
-//! This layer keeps no counts: the [`feed`](super::feed), which calls this layer, decides when to open, to read and to
-//! disconnect. A service can have more than one publisher: `selected` has the one whose messages are read.
+//! This layer keeps no counts: the [`feed`](super::feed) above it decides when to open, to read and to disconnect. A
+//! service can have more than one publisher, and `selected` has the one whose messages are read.
 
 mod selected;
 mod slices;
@@ -164,7 +164,7 @@ impl Subscription {
     }
 
     /// Closes a connection whose publisher has gone. The remaining publishers count as stale for a while, unless a show
-    /// runs here. Then one of the publishers may belong to the next show, which is about to send.
+    /// runs here, because one of them may then belong to the next show, which is about to send.
     pub fn leave(&self, connection: Connection) {
         let remaining = publishers(&connection.poses_service);
         // In this order: a show serves commands before it has a publisher.
@@ -443,8 +443,8 @@ impl Connection {
         first.or_else(|| self.poses.receive().ok().flatten())
     }
 
-    /// Selects the publisher of the next frame, if none is selected and a frame has come. Every publisher sends frames
-    /// all the time, also while paused.
+    /// Selects the publisher of the next frame, if none is selected and a frame has come. This always finds a publisher
+    /// that runs, because publishers send frames all the time, also while paused.
     fn decide(&mut self) {
         if matches!(self.selection, Selection::Undecided { .. })
             && let Some(sample) = self.next_frame()

@@ -1,7 +1,7 @@
 //! Commands to a publisher from another process: requests over `<name>/control`, and their responses.
 //!
 //! A [`Controller`] waits for the response, as the command `control` does. A [`command_client`] has its own thread, for
-//! programs with other work meanwhile, such as `watch` and the stage picture's server.
+//! programs that have other work meanwhile, such as `watch` and the stage picture's server.
 
 pub mod command_client;
 

@@ -2,8 +2,8 @@
 //!
 //! In: frames as they come, and a moment of CLOCK_MONOTONIC. Out: positions, headings and velocities at that moment,
 //! also between frames. The display runs a period behind the stream, at any rate. The error falls with the fourth power
-//! of the frames' distance h. Its bound is h^4 / 384 times the greatest fourth derivative (de Boor, A Practical Guide
-//! to Splines, IV.6).
+//! of the frames' distance h, because its bound is h^4 / 384 times the greatest fourth derivative (de Boor, A Practical
+//! Guide to Splines, IV.6).
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,4 @@
-//! Layouts of messages by their names in shared memory: the layouts of this program, and of a service that this program
+//! Layouts of messages by their names in shared memory: those of this program, and those of a service that this program
 //! cannot read.
 
 use iceoryx2::config::Config;

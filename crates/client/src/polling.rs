@@ -1,8 +1,8 @@
 //! The loop of a subscriber that polls, for `send`, `metrics` and `chase`. In: the events of a [`Feed`] of each
 //! publisher. Out: calls of a [`Handler`].
 //!
-//! Waking this process at each frame would cost the publisher more than it saves here; polling costs the publisher
-//! nothing.
+//! Subscribers poll because waking this process at each frame would cost the publisher more than it saves here, while
+//! polling costs the publisher nothing.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

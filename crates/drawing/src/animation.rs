@@ -12,10 +12,10 @@ use super::{Drawing, Surroundings, benches, marks, metres, rounded, sheet};
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::solve::Chain;
 
-/// Seconds for which the last sample stays before the picture starts again.
+/// The time for which the last sample stays before the picture starts again, in seconds.
 const HOLD: f64 = 4.0;
 
-/// Number of colours of a board.
+/// The number of colours of a board.
 const COLOURS: usize = 16;
 
 /// The greatest number of values in a countdown.
@@ -23,10 +23,10 @@ const MOST_NUMBERS: f64 = 200.0;
 
 /// The times of an animation.
 struct KeyTimes {
-    /// Number of samples, and the number of further steps for which the last one stays.
+    /// The number of samples, and the number of further steps for which the last one stays.
     samples: usize,
     held: usize,
-    /// Seconds between samples.
+    /// The time between samples, in seconds.
     step: f64,
 }
 

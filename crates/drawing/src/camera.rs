@@ -3,7 +3,7 @@
 use super::rounded;
 use bench_dragon_motion::model::Point;
 
-/// A rectangle of the stage, metres.
+/// A rectangle of the stage, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageBox {
     /// The least x and y.
@@ -69,7 +69,7 @@ impl StageBox {
             && other.least.y <= self.greatest.y
     }
 
-    /// Returns the least and the greatest distance from `centre` of a point in the box, metres.
+    /// Returns the least and the greatest distance from `centre` of a point in the box, in metres.
     pub fn radii(&self, centre: Point) -> (f64, f64) {
         let nearest = centre.sup(&self.least).inf(&self.greatest);
         let farthest = (self.least - centre).abs().sup(&(self.greatest - centre).abs());

@@ -62,7 +62,7 @@ impl<'a> Dragons<'a> {
         self.drawn[0].motion
     }
 
-    /// Returns a length that no board has, metres.
+    /// Returns a length that no board has, in metres.
     pub fn greatest_board(&self) -> f64 {
         let length = |of: &Drawn| {
             let team = of.motion.team();

@@ -1,6 +1,6 @@
 //! The dragon's head and tail in three dimensions for the look from a seat: balls of lit paper and tapered tufts.
 //!
-//! Metres along the board, to its left, and upward, as in `crates/outputs/src/view/dragon_figure.js`.
+//! Lengths are metres along the board, to its left, and upward, as in `crates/outputs/src/view/dragon_figure.js`.
 
 use svg::node::element::{Circle, Group, Path};
 
@@ -29,7 +29,7 @@ const SKULL: [[f64; 3]; 9] = [
     [1.04, 2.11, 0.215],
     [1.19, 2.13, 0.165],
 ];
-/// Places along a tuft.
+/// The places along a tuft.
 const STEPS: u32 = 6;
 
 /// The shapes of a figure with their depths.

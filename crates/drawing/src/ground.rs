@@ -1,4 +1,4 @@
-//! The obstacles and the boundary of a stage, with their keep-outs and names. Called by the drawings only.
+//! The obstacles and the boundary of a stage, with their keep-outs and names.
 
 use svg::node::element::{Circle, Group, Path, Title};
 

@@ -168,7 +168,7 @@ impl BoardMap {
 }
 
 /// Returns the names with their lines, the most important first in `names`. `boards` are all boards of the picture,
-/// `marks` the places of events, `hole_inset` is the team's, metres.
+/// `marks` the places of events, `hole_inset` is the team's, in metres.
 pub fn labels(
     names: &[Name],
     boards: &[(usize, Board)],

@@ -1,8 +1,8 @@
 //! The lantern look: the stage at night in the light of the dragon's lanterns, without script and without filter.
 //!
 //! The look is that of the page's show (`crates/outputs/src/view/lanterns.js`). Light on the ground is a mask over
-//! paving. Pools of light are white circles in the mask, which cover one another as light adds up. The boards are the
-//! true rectangles.
+//! paving. Pools of light are white circles in the mask, which cover one another in the way that light adds up.
+//! The boards are the true rectangles.
 
 use svg::node::element::{
     Circle, Definitions, Ellipse, Group, Line, Mask, Path, Pattern, RadialGradient, Rectangle, Stop, Use,
@@ -17,15 +17,15 @@ use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::solve::Chain;
 
-/// The radius of a bench's pool of light, and of a lantern's halo, metres.
+/// The radius of a bench's pool of light, and of a lantern's halo, in metres.
 const POOL: f64 = 3.2;
 const HALO: f64 = 0.62;
-/// Metres of light around the boards of a picture.
+/// The width of the light around the boards of a picture, in metres.
 pub const MARGIN: f64 = 2.0;
 /// The lanterns of a board, as shares of half its length: the second of each is gold.
 const ON_BODY: [f64; 3] = [-0.41, 0.0, 0.41];
 const ON_HEAD: [f64; 4] = [-0.7, -0.44, -0.18, 0.09];
-/// The distance of the pearl ahead of the head's board, metres.
+/// The distance of the pearl ahead of the head's board, in metres.
 const PEARL: f64 = 0.42;
 /// The size of the head and of the tail.
 const CROWN: f64 = 1.3;

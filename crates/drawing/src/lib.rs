@@ -1,10 +1,10 @@
 //! Pictures of the stage: a chain at one time as SVG text, or a stretch of a motion as one animated SVG.
 //!
-//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. `draw` calls it. The plots of `trade` and of
-//! the soak report take their colours from [`palette`].
+//! In: a motion, its events, chains at times, a [`Look`]. Out: text. Pure. The plots of `trade` and of the soak report
+//! take their colours from [`palette`].
 //!
-//! The stage is drawn in metres, y upward, in a group whose transform maps it to the sheet, clipped at the viewport. So
-//! an editor shows true coordinates.
+//! The stage is drawn in metres, y upward, in a group whose transform maps it to the sheet, so that an editor shows
+//! true coordinates. It is clipped at the viewport.
 
 pub mod animation;
 mod benches;
@@ -43,7 +43,7 @@ pub use scale::mean_speeds;
 use scale::{ColourScale, Speeds};
 use swept::SweptArea;
 
-/// Width of a sheet in its own units, for any size in print or on a screen.
+/// The width of a sheet in its own units, for any size in print or on a screen.
 const WIDTH: f64 = 960.0;
 
 /// The font of all text, the same as on the page.

@@ -1,4 +1,4 @@
-//! The look of a picture: colours, framing, surroundings, size. `draw` reads it from its options.
+//! The look of a picture: colours, framing, surroundings, size.
 
 use super::WIDTH;
 use super::palette::{self, Palette};
@@ -29,11 +29,11 @@ impl Theme {
 /// A place in the audience.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seat {
-    /// Turns around the stage from its south.
+    /// The place of the seat, in turns around the stage from its south.
     pub turns: f64,
-    /// The distance from the dragon's middle, metres; by default it follows from the dragon's reach.
+    /// The distance from the dragon's middle, in metres; by default it follows from the dragon's reach.
     pub distance: Option<f64>,
-    /// The height of the eye, metres.
+    /// The height of the eye, in metres.
     pub height: f64,
 }
 
@@ -53,7 +53,7 @@ pub enum Style {
 pub enum Framing {
     /// The box of every board at every time of the picture.
     Everything,
-    /// The square about the origin with this half width, metres.
+    /// The square about the origin with this half width, in metres.
     Radius(f64),
     /// A width in metres about a point.
     View(Point, f64),

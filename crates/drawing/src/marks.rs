@@ -11,7 +11,7 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
-/// Seconds about an event that count as its time: a time typed with six decimals still matches.
+/// The time about an event that counts as its time, in seconds, so that a time typed with six decimals still matches.
 const NOW: f64 = 1e-6;
 
 /// The tense of an event.

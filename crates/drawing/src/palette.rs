@@ -1,11 +1,11 @@
 //! The colours of all pictures of this program: those of the stage page's style sheet, light and dark.
 //!
 //! `tests/commands/draw` compares them with the page's `style.css`. Drawings use one palette. Plots are made in the
-//! light palette and get the dark one by [`with_dark_rules`], which a viewer that prefers dark applies.
+//! light palette, and [`with_dark_rules`] adds the dark one, which a viewer that prefers dark applies.
 
 use std::fmt::Write;
 
-/// Steps of the colour scale, as on the page.
+/// The steps of the colour scale, as on the page.
 pub const SHADES: usize = 32;
 
 /// The colours of one theme, as `#rrggbb`. Each has the name of its variable in the style sheet.
@@ -84,7 +84,7 @@ const DRAGONS: [&str; 16] = [
     "#1f6fb5", "#c4560a", "#0b8560", "#a8478c", "#8a6a00", "#6c58d0",
 ];
 
-/// Names of dragons that are colours, with their places in [`DRAGONS`].
+/// The names of dragons that are colours, with their places in [`DRAGONS`].
 const NAMED: [(&str, usize); 14] = [
     ("blue", 0),
     ("orange", 1),

@@ -1,7 +1,7 @@
 //! The colour of a bench: its mean speed over one link passage, on a scale about the head's speed.
 //!
-//! The page has the same scale (`SpeedScale` of `crates/outputs/src/view/palette.js`). So a colour means the same speed
-//! on the page, in a picture of `draw` and in the documents. `draw` calls [`mean_speeds`].
+//! The page has the same scale (`SpeedScale` of `crates/outputs/src/view/palette.js`), so a colour means the same speed
+//! on the page, in a picture of `draw` and in the documents.
 
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::solve::{Chain, Solver};
@@ -37,7 +37,7 @@ pub fn mean_speeds(motion: &Motion, solver: &mut dyn Solver, time: f64, chain: &
     chain.speed.iter_mut().zip(sums).for_each(|(mean, sum)| *mean = sum / weights);
 }
 
-/// The range of speeds, metres per second.
+/// The range of speeds, in metres per second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Speeds {
     least: f64,
@@ -69,7 +69,7 @@ impl Speeds {
 /// The assignment of colours to speeds: logarithmic in the difference from the head's speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColourScale {
-    /// The head's speed in the middle of the scale, metres per second.
+    /// The head's speed in the middle of the scale, in metres per second.
     pub head_speed: f64,
     /// The greatest difference from the head's speed that has a colour, as a share of that speed.
     pub width: f64,
@@ -83,7 +83,7 @@ impl ColourScale {
         0.5 + 0.5 * difference.signum() * part.min(1.0)
     }
 
-    /// Returns the speeds at the slow and at the fast end, metres per second.
+    /// Returns the speeds at the slow and at the fast end, in metres per second.
     pub fn ends(&self) -> (f64, f64) {
         (self.head_speed * (1.0 - self.width).max(0.0), self.head_speed * (1.0 + self.width))
     }

@@ -21,12 +21,12 @@ use bench_dragon_motion::solve::Chain;
 
 /// The height of a sheet as a share of its width.
 pub const SHAPE: f64 = 0.5625;
-/// The height of the boards and their thickness, metres.
+/// The height of the boards and their thickness, in metres.
 const BOARD: f64 = 1.18;
 const THICK: f64 = 0.06;
-/// The usual distance as a multiple of the stage's reach, and the least, metres.
+/// The usual distance as a multiple of the stage's reach, and the least, in metres.
 const DISTANCE: (f64, f64) = (1.9, 19.0);
-/// The nearest that is drawn, metres.
+/// The nearest that is drawn, in metres.
 const NEAREST: f64 = 0.5;
 /// The lanterns of a board, as shares of half its length: the second of each is gold.
 const ON_BODY: [f64; 3] = [-0.41, 0.0, 0.41];
@@ -41,7 +41,7 @@ pub struct Spot {
     pub y: f64,
     /// Sheet units a metre.
     pub scale: f64,
-    /// Metres along the line of sight.
+    /// The distance along the line of sight, in metres.
     pub depth: f64,
 }
 

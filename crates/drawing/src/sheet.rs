@@ -14,7 +14,7 @@ const RIGHT: f64 = 18.0;
 const TOP: f64 = 84.0;
 /// Sheet units for the numbers and the name of the lower axis.
 const AXIS: f64 = 40.0;
-/// Height of a row of the legend.
+/// The height of a row of the legend.
 const ROW: f64 = 28.0;
 const BOTTOM: f64 = 14.0;
 

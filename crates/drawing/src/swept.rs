@@ -1,7 +1,7 @@
 //! [`SweptArea`]: the ground that boards cover during a stretch of a motion, as polygons. `draw --swept` and `check
 //! --swept` call it.
 //!
-//! Boards ride on the path: a tail that whips by momentum covers more.
+//! Because boards ride on the path here, a tail that whips by its momentum covers more.
 
 use std::ops::Range;
 
@@ -14,15 +14,16 @@ use i_overlay::core::overlay::IntOverlayOptions;
 use i_overlay::core::simplify::Simplify;
 use i_overlay::i_float::int::point::IntPoint;
 
-/// Greatest distance of the outline from the true one, metres.
+/// The greatest distance of the outline from the true one, in metres.
 pub const TOLERANCE: f64 = 1e-3;
 
-/// Greatest distance of a corner from the straight line of its step, metres. An edge that turns by an angle a within
-/// the step bulges beyond the step's polygons by up to its length times a^2 / 8. Its corners leave their lines by as
-/// much.
+/// The greatest distance of a corner from the straight line of its step, in metres. An edge that turns by an angle a
+/// within the step bulges beyond the step's polygons by up to its length times a^2 / 8. Its corners leave their lines
+/// by as much.
 const STRAIGHT: f64 = 0.1 * TOLERANCE;
 
-/// Metres of the grid to which corners are rounded: on a grid, the union has no corner but the corners of its rings.
+/// The step of the grid to which corners are rounded, in metres. On a grid, the union has no corner but the corners of
+/// its rings.
 const GRID: f64 = 1e-6;
 
 /// Polygons that are united first: few, since the positions of a board overlap many others and every edge crosses
@@ -37,7 +38,8 @@ pub type Ring = Vec<[f64; 2]>;
 pub struct SweptStretch<'a> {
     /// The motion.
     pub motion: &'a Motion,
-    /// Metres that its head has travelled at the beginning and at the end; equal for a dragon that stands.
+    /// The distances that its head has travelled at the beginning and at the end, in metres; equal for a dragon that
+    /// stands.
     pub travelled: (f64, f64),
     /// The benches, counted from 0.
     pub benches: Range<usize>,

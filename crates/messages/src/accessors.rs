@@ -1,4 +1,4 @@
-//! From the numbers of a layout to states, levels, codes and events. Called by subscribers.
+//! From the numbers of a layout to states, levels, codes and events.
 
 use crate::control::Code;
 use crate::layouts::{CollisionAlert, ControlResponse, FrameHeader, NO_BENCH, Stage, StageDragon, StageEvent};

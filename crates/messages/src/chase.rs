@@ -1,4 +1,4 @@
-//! The sources and the states of a chase. Called by `chase` and by subscribers of its status.
+//! The sources and the states of a chase.
 
 use crate::layouts::ChaseStatus;
 

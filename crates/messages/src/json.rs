@@ -1,7 +1,6 @@
 //! Messages as JSON: names in place of numbers, null for no value, and text for integers that a double cannot hold.
 //!
-//! In: a layout. Out: a value that serde writes. Called by `watch --json`, the stage picture's server and the
-//! recorder.
+//! In: a layout. Out: a value that serde writes.
 
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! The memory layouts that publishers write and subscribers in any language read.
 //!
-//! Depends on nothing but serde and iceoryx2's [`ZeroCopySend`]. States, levels and kinds are plain numbers here.
-//! `convert` of the crate `show` fills them in, and the accessors of this crate give them their types. Everything is
+//! It depends only on serde and iceoryx2's [`ZeroCopySend`]. States, levels and kinds are plain numbers here: `convert`
+//! of the crate `show` fills them in, and the accessors of this crate give them their types. Everything is
 //! little-endian, `#[repr(C)]` and without implicit padding. A type's name ends in the version of its layout, so that a
 //! subscriber built for another layout is refused instead of reading nonsense.
 //!

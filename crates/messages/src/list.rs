@@ -1,6 +1,7 @@
 //! A list of bounded length inside a layout.
 //!
-//! In memory a count and room for the most elements. Over ROS 2 and in files a sequence of the elements in use.
+//! In memory it is a count and room for the greatest number of elements. Over ROS 2 and in files it is a sequence of
+//! the elements in use.
 
 use std::ops::Deref;
 

@@ -1,6 +1,6 @@
 //! The names of benches and obstacles for people: benches count from 1 within their dragon.
 //!
-//! Before there is a stage message a scene's [`Roster`] has the names; a subscriber has the names of the [`Stage`].
+//! Before there is a stage message, a scene's [`Roster`] has the names; a subscriber has those of the [`Stage`].
 
 use crate::layouts::{NO_BENCH, Stage};
 

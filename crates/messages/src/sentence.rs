@@ -1,7 +1,7 @@
 //! Alerts in words, for people. Benches are counted from 1, and the sentence states this.
 //!
-//! In: a [`CollisionAlert`] and the [`Stage`] with the names. Out: a sentence. Called by `run`, `watch` and the stage
-//! picture's server, so that all of them print the same.
+//! In: a [`CollisionAlert`] and the [`Stage`] with the names. Out: a sentence, the same for the terminal and for the
+//! page.
 
 use std::fmt::Display;
 use std::io;
@@ -81,8 +81,8 @@ pub fn alert_sentence(alert: &CollisionAlert, stage: &Stage, figures: Figures) -
     if sentence.contains("bench ") { format!("{sentence} (counting from 1)") } else { sentence }
 }
 
-/// Returns a state that no alert reports, as a sentence; `None` if an alert reports it or nothing has happened. A show
-/// of several dragons is at the end of its paths when all are.
+/// Returns a state that no alert reports, as a sentence, or `None` if an alert reports it or nothing has happened. A
+/// show of several dragons is at the end of its paths when all of them are.
 pub fn state_sentence(state: FrameState, stage: &Stage) -> Option<&'static str> {
     match state {
         FrameState::PathEnd if stage.dragons.len() > 1 => Some("all heads have reached the ends of their paths"),

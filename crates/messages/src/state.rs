@@ -1,7 +1,7 @@
 //! The state of a frame, the level of an alert and the playback state: each a type without impossible values.
 //!
-//! Only this file has the [`Severity`] of each: colours, signs and diagnostics follow from the severity, and not from
-//! the list of states.
+//! Only this file has the [`Severity`] of each, so that colours, signs and diagnostics follow from the severity, and
+//! not from the list of states.
 //!
 //! On the wire the values of each type are numbered in their order, from 0; levels have the numbers of their states.
 //! The constants in `msgs/msg` and in the Python layouts are generated from this file, doc comments included: see

@@ -1,8 +1,7 @@
 //! The nearest two boards of a chain: by all pairs as the reference, and by the live method that tests few of them.
 //!
-//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. The show calls it if a scene has alerts. Pairs that share a
-//! handle never count. Both methods evaluate a pair with the same function on the same numbers, so they agree to the
-//! last bit.
+//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. Pairs that share a handle never count. Both methods
+//! evaluate a pair with the same function on the same numbers, so they agree to the last bit.
 
 mod between;
 mod between_table;
@@ -33,7 +32,7 @@ use search::{CarriedBounds, ClearanceSearch};
 /// The nearest two boards that share no handle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairClearance {
-    /// Metres between them; negative where they overlap.
+    /// The distance between them, in metres; negative where they overlap.
     pub value: f64,
     /// The lower bench, counted from 0.
     pub bench_a: usize,
@@ -106,9 +105,9 @@ pub struct ClearanceCounters {
 /// The live method: the same result as [`least_clearance_all_pairs`], from a few pairs.
 ///
 /// The present clearance of the previous nearest pair is the first limit. With a table, only pairs whose bound is
-/// within the limit are tested: most often none. The bounds hold for every frame, so that jumps of the show do no harm.
-/// Without a table, every bench carries a bound from frame to frame, lowered by the displacement of the handles. All
-/// memory is reserved by the constructor.
+/// within the limit are tested, which are most often none. The bounds hold for every frame, so jumps of the show do no
+/// harm. Without a table, every bench carries a bound from frame to frame, lowered by the displacement of the handles.
+/// All memory is reserved by the constructor.
 #[derive(Debug, Clone)]
 pub struct ClearanceMonitor {
     team: Team,
@@ -116,12 +115,12 @@ pub struct ClearanceMonitor {
     last_pair: Option<(usize, usize)>,
     table: Option<Box<BoundTable>>,
     carried: CarriedBounds,
-    /// Metres that a link of a frame may be off its length.
+    /// The length, in metres, by which a link of a frame may be off.
     link_error: f64,
     counters: ClearanceCounters,
 }
 
-/// Upper bound of the error of a link of an exact frame, metres.
+/// An upper bound of the error of a link of an exact frame, in metres.
 const EXACT_LINK_ERROR: f64 = 1e-9;
 
 impl ClearanceMonitor {

@@ -1,51 +1,54 @@
 //! First contact and least clearance of a motion along any path, by conservative advancement. The head advances in
-//! steps that are proved to contain no nearer pair. A step is halved if the proof fails.
+//! steps that are proved to contain no nearer pair, and a step is halved if the proof fails.
 //!
 //! In: a path, a team, the places where handles turn round ([`Singularities`](super::singularities::Singularities)),
 //! two places of the head. Out: an [`Event`] or a [`LeastClearance`], and the place up to which the search came. The
-//! timeline, `check` and `plan pitch` call it. The search of `stepped_search` serves boards of one team, boards of two
-//! dragons ([`between`]), and boards and obstacles (`ground`).
+//! search of `stepped_search` serves boards of one team, boards of two dragons ([`between`]), and boards and obstacles
+//! (`ground`).
 //!
-//! **How far handles move.** Handle 1 turns round only if the head is at a head turn. Handle k + 1 turns round only if
-//! handle k turns round or is at a body turn. So the two configurations at the ends of a step and the followers of the
-//! turns between determine how each handle moves. The path that handle k passes over, forth and back, has the length
-//! m_k (`displacement`).
+//! **How far handles move.** Handle 1 turns round only where the head is at a head turn. Handle k + 1 turns round only
+//! where handle k turns round or is at a body turn. Therefore the motion of every handle in a step is determined by the
+//! two configurations at the ends of the step and by the followers of the turns between them. The path that handle k
+//! passes over, back and forth, has the length m_k (`displacement`).
 //!
-//! **How far boards move.** A point of the board from handle i to i + 1 is rear + s (front - rear) + w n with the
-//! link's unit normal n. Here s is in [-e, 1 + e], e = inset / link, and |w| <= width / 2. With handle velocities u and
-//! v, n turns at most at the rate (|u| + |v|) / link. So in a step the point goes along a path no longer than
+//! **How far boards move.** A point of the board from handle i to i + 1 is rear + s (front - rear) + w n. Here n is the
+//! link's unit normal, s is in [-e, 1 + e] with e = inset / link, and |w| <= width / 2. If the handles have velocities
+//! u and v, then n turns at a rate of at most (|u| + |v|) / link. So in a step the point moves along a path no longer
+//! than
 //! |s| m_i + |1 - s| m_{i+1} + (width / (2 link)) (m_i + m_{i+1}). For any s this length is at most
 //! C = max(m_i, m_{i+1}) + (e + width / (2 link)) (m_i + m_{i+1}).
 //!
-//! **Why nothing is skipped.** Assume that at some time of a step the clearance of a pair is x <= `limit`, limit >= 0.
-//! Take the nearest points P and Q of the two boards at that time, or a common point if the boards overlap. P and Q are
-//! at most `limit` apart. At the ends of the step the *same* two points of the boards are at least as far apart as the
-//! clearances there. Their paths before and after that time together are their paths in the step. So c_start + c_end <=
-//! 2 limit + B, B = C_a + C_b, and a pair that violates this stays above the limit during the whole step. (C need not
-//! be additive over sub-steps: the lengths of the paths of P and Q are.) For a limit below 0 there may be no such
-//! common pair of points. Clearance is the largest gap over all directions. So along the best direction at either end
-//! two points bound the clearance, and these points differ between the ends. Then C has the sum m_i + m_{i+1}, which is
-//! additive, in place of the maximum. Uncertain steps are halved, the earlier half first, down to the last digits of
-//! the distance.
+//! **Why nothing is skipped.** Suppose that at some time of a step the clearance of a pair is x <= `limit`, where
+//! limit >= 0. Let P and Q be the nearest points of the two boards at that time, or a common point if the boards
+//! overlap, so that P and Q are at most `limit` apart. At both ends of the step the *same* two points of the boards are
+//! at least as far apart as the clearances there. Because their paths before and after that time together are their
+//! paths in the step, it follows that c_start + c_end <= 2 limit + B, where B = C_a + C_b. A pair that violates this
+//! therefore stays above the limit during the whole step. (C need not be additive over sub-steps, because the lengths
+//! of the paths of P and Q are.)
 //!
-//! **Seen from the chain.** All this holds in any frame that moves rigidly. If all handles from the first to the last
-//! of a pair stay on one line or circle, their distances along it stay the same. Then B = 0. On one spiral, take the
-//! frame that turns about the centre with handle i. The frame also moves outward by a d theta_i, in a fixed direction e
-//! of the frame. Let psi_k = theta_k - theta_i. In this frame handle k moves by a d psi_k outward and by r_k d psi_k
-//! around. It also moves by a d theta_i times the difference between its outward direction and e. This difference is at
-//! most the angle between the two directions. While the handles from i to k go the same way, psi_k is monotone, so that
-//! the ends of the step determine these lengths. The angle of each link is monotone, too. The product
-//! (t . b) sqrt(a^2 + r^2) is larger at the outer handle than at the inner handle, by 2 a (r + r') sin^2(d / 2) / link.
-//! So the outer handle turns less.
+//! For a limit below 0 there may be no such common pair of points. There the clearance is the largest gap over all
+//! directions, so along the best direction at either end two points bound the clearance, but these points differ
+//! between the ends. C must then be additive, and so has the sum m_i + m_{i+1} in place of the maximum. Uncertain steps
+//! are halved, the earlier half first, down to the last digits of the distance.
 //!
-//! **Which pairs.** Every link behind the first has one length. So the place of handle i >= 1 determines all places
-//! behind it. A pair (i, i + k) is where (1, 1 + k) is when handle 1 is at that place. Let S be the first place of
-//! handle 1. A handle i that is at or ahead of S is behind handle 1, which has come from S without a jump. So handle 1
-//! was at the place of handle i before. Then the pair (1, 1 + k) was where (i, i + k) is now. So pairs without boards 0
-//! and 1 matter only in steps in which handle 2 is somewhere behind S, in either direction of motion. A pair does not
-//! matter if its front handles are both behind the quiet place, where no two boards ever come within the limit. No pair
-//! matters while the whole team keeps its shape. Followers are solved only as far back as they can reach the boards
-//! that matter (`reach`).
+//! **Seen from the chain.** All this holds in any frame of reference that moves rigidly. If all handles from the first
+//! to the last of a pair stay on one line or circle, their distances along it stay the same, and B = 0. On one spiral,
+//! take the frame that turns about the centre with handle i and also moves outward by a d theta_i, in a fixed direction
+//! e of the frame. Let psi_k = theta_k - theta_i. In this frame handle k moves by a d psi_k outward and by r_k d psi_k
+//! around. It also moves by a d theta_i times the difference between its outward direction and e, which is at most the
+//! angle between the two directions. While the handles from i to k go the same way, psi_k is monotone, and so is the
+//! angle of each link, because the outer handle turns less than the inner one. (The product (t . b) sqrt(a^2 + r^2) is
+//! larger at the outer handle, by 2 a (r + r') sin^2(d / 2) / link.) Therefore these lengths are determined by the ends
+//! of the step.
+//!
+//! **Which pairs.** Every link behind the first has the same length, so the place of handle i >= 1 determines all
+//! places behind it. A pair (i, i + k) is therefore where (1, 1 + k) is when handle 1 is at that place. Let S be the
+//! first place of handle 1. If handle i is at S or ahead of it, then handle 1, which is further ahead and has come from
+//! S without a jump, has been at the place of handle i before. At that time the pair (1, 1 + k) was where (i, i + k) is
+//! now. Hence pairs without boards 0 and 1 matter only in steps in which handle 2 is somewhere behind S, in either
+//! direction of motion. A pair does not matter if its front handles are both behind the quiet place, because there no
+//! two boards ever come within the limit. No pair matters while the whole team keeps its shape. Followers are solved
+//! only as far back as they can reach the boards that matter (`reach`).
 
 pub mod between;
 mod broad_phase;
@@ -72,16 +75,16 @@ pub use ground::{ObstacleClearance, Touch};
 pub struct Found<T> {
     /// The result.
     pub value: Option<T>,
-    /// Metres of travel of the head up to which that is proved: the whole request, unless the budget was spent.
+    /// The travel of the head up to which that is proved, in metres: the whole request, unless the budget was spent.
     pub searched_until: f64,
 }
 
 /// The least clearance of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastClearance {
-    /// Metres between the two boards; negative where they overlap.
+    /// The distance between the two boards, in metres; negative where they overlap.
     pub value: f64,
-    /// Metres that the head has travelled.
+    /// The distance that the head has travelled, in metres.
     pub travelled: f64,
     /// The lower bench, counted from 0.
     pub bench_a: u32,
@@ -93,18 +96,18 @@ pub struct LeastClearance {
 pub struct ConservativeAdvancement<'a> {
     path: &'a Path,
     team: &'a Team,
-    /// Places of the head at which handle 1 turns round.
+    /// The places of the head at which handle 1 turns round.
     head_turns: Vec<Param>,
-    /// Places of the front handle of a body link at which its rear handle turns round.
+    /// The places of the front handle of a body link at which its rear handle turns round.
     body_turns: Vec<Param>,
-    /// For each segment the first of the run of lines, or of arcs of one circle, that it belongs to.
+    /// The index, for each segment, of the first segment of the run with the same constant curvature.
     curves: Vec<usize>,
 }
 
 impl<'a> ConservativeAdvancement<'a> {
-    /// Creates the searches for `team` on `path`. `head_turns` are the metres of travel of the head at which handle 1
-    /// turns round. `body_turns` are the metres of travel of a body link's front handle at which its rear handle does.
-    /// Both are in order.
+    /// Creates the searches for `team` on `path`. `head_turns` are the places of the head, in metres of travel, at
+    /// which handle 1 turns round, and `body_turns` the places of a body link's front handle at which its rear handle
+    /// does. Both are in order.
     pub fn new(path: &'a Path, team: &'a Team, head_turns: &[f64], body_turns: &[f64]) -> Self {
         let places = |turns: &[f64]| turns.iter().map(|travelled| path.param_at(*travelled)).collect();
         let mut curves = Vec::with_capacity(path.segments());

@@ -1,8 +1,8 @@
 //! Several dragons in one show: their motions on the show's clock, and the events of all of them.
 //!
 //! In: named motions with delays, in the order of the scene. Out: one timeline, one chain, one least clearance. Handles
-//! are numbered through: bench i joins handles i and i + 1, so the number of a dragon's last handle names no bench.
-//! Obstacles follow the handles. The show and the commands call it for a scene with several dragons.
+//! are numbered through: bench i joins handles i and i + 1, so the number of a dragon's last handle is not used as the
+//! number of a bench. Obstacles follow the handles.
 
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ use crate::{CONTACT_BUDGET, Choice, Motion};
 pub struct Dragon {
     /// Its name, unique in the show.
     pub name: String,
-    /// Seconds of the show during which it stands at its start.
+    /// The time of the show, in seconds, during which it stands at its start.
     pub delay: f64,
     /// Its motion, in its own time.
     pub motion: Motion,

@@ -22,9 +22,9 @@ use crate::model::Point;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Kind of the event.
+    /// The kind of the event.
     pub kind: EventKind,
-    /// Metres that the head has travelled along the path since the scene's start.
+    /// The distance that the head has travelled along the path since the scene's start, in metres.
     pub travelled: f64,
     /// The first bench concerned: of two that touch, the bench nearer the head; else the bench that stalls, locks or
     /// reaches an obstacle.

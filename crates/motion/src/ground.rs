@@ -18,12 +18,12 @@ pub struct Obstacle {
     pub name: String,
     /// The shape.
     pub shape: Shape,
-    /// Metres that every board has to stay away.
+    /// The distance that every board has to keep, in metres.
     pub keep_out: f64,
 }
 
 impl Obstacle {
-    /// Returns the clearance of a board, metres: the signed distance to the shape minus the keep-out.
+    /// Returns the clearance of a board, in metres: the signed distance to the shape minus the keep-out.
     pub fn clearance(&self, board: &Board) -> f64 {
         self.shape.signed_distance(board) - self.keep_out
     }

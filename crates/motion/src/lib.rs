@@ -1,9 +1,8 @@
 //! The motion: a team on a path at a speed, with a method to solve it. This crate alone decides what a show computes:
-//! the solver and the reason for it, the events, and the live clearance. It also decides the time of a travelled
-//! distance and the outline to draw.
+//! the solver and the reason for it, the events, the live clearance, the time of a travelled distance, and the outline
+//! to draw.
 //!
-//! In: the numbers of a scene. The show, the plans and the commands call it. Only `model` distinguishes the kinds of
-//! curves.
+//! In: the numbers of a scene. Only `model` distinguishes the kinds of curves.
 
 pub mod clearance;
 pub mod contact;
@@ -43,7 +42,7 @@ use timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
 /// The choice of the solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// The cheapest solver whose measured position error meets this accuracy, metres.
+    /// The cheapest solver whose measured position error meets this accuracy, in metres.
     Accuracy(f64),
     /// Exact motion, each follower bracketed.
     Newton,
@@ -123,7 +122,7 @@ const SINGULARITIES_BUDGET: u64 = 50_000_000;
 /// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
 const CONTACT_BUDGET: u64 = 100_000_000;
 
-/// Accuracy, metres, of the table that the clearance makes if an exact one is too large.
+/// The accuracy, metres, of the table that the clearance makes if an exact one is too large.
 const CLEARANCE_ACCURACY: f64 = 1e-4;
 
 const NO_TABLE: &str = "there is no table for this team and path";
@@ -206,7 +205,7 @@ impl Motion {
         &self.team
     }
 
-    /// Returns the speed of the head along the curve, metres per second.
+    /// Returns the speed of the head along the curve, in metres per second.
     pub fn head_speed(&self) -> f64 {
         self.head_speed
     }

@@ -1,7 +1,6 @@
 //! Links on a path: the follower, which is the handle at the rear end of a link, and the link's pose.
 //!
 //! In: a path, the place of a link's front handle, the link's length. Out: the rear handle's place and the link's pose.
-//! Solvers and events call it.
 
 use crate::model::Point;
 use crate::model::curve::{Curve, Follower};
@@ -35,8 +34,8 @@ pub fn link_pose(path: &Path, front: Param, rear: Param, link: f64) -> LinkPose 
 /// Returns the first place from `from` backward that is `link` metres from `front`; all places between are nearer.
 ///
 /// The square of the distance from `front` grows from a place by at most 2 slope h + bound h^2 over the next h units
-/// back. Here `bound` is [`Curve::second_derivative_bound`]. Each step goes to where the square with this growth
-/// reaches the square of the link. So steps never pass the first place sought; near it they double its digits.
+/// back, where `bound` is [`Curve::second_derivative_bound`]. Each step goes to where the square with this growth
+/// reaches the square of the link, so steps never pass the first place sought. Near it they double its digits.
 fn march(path: &Path, from: Param, front: Point, link: f64) -> Result<Param, NoFollower> {
     let mut param = from;
     for _ in 0..MOST_STEPS {
@@ -65,7 +64,7 @@ fn march(path: &Path, from: Param, front: Point, link: f64) -> Result<Param, NoF
     Err(NoFollower)
 }
 
-/// Steps after which the search for a follower gives up: many more than a path of sensible segments needs.
+/// The steps after which the search for a follower gives up: many more than a path of sensible segments needs.
 const MOST_STEPS: usize = 100_000;
 
 /// Returns the units of the coordinate that a segment has behind a place.

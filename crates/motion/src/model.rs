@@ -1,7 +1,7 @@
 //! The model of the stage: curves, the path made of them, the board, the separation of two boards, root finding.
 //!
-//! Pure functions of numbers: no clock, no input or output, no team in motion, no scene file. Every other room calls
-//! it. Points and vectors are nalgebra's, in metres, frame `stage` (x right, y up).
+//! Pure functions of numbers: no clock, no input or output, no team in motion, no scene file. Points and vectors are
+//! nalgebra's, in metres, in the frame `stage` (x right, y up).
 
 pub mod arc;
 pub mod board;
@@ -19,7 +19,7 @@ pub mod shape;
 pub mod spiral;
 pub mod team;
 
-/// A place on the stage, metres.
+/// A place on the stage, in metres.
 pub type Point = nalgebra::Point2<f64>;
 /// A displacement on the stage, metres, or a direction.
 pub type Vector = nalgebra::Vector2<f64>;

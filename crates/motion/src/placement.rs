@@ -69,7 +69,7 @@ impl Placement {
     /// The placement of a path that stands at its own coordinates.
     pub const IDENTITY: Self = Self { turn: None, origin: Vector::new(0.0, 0.0) };
 
-    /// Creates the placement that puts the origin of the path's coordinates at `origin`, metres. The placement turns
+    /// Creates the placement that puts the origin of the path's coordinates at `origin`, in metres. The placement turns
     /// the path by `rotation_turns` turns counter-clockwise about that point, after a reflection of y if `mirror` is
     /// true.
     pub fn new(origin: Vector, rotation_turns: f64, mirror: bool) -> Self {

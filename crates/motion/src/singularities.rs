@@ -1,20 +1,21 @@
 //! Singular configurations of the chain: the first stall (dead point) and the lock or path end that ends the motion.
 //!
-//! In: a path and a team. Out: [`Singularities`], in metres of travel of the head. The timeline calls the search once,
-//! before the show; the search for contacts cuts its steps at the turning points found here.
+//! In: a path and a team. Out: [`Singularities`], in metres of travel of the head. The search for contacts cuts its
+//! steps at the turning points found here.
 //!
 //! **Two links are enough.** Let F be the follower map of a body link, from its front handle's travel to its rear
 //! handle's. Handle k + 1 is behind handle k, so no handle after the first is ever further along the path than handle 1
 //! has been. On the first segment, outside the fold, F is continuous arbitrarily far back. So while F is continuous up
 //! to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
 //! is first reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on
-//! the first segment. This segment is a straight line without singularities, or an inward spiral with singularities
-//! near its centre only (`inward`). Only a start near the centre makes `SingularitySearch::body_stall` consider more
-//! links. So there are two problems in one variable, a `LinkTrace` each. The first is the head's link for all places of
-//! the head. The second is a body link for all places that handle 1 has come to. The two problems are solved in
-//! lockstep. Every step is proven to hold nothing unseen (`certificate`) or halved, down to the resolution of doubles
-//! (`trace`). Between two turning points of handle 1 its place is monotone in the head's place. So the head's place is
-//! found from handle 1's place by bisection.
+//! the first segment, which is a straight line without singularities, or an inward spiral with singularities near its
+//! centre only (`inward`). Therefore only a start near the centre makes `SingularitySearch::body_stall` consider more
+//! links.
+//!
+//! So two problems in one variable remain, a `LinkTrace` each: the head's link for all places of the head, and a body
+//! link for all places that handle 1 has come to. They are solved in lockstep. Every step is proven to hold nothing
+//! unseen (`certificate`) or halved, down to the resolution of doubles (`trace`). Between two turning points of handle
+//! 1 its place is monotone in the head's place, so the head's place is found from handle 1's place by bisection.
 
 mod certificate;
 mod inward;
@@ -31,12 +32,12 @@ use super::event::{Budget, Event};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
 
-/// Units in the last place before a lock. Rounding can make a handle jump within the last `JUMP_DIGITS`. `SAFE_DIGITS`
-/// more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
+/// The margins before a lock, in units in the last place. Rounding can make a handle jump within the last
+/// `JUMP_DIGITS`; `SAFE_DIGITS` more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
 const JUMP_DIGITS: u32 = 256;
 const SAFE_DIGITS: u32 = 32;
 const UNTOUCHED_DIGITS: u32 = 1024;
-/// Least displacement of a handle that jumps, in links: towards any other lock it moves less over those digits.
+/// The least displacement of a handle that jumps, in links: towards any other lock it moves less over those digits.
 const JUMP: f64 = 0.05;
 
 /// The singular configurations of a motion, up to the one that ends it.
@@ -46,11 +47,11 @@ pub struct Singularities {
     pub stall: Option<Event>,
     /// The lock, or the path's end if no link locks. `None` if the search ended before either.
     pub end: Option<Event>,
-    /// Metres of travel of the head up to which the search is complete: those of `end`, if there is one.
+    /// The travel of the head up to which the search is complete, in metres: that of `end`, if there is one.
     pub searched_until: f64,
-    /// Metres of travel of the head at which the first link's rear handle turns round, in order.
+    /// The places of the head, in metres of travel, at which the first link's rear handle turns round, in order.
     pub head_turns: Vec<f64>,
-    /// Metres of travel of a body link's front handle at which its rear handle turns round, in order.
+    /// The places of a body link's front handle, in metres of travel, at which its rear handle turns round, in order.
     pub body_turns: Vec<f64>,
 }
 

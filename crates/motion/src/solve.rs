@@ -1,7 +1,7 @@
 //! Solvers: from the head's travel to the state of every handle.
 //!
-//! The solvers differ in cost and accuracy and implement [`Solver`]; [`crate`] chooses one. Each lies on the measured
-//! Pareto front of error against time, except the paper's solver and the reference.
+//! The solvers differ in cost and accuracy and implement [`Solver`]; [`crate`] chooses one. Except for the paper's
+//! solver and the reference, each lies on the measured Pareto front of error against time.
 
 pub mod newton;
 pub mod paper;
@@ -18,17 +18,17 @@ use crate::linkage::NoFollower;
 /// All arrays have one length, the number of handles. Without velocities, `speed`, `vx` and `vy` hold NaN.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chain {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: Vec<f64>,
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: Vec<f64>,
-    /// Radians in (-pi, pi], the direction of the bench this handle leads; the last handle takes the last bench's.
+    /// The direction of the bench this handle leads, in radians in (-pi, pi]; the last handle has the last bench's.
     pub heading: Vec<f64>,
     /// Signed speed along the path, metres per second, positive in the direction of travel.
     pub speed: Vec<f64>,
-    /// Velocity along x, metres per second.
+    /// Velocity along x, in metres per second.
     pub vx: Vec<f64>,
-    /// Velocity along y, metres per second.
+    /// Velocity along y, in metres per second.
     pub vy: Vec<f64>,
 }
 
@@ -62,17 +62,17 @@ impl Chain {
 /// The handles of a chain, or some of a longer chain's, to write to. The arrays are those of [`Chain`].
 #[derive(Debug)]
 pub struct ChainMut<'a> {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: &'a mut [f64],
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: &'a mut [f64],
-    /// Radians in (-pi, pi].
+    /// The heading, in radians in (-pi, pi].
     pub heading: &'a mut [f64],
-    /// Metres per second along the path.
+    /// The speed along the path, in metres per second.
     pub speed: &'a mut [f64],
-    /// Metres per second along x.
+    /// The velocity along x, in metres per second.
     pub vx: &'a mut [f64],
-    /// Metres per second along y.
+    /// The velocity along y, in metres per second.
     pub vy: &'a mut [f64],
 }
 
@@ -108,12 +108,12 @@ impl ChainMut<'_> {
     }
 }
 
-/// The positions of the handles of a chain, metres.
+/// The positions of the handles of a chain, in metres.
 #[derive(Debug, Clone, Copy)]
 pub struct Positions<'a> {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: &'a [f64],
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: &'a [f64],
 }
 

@@ -1,7 +1,7 @@
 //! [`sweep`]: the positions that boards take one after the other while the head goes from one place to another. The
 //! positions are near enough to each other for an outline of the ground that the boards cover.
 //!
-//! In: a motion, a stretch of its path, some benches. Out: pairs of positions of one board. `drawing::swept` calls it.
+//! In: a motion, a stretch of its path, some benches. Out: pairs of positions of one board.
 
 use std::ops::Range;
 
@@ -30,8 +30,8 @@ const LEAST_SHARE: f64 = 1e-9;
 /// between its two ends. This is tested at a quarter, a half and three quarters of the step. `progress` receives the
 /// share that is done, from 0 to 1.
 ///
-/// A board whose front handle is at one place of the path lies in one position, whichever bench of its length that is.
-/// So a board is left out from where the board before it, of the same length, began.
+/// All benches of one length lie in the same position when their front handles are at the same place of the path. So a
+/// board is left out from the place on where the board before it, of the same length, began.
 ///
 /// # Errors
 /// [`NoFollower`] if a handle has no place before the end of the stretch.
@@ -82,7 +82,7 @@ pub fn sweep(
 
 /// A board in its position.
 struct Position {
-    /// Metres of the path to its front handle.
+    /// The length of path to its front handle, in metres.
     front: f64,
     corners: [Point; 4],
 }
@@ -91,7 +91,7 @@ struct Position {
 struct Boards<'a> {
     motion: &'a Motion,
     benches: Range<usize>,
-    /// Metres of the path to each front handle at the beginning.
+    /// The length of path to each front handle at the beginning, in metres.
     begun: Vec<f64>,
     /// True if handles may go backward.
     turn_back: bool,

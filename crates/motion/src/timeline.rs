@@ -1,5 +1,4 @@
-//! The events of a motion with their times. [`super::Motion`] makes a timeline; the show, `events`, `solve` and `draw`
-//! use it.
+//! The events of a motion with their times.
 
 use super::contact::{LeastClearance, ObstacleClearance};
 use super::event::Event;

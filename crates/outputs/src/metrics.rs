@@ -1,10 +1,9 @@
 //! The figures of running publishers for Prometheus, over HTTP. In: the services of one name or several, as a
-//! subscriber. Out: text at `/metrics`, in which the label `name` distinguishes the publishers. Called by the command
-//! `metrics`.
+//! subscriber. Out: text at `/metrics`, in which the label `name` distinguishes the publishers.
 //!
-//! A [`Monitor`] of each publisher handles all events, on one thread besides the server's, since ports cannot leave the
-//! thread that created them. Each request gets the figures of that moment: `families` has their list, `exposition` the
-//! text.
+//! A [`Monitor`] of each publisher handles all events, on one thread besides the server's, because ports cannot leave
+//! the thread that created them. Each request gets the figures of that moment: `families` has their list, `exposition`
+//! the text.
 
 pub mod exposition;
 pub mod families;

@@ -1,5 +1,5 @@
 //! The figures of a publisher: rate, gaps, latency, state, alert. In: the events of a
-//! [`feed`](bench_dragon_client::feed). Out: an [`IntervalReport`] on request. Called by `watch` and `metrics`.
+//! [`feed`](bench_dragon_client::feed). Out: an [`IntervalReport`] on request.
 
 use std::time::{Duration, Instant};
 
@@ -24,7 +24,7 @@ pub enum Presence {
     Silent,
 }
 
-/// Latency from sending to receiving over an interval, nanoseconds.
+/// The latency from sending to receiving over an interval, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Latency {
     /// Half are at most this.
@@ -54,7 +54,7 @@ pub struct IntervalReport {
     pub received: u64,
     /// Gaps in the sequence since the monitor started.
     pub missed: u64,
-    /// Latency in this interval; `None` if no frame came, or if the frames have another machine's clock.
+    /// The latency in this interval; `None` if no frame came, or if the frames have another machine's clock.
     pub latency: Option<Latency>,
     /// True if the publisher's clock is that of this process.
     pub shares_clock: bool,

@@ -1,8 +1,7 @@
 //! Outputs to other machines: trackers for lighting desks ([`psn_sender`]) and OSC messages ([`osc_sender`]).
 //!
 //! Each is a subscriber of each publisher, in a separate process. This file has their common part: it decides which
-//! frames are due, and when frames have stopped. In: the events of a feed. Out: UDP datagrams. Called by the command
-//! `send`.
+//! frames are due, and when frames have stopped. In: the events of a feed. Out: UDP datagrams.
 
 pub mod axes;
 pub mod network;

@@ -1,11 +1,10 @@
 //! The live stage picture: reads the frames of one publisher or several and serves them to browsers, with the page that
 //! draws them.
 //!
-//! Called by the `view` command. `reader` reads a publisher's shared memory on a separate thread, since ports cannot
-//! leave the thread that created them, and hands over the newest picture. `browser` sends the picture to one browser at
-//! its pace, over one WebSocket for each publisher; `wire` is its layout. `origin` decides which pages may connect,
-//! `authorization` which browsers may command; `certificates` has the proofs of scenes, `facts` the facts that take
-//! time to compute.
+//! `reader` reads a publisher's shared memory on a separate thread, because ports cannot leave the thread that created
+//! them, and hands over the newest picture. `browser` sends the picture to one browser at its pace, over one WebSocket
+//! for each publisher; `wire` is its layout. `origin` decides which pages may connect, `authorization` which browsers
+//! may command; `certificates` has the proofs of scenes, `facts` the facts that take time to compute.
 
 mod authorization;
 mod browser;

@@ -11,11 +11,11 @@ use super::scene::Team;
 
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
-/// Number of directions all around that are tried where none of the best is enough.
+/// The number of directions all around that are tried where none of the best is enough.
 const SECTORS: usize = 64;
-/// Angle in radians to which the best of these directions is refined.
+/// The angle in radians to which the best of these directions is refined.
 const LEAST_ANGLE: f64 = 1e-9;
-/// Distance by doubles, metres, from which on one of the eight fixed directions is tried first.
+/// The distance by doubles, metres, from which on one of the eight fixed directions is tried first.
 const CLEARLY_APART: f64 = 1e-2;
 
 /// A direction, of any length.

@@ -1,5 +1,5 @@
 //! The curves of a path, in intervals: as functions of their coordinate, and as pieces in the text of a scene
-//! (docs/proofs.md, "Definitions"). The path and the scene call it; no other file matches on the kinds of curves.
+//! (docs/proofs.md, "Definitions"). No other file matches on the kinds of curves.
 
 use serde::Deserialize;
 

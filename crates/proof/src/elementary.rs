@@ -9,7 +9,7 @@ use super::interval::Interval;
 const TERMS: usize = 16;
 /// Terms of the same series for an angle of at most 0.02: the remainder is at most 0.02^16 / 16! < 1e-40.
 const NEAR_TERMS: usize = 8;
-/// Number of angles in a radian whose sine and cosine are kept.
+/// The number of angles in a radian whose sine and cosine are kept.
 const PER_RADIAN: f64 = 32.0;
 /// Terms of the series of arctangent and of its hyperbolic twin: for |z| <= 0.34 the remainder is below 1e-42.
 const SLOW_TERMS: usize = 45;

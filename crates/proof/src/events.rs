@@ -30,7 +30,7 @@ pub(super) struct Events {
 pub(super) struct Near {
     pub benches: [usize; 2],
     pub most: Interval,
-    /// Metres of the head from the start to that place or one before it.
+    /// A lower bound of the travel of the head at that place, in metres.
     pub travelled: Interval,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct NearObstacle {
     pub obstacle: usize,
     pub bench: usize,
     pub most: Interval,
-    /// Metres of the head from the start to that place or one before it.
+    /// A lower bound of the travel of the head at that place, in metres.
     pub travelled: Interval,
 }
 

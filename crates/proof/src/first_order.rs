@@ -12,12 +12,12 @@ use super::path::{Place, Span};
 use super::scene::{Scene, Team};
 use super::sides::Sides;
 
-/// Number of times that the products of a link are enclosed again from the enclosure of its rear handle.
+/// The number of times that the products of a link are enclosed again from the enclosure of its rear handle.
 const ROUNDS: usize = 3;
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
 
-/// A handle: `point` + tau `velocity`, and an error. For two dragons tau is a time, and rates are metres per second.
+/// A handle: `point` + tau `velocity`, and an error. For two dragons tau is a time, so rates are in metres per second.
 #[derive(Debug, Clone)]
 pub(super) struct Handle {
     /// p(m), t(m).
@@ -46,7 +46,7 @@ pub(super) enum When {
 /// The listed handles over a step.
 pub(super) struct FirstOrder {
     pub handles: Vec<Handle>,
-    /// Upper bound of |tau|.
+    /// An upper bound of |tau|.
     pub half_step: Interval,
 }
 

@@ -1,5 +1,5 @@
-//! The obstacles of a stage, with their shapes in the path's own coordinates. Lemma 9 of docs/proofs.md: boards that
-//! stay clear of them, and boards that have come within their keep-out. Lemma 11: clearances.
+//! The obstacles of a stage, with their shapes in the path's own coordinates. By Lemma 9 of docs/proofs.md boards stay
+//! clear of them, or have come within their keep-out; by Lemma 11 their clearances are bounded.
 
 use serde::Deserialize;
 

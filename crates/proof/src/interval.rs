@@ -1,7 +1,7 @@
 //! Interval arithmetic of the checker, with ends of 128 bits.
 //!
-//! Every operation returns an interval that holds the result for all numbers of its operands: lower ends are rounded
-//! down, upper ends up. Every operation relies only on the operations and the comparisons of [`Number`]. An operation
+//! Every operation returns an interval that holds the result for all numbers of its operands, because lower ends are
+//! rounded down and upper ends up. It relies only on the operations and the comparisons of [`Number`]. An operation
 //! without a value is NaN: a division by an interval that holds 0, or a root of a number that may be negative. NaN
 //! propagates, and every comparison with it is false.
 

@@ -1,8 +1,8 @@
-//! The checker of certificates: the rules of docs/proofs.md, and nothing else. `verify`, `check
-//! --certificate` and `view --certificate` call it.
+//! The checker of certificates: the rules of docs/proofs.md, and nothing else.
 //!
 //! In: the lines of a certificate. Out: its proved claims, or the first line that does not follow. This crate depends
-//! on no other crate of this workspace: it shares neither geometry, parsing nor solver with the search, only that page.
+//! on no other crate of this workspace, because a fault in shared code would be shared too: it has neither geometry,
+//! parsing nor solver in common with the search, only that page.
 
 mod apart;
 mod boards;
@@ -80,11 +80,11 @@ pub struct Proved {
     /// The least pitch, in a certificate of that question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_pitch: Option<ProvedPitch>,
-    /// Number of steps checked.
+    /// The number of steps checked.
     pub steps: u64,
-    /// Number of links checked, in all steps.
+    /// The number of links checked, in all steps.
     pub links: u64,
-    /// Number of pairs of boards checked, in all steps.
+    /// The number of pairs of boards checked, in all steps.
     pub pairs: u64,
 }
 
@@ -183,7 +183,7 @@ struct Checker {
     /// True in the section of a dragon.
     is_in_section: bool,
     between: Option<Pair>,
-    /// Number of results before the section.
+    /// The number of results before the section.
     before: usize,
     steps: Steps,
     events: Events,

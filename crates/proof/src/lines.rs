@@ -204,10 +204,10 @@ pub struct ProvedEvent {
     pub event: EventKind,
     /// The status.
     pub status: Status,
-    /// Seconds before which the event does not happen.
+    /// The time, in seconds, before which the event does not happen.
     #[serde(default)]
     pub time_lo: Option<f64>,
-    /// Seconds by which the event has happened.
+    /// The time, in seconds, by which the event has happened.
     #[serde(default)]
     pub time_hi: Option<f64>,
     /// The bench of a link that has stalled or locked at `time_hi`, or the first of two that overlap then.
@@ -245,15 +245,15 @@ pub enum Until {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProvedClearance {
-    /// Metres: no two boards that share no handle are nearer.
+    /// The lower bound, in metres: no two boards that share no handle are nearer.
     #[serde(default)]
     pub lo: Option<f64>,
-    /// Metres: at one place the two benches are no further apart.
+    /// The upper bound, in metres: at one place the two benches are no further apart.
     #[serde(default)]
     pub hi: Option<f64>,
     /// The end of the stretch.
     pub until: Until,
-    /// Seconds of that end, for [`Until::Time`].
+    /// The time of that end, in seconds, for [`Until::Time`].
     #[serde(default)]
     pub time_until: Option<f64>,
     /// The bench of the two that is nearer the head, or the bench of the first of two dragons, counted from 0.
@@ -274,15 +274,15 @@ pub struct ProvedClearance {
 pub struct ProvedObstacleClearance {
     /// The number of the obstacle on the stage, from 0; the boundary is the last.
     pub obstacle: usize,
-    /// Metres: no board's clearance is less.
+    /// The lower bound, in metres: no board's clearance is less.
     #[serde(default)]
     pub lo: Option<f64>,
-    /// Metres: at one place the bench's clearance is no more.
+    /// The upper bound, in metres: at one place the bench's clearance is no more.
     #[serde(default)]
     pub hi: Option<f64>,
     /// The end of the stretch: the path's end or a time.
     pub until: Until,
-    /// Seconds of that end, for [`Until::Time`].
+    /// The time of that end, in seconds, for [`Until::Time`].
     #[serde(default)]
     pub time_until: Option<f64>,
     /// The bench, counted from 0.
@@ -297,11 +297,11 @@ pub struct ProvedObstacleClearance {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProvedSpeed {
-    /// Metres per second that no handle may exceed.
+    /// The speed that no handle may exceed, in metres per second.
     pub limit: f64,
-    /// Metres per second: with the head no faster, no handle exceeds the limit.
+    /// The lower speed, in metres per second: if the head is no faster, no handle exceeds the limit.
     pub value_lo: f64,
-    /// Metres per second: with the head any faster, the handle exceeds the limit.
+    /// The higher speed, in metres per second: if the head is any faster, the handle exceeds the limit.
     pub value_hi: f64,
     /// The handle has at least this ratio to the head's speed at one place.
     pub ratio_lo: f64,
@@ -309,7 +309,7 @@ pub struct ProvedSpeed {
     pub ratio_hi: f64,
     /// The handle, counted from 0.
     pub handle: usize,
-    /// Seconds at the scene's own speed up to which this holds, from its start on.
+    /// The time up to which this holds from the scene's start on, in seconds at the scene's own speed.
     pub time_until: f64,
 }
 
@@ -317,14 +317,15 @@ pub struct ProvedSpeed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProvedPitch {
-    /// Metres from the centre that the head is to reach.
+    /// The radius that the head is to reach, in metres from the centre.
     pub radius: f64,
     /// The least pitch that is looked at, metres per turn.
     pub from: f64,
-    /// Metres per turn: with every pitch from `from` to this, two boards overlap or a link locks before.
+    /// The lower pitch, in metres per turn: with every pitch from `from` to this one, two boards overlap or a link
+    /// locks before.
     #[serde(default)]
     pub value_lo: Option<f64>,
-    /// Metres per turn: with this pitch the head reaches the radius.
+    /// The higher pitch, in metres per turn: with it the head reaches the radius.
     #[serde(default)]
     pub value_hi: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! Binary numbers of 128 bits, without a heap. [`super::interval`] calls it.
+//! Binary numbers of 128 bits, without a heap.
 //!
 //! `+`, `-`, `*` and `/` return the exact result rounded to the next number in a given direction. A result without a
 //! value, or with an exponent beyond any that a certificate can need, is NaN. NaN propagates.
@@ -79,7 +79,7 @@ impl Number {
         if self.is_nan() {
             return f64::NAN;
         }
-        // 53 bits are exact in a double. Two factors, since one alone may overflow.
+        // 53 bits are exact in a double. There are two factors, because one alone may overflow.
         let (leading, exponent) = ((self.mantissa >> 75) as f64, self.exponent + 75);
         let half = exponent / 2;
         let size = leading * 2f64.powi(half) * 2f64.powi(exponent - half);

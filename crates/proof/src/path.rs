@@ -1,5 +1,5 @@
-//! The path of a certificate, in intervals: its segments, its places and their order. The module also bounds length,
-//! curvature and turning between two places (docs/proofs.md, "Definitions" and "Capsules").
+//! The path of a certificate, in intervals: its segments, its places and their order, and bounds of length, curvature
+//! and turning between two places (docs/proofs.md, "Definitions" and "Capsules").
 
 use std::cmp::Ordering;
 
@@ -49,10 +49,10 @@ pub(super) enum PathEnd {
 /// The whole path.
 pub(super) struct Path {
     segments: Vec<Segment>,
-    /// Metres from the start to each segment's start; for the first segment, to its end.
+    /// The travel from the start to each segment's start, in metres; for the first segment, to its end.
     travelled: Vec<Interval>,
     path_end: PathEnd,
-    /// Metres from the start to the path's end.
+    /// The travel from the start to the path's end, in metres.
     pub length: Interval,
 }
 

@@ -13,12 +13,12 @@ use super::steps::{Step, Steps};
 /// Limit of pieces on which a distance is bounded for one lock. A certificate that the search has written needs some
 /// hundred.
 const MOST_PIECES: usize = 20_000;
-/// A number above 3 pi / 2, radians.
+/// A number above 3 pi / 2, in radians.
 const THREE_QUARTERS: f64 = 4.712_388_980_384_7;
 
 /// The consequences of the lines so far.
 pub(super) struct Pitch {
-    /// Metres from the centre that the head is to reach.
+    /// The radius that the head is to reach, in metres from the centre.
     radius: f64,
     /// The least pitch of the first interval, and the greatest of the last: with every pitch between, the head does not
     /// reach the radius.
@@ -34,7 +34,7 @@ pub(super) struct Pitch {
 /// A pitch with which Lemma 8 holds far out, and the steps from there.
 struct Free {
     pitch: f64,
-    /// Metres from the centre from which on Lemma 8 holds.
+    /// The distance from the centre, in metres, from which on Lemma 8 holds.
     far: f64,
     scene: Scene,
     steps: Steps,

@@ -12,9 +12,9 @@ const ORDER: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::
 
 /// The state of knowledge of an event.
 struct Known {
-    /// Seconds before which the event does not happen.
+    /// The time, in seconds, before which the event does not happen.
     not_before: Interval,
-    /// Seconds by which the event has happened, and its benches.
+    /// The time, in seconds, by which the event has happened, and its benches.
     by: Option<(Interval, Option<usize>, Option<usize>)>,
     /// True if the event does not happen before the motion ends.
     never: bool,

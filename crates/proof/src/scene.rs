@@ -22,13 +22,13 @@ const MOST_DRAGONS: usize = 16;
 pub(super) struct Scene {
     /// The name; empty in a scene of one dragon.
     pub name: String,
-    /// Seconds of the show during which it stands at its start.
+    /// The time of the show, in seconds, during which it stands at its start.
     pub delay: Interval,
     /// The place of the path on the stage.
     pub frame: Mapping,
     pub team: Team,
     pub path: Path,
-    /// Metres per second.
+    /// The speed of the head, in metres per second.
     pub head_speed: Interval,
     /// The obstacles in the path's own coordinates, the boundary last.
     pub obstacles: Vec<Obstacle>,

@@ -30,7 +30,8 @@ impl Alone {
 const BEFORE_LOCK: f64 = 1e-3;
 
 impl Alone {
-    /// Returns true if the dragon locks, and a time is before the end of its last step by next to nothing.
+    /// Returns true if the dragon locks, and a time is within [`BEFORE_LOCK`] links of travel before the end of its
+    /// last step.
     fn locks_just_after(&self, scene: &Scene, time: f64) -> bool {
         let Some(end) = self.end.filter(|_| self.locks) else { return false };
         let end = scene.time(&scene.path.travelled(end));
@@ -54,16 +55,16 @@ pub(super) enum Claim<'c> {
 /// The section of two dragons.
 pub(super) struct Pair {
     pub dragons: [usize; 2],
-    /// Seconds up to which stretches follow one another from the start. The first flag is true if all stretches were
-    /// clear, the second if all have a number `apart`.
+    /// The time, in seconds, up to which stretches follow one another from the start. The first flag is true if all
+    /// stretches were clear, the second if all have a number `apart`.
     end: Option<f64>,
     all_clear: bool,
     all_apart: bool,
-    /// The end of the last stretch with a number `apart`, and the least of these numbers, metres.
+    /// The end of the last stretch with a number `apart`, and the least of these numbers, in metres.
     apart: Option<(f64, f64)>,
     /// Two benches that overlap, and seconds.
     meeting: Option<([usize; 2], f64)>,
-    /// Two benches that are no further apart than some metres at a time, seconds.
+    /// Two benches that are no further apart than some metres at a time, in seconds.
     near: Option<([usize; 2], Interval, f64)>,
     /// Counts for the report.
     pub steps: u64,
@@ -81,8 +82,8 @@ struct Together {
     links: u64,
 }
 
-/// Returns true if a head is surely in a span from one time to another. The head stands at the start before its delay
-/// has passed, and at the path's end.
+/// Returns true if a head is certain to be in a span from one time to another. The head stands at the start until its
+/// delay has passed, and then again at the path's end.
 fn is_in_span(scene: &Scene, Span(lo, hi): Span, from: &Interval, to: &Interval) -> bool {
     scene.path.travelled(lo).is_at_most(&scene.travelled_at(from))
         && (scene.path.is_at_end(hi) || scene.travelled_at(to).is_at_most(&scene.path.travelled(hi)))

@@ -1,4 +1,4 @@
-//! A board in doubles. [`super::first_order`] chooses directions and points with it; no proof depends on the choice.
+//! A board in doubles, by which [`super::first_order`] chooses directions and points. No proof depends on the choice.
 
 /// A board at one moment.
 pub(super) struct Sides {

@@ -7,7 +7,7 @@ use super::interval::Interval;
 use super::path::{Place, Span};
 use super::scene::Scene;
 
-/// Number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
+/// The number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
 const ROUNDS: usize = 2;
 
 /// Ratios of speeds to the head's.
@@ -90,7 +90,7 @@ struct Link<'a> {
     /// r and r' with the front handle at its place, r' only where neither span has a junction.
     at_place: Interval,
     rate_at_place: Interval,
-    /// Metres of the front handle from its place at tau = 0.
+    /// The travel of the front handle from its place at tau = 0, in metres.
     offset: Interval,
 }
 

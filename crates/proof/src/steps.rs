@@ -25,7 +25,7 @@ pub(super) struct Step {
     pub apart: Option<f64>,
     /// Claim by obstacle: its clearance is more than these metres.
     pub beside: Vec<Option<f64>>,
-    /// Places of all listed handles with the head at one place.
+    /// The places of all listed handles with the head at one place.
     pub at: Vec<Place>,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Steps {
     pub all_moving: bool,
     pub all_clear: bool,
     pub all_apart: bool,
-    /// Metres by which boards were apart in all steps up to `apart_end`.
+    /// The distance that boards kept at least in all steps up to `apart_end`, in metres.
     pub apart: f64,
     /// By obstacle: the end of the last step that stays clear of it, and true if all steps did.
     free: Vec<(Option<Place>, bool)>,

@@ -24,13 +24,13 @@ use bench_dragon_client::clock::{Clock, Deadlines};
 use control::CommandQueues;
 use statistics::Sample;
 
-/// Nanoseconds between two calls of [`Publisher::maintain`].
+/// The time between two calls of [`Publisher::maintain`], in nanoseconds.
 const MAINTENANCE_NS: u64 = 100_000_000;
 
 /// Counts of a show since its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ShowCounts {
-    /// Times the show began again after its end.
+    /// The number of times that the show began again after its end.
     pub shows_played: u64,
     /// Contacts that no search had found.
     pub unforeseen_contacts: u64,
@@ -146,7 +146,7 @@ pub trait FrameSource {
 pub struct LoopOptions {
     /// The run's number, in every header.
     pub run_id: u64,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
     /// The number of periods after which the loop ends; `None` for a loop without limit.
     pub periods: Option<u64>,
@@ -221,7 +221,7 @@ pub struct Reports {
     pub samples: rtrb::Producer<Sample>,
     /// Every alert and every cue.
     pub announcements: rtrb::Producer<Announcement>,
-    /// Turns of the loop's wait so far: a sign of life also between two frames.
+    /// The number of turns of the loop's wait so far, a sign of life also between two frames.
     turns: Arc<AtomicU64>,
 }
 
@@ -239,7 +239,7 @@ impl Reports {
 
 /// Publishes one frame in each period until `stop` is set or the periods are over.
 ///
-/// A frame is computed in its period, however late. A period that has wholly passed is skipped and counted. Later
+/// A frame is computed in its period, however late. A period that has wholly passed is skipped and counted, and later
 /// deadlines do not shift.
 ///
 /// # Errors

@@ -1,9 +1,9 @@
 //! `run --log`: a transport that writes a file.
 //!
 //! [`LogPublisher`] is the loop's end. It copies the arrays of a frame into a queue without a lock, an allocation or a
-//! system call. A thread orders them as in the message, hashes them and writes. The log skips no frame while its queue
-//! has room. Without room, the log records the frame's tick as lost, after the commands of the frame. Without room for
-//! these records, the log ends.
+//! system call. A thread puts them in the order of the message, hashes them and writes. While its queue has room, the
+//! log skips no frame. Without room it records the frame's tick as lost, after the commands of the frame; without room
+//! even for these records, the log ends.
 
 pub mod arithmetic;
 pub mod hash;
@@ -32,7 +32,7 @@ use hash::{HANDLE_WORDS, HEADER_WORDS, columns, header_words};
 use lines::ShowLine;
 use writer::LogWriter;
 
-/// Seconds of frames that the thread may fall behind before frames are lost.
+/// The time, in seconds of frames, by which the thread may fall behind before frames are lost.
 const QUEUED_SECONDS: f64 = 5.0;
 /// Frames that the queue holds at least.
 const LEAST_FRAMES: usize = 4;

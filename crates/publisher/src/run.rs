@@ -1,7 +1,7 @@
 //! Start and stop of a publisher: the threads of the loop and of its statistics, and the transports' ends on both.
 //!
-//! In: a [`FrameSource`], the open transports, their command queues, a clock. Out: a [`Published`]. Prints nothing but
-//! warnings through the crate `log`: the caller prints in its [`Hooks`]. Called by the commands `run` and `replay`.
+//! In: a [`FrameSource`], the open transports, their command queues, a clock. Out: a [`Published`]. Except for warnings
+//! through the crate `log`, nothing is printed here: the caller prints in its [`Hooks`].
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -20,7 +20,7 @@ use crate::live::{
 };
 use crate::transports::{self, Transport, TransportConfig, TransportError};
 
-/// Nanoseconds between two calls of [`Publisher::maintain`] before the first frame.
+/// The time between two calls of [`Publisher::maintain`] before the first frame, in nanoseconds.
 const LEAD_INTERVAL_NS: u64 = 10_000_000;
 
 /// The longest wait for [`Publishing::awaited`].
@@ -65,13 +65,13 @@ pub struct Publishing<'a> {
     pub scheduling: Scheduling,
     /// The run's number.
     pub run_id: u64,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
-    /// Seconds of wall time after which the loop ends.
+    /// The wall time after which the loop ends, in seconds.
     pub duration: Option<f64>,
     /// The scene's name in the status.
     pub scene: &'a str,
-    /// Nanoseconds that waiting subscribers have to connect before the first frame.
+    /// The time that waiting subscribers have to connect before the first frame, in nanoseconds.
     pub lead_ns: u64,
     /// A flag that is set when the process of ROS 2 is connected. The first frame waits for the flag, 5 s at most.
     pub awaited: Option<&'a AtomicBool>,
@@ -186,7 +186,7 @@ impl Publishing<'_> {
     }
 
     /// Waits for [`lead_ns`](Self::lead_ns) and for [`awaited`](Self::awaited), or until `stop` is set. Returns false
-    /// if the wait for `awaited` was in vain.
+    /// if `awaited` did not come.
     fn wait_for_subscribers(
         &self,
         clock: &impl Clock,

@@ -1,8 +1,7 @@
 //! The transports.
 //!
 //! In: a [`TransportConfig`]. Out: for each requested transport, a [`Publisher`] for the loop's thread and a
-//! [`StatusPublisher`] for the statistics thread. Transports know messages, no solver, and not each other.
-//! Called by [`run`](crate::run).
+//! [`StatusPublisher`] for the statistics thread. Transports know messages, but no solver and not each other.
 
 pub mod iceoryx2;
 

@@ -2,9 +2,8 @@
 //!
 //! In: the messages of a publisher. Out: files. [`recorder`] chooses the file of each message, and `run` keeps the
 //! state of the run. `messages` fills the messages of each topic. `file` is one file with its channels and chunks, and
-//! `disk` writes its bytes. [`recover`](mod@recover) repairs a file that was cut. [`reader`] reads a file, or the files
-//! of a `bag`, for a replay, by the `index` at the end of each. Nothing here knows a transport. Called by the command
-//! `record` and by the replay.
+//! `disk` writes its bytes. [`recover`](mod@recover) repairs a file that was cut. For a replay, [`reader`] reads a
+//! file, or the files of a `bag`, by the `index` at the end of each. Nothing here knows a transport.
 
 mod bag;
 mod disk;

@@ -2,8 +2,8 @@
 //!
 //! In: a [`Recording`] and [`ReplayOptions`]. Out: a [`Replay`], the loop's [`FrameSource`], and a thread that reads
 //! ahead into a queue of bounded size. With [`Pace::Recorded`] a frame is due as many periods after the first as in the
-//! recording. With [`Pace::Even`] each period has a frame. If the loop skips periods, or the disk is late, all later
-//! frames shift. Thus no frame is skipped, and none is sent in a burst. Called by the command `replay`.
+//! recording; with [`Pace::Even`] each period has a frame. If the loop skips periods, or the disk is late, all later
+//! frames shift, so that no frame is skipped and none is sent in a burst.
 
 mod pass;
 #[cfg(test)]
@@ -29,7 +29,7 @@ use bench_dragon_show::Outcome;
 use bench_dragon_show::convert::Stamps;
 use pass::{Pass, Recorded, Start};
 
-/// Seconds of frames that are read ahead.
+/// The time, in seconds of frames, that is read ahead.
 const QUEUED_SECONDS: f64 = 2.0;
 /// The least number of frames in that queue.
 const QUEUED_FRAMES: usize = 4;

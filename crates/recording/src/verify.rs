@@ -1,8 +1,8 @@
 //! Compares the frames of a recording with its scene.
 //!
 //! In: a [`Recording`] and the [`Scene`] that it holds. Out: a [`RecordingVerdict`]. A second solver computes the
-//! handles of each frame at the frame's own simulated time. A recording has no commands: only a log proves
-//! that simulated time advanced as commanded. Called by the command `verify`.
+//! handles of each frame at the frame's own simulated time. Because a recording has no commands, only a log proves that
+//! simulated time advanced as commanded.
 
 use serde::Serialize;
 
@@ -20,9 +20,9 @@ pub struct RecordingVerdict {
     pub frames: u64,
     /// The first difference.
     pub difference: Option<FrameDifference>,
-    /// The greatest distance of a handle so far, metres.
+    /// The greatest distance of a handle so far, in metres.
     pub max_difference: Option<f64>,
-    /// The tolerance of that handle, metres.
+    /// The tolerance of that handle, in metres.
     pub tolerance: Option<f64>,
 }
 

@@ -47,7 +47,7 @@ const OK: u8 = 0;
 const WARN: u8 = 1;
 const ERROR: u8 = 2;
 
-/// Nanoseconds without a status after which a chase has died. A chase sends five statuses a second.
+/// The time without a status, in nanoseconds, after which a chase counts as dead. A chase sends five statuses a second.
 const CHASE_SILENCE_NS: u64 = 2_000_000_000;
 
 /// The input of a second's diagnostics besides the status.

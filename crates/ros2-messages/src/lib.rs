@@ -1,8 +1,8 @@
 //! The ROS 2 messages on the wire, field for field as `msgs/` and the standard packages define them.
 //!
-//! A message of a header and one of the program's layouts nests the layout: on the wire a nested struct is its fields
-//! in order. Called by the ROS 2 transport and by the recorder, so that a recording has the same messages as a ROS 2
-//! subscriber.
+//! A message of a header and one of the program's layouts nests the layout, because on the wire a nested struct is its
+//! fields in order. The ROS 2 transport and the recorder share these messages, so that a recording has the same
+//! messages as a ROS 2 subscriber.
 
 pub mod diagnostics;
 pub mod markers;
@@ -23,9 +23,9 @@ pub const FRAME_ID: &str = "stage";
 /// builtin_interfaces/Time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Time {
-    /// Seconds since 1970, or simulated seconds.
+    /// The whole seconds since 1970, or the simulated seconds.
     pub sec: i32,
-    /// Nanoseconds of that second.
+    /// The nanoseconds of that second.
     pub nanosec: u32,
 }
 
@@ -164,11 +164,11 @@ impl HasStamp for HandlePoses {
 /// geometry_msgs/Point and Vector3.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Xyz {
-    /// Metres.
+    /// The x coordinate, in metres.
     pub x: f64,
-    /// Metres.
+    /// The y coordinate, in metres.
     pub y: f64,
-    /// Metres.
+    /// The z coordinate, in metres.
     pub z: f64,
 }
 

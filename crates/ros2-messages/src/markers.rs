@@ -14,9 +14,9 @@ use bench_dragon_motion::model::board::Board;
 /// builtin_interfaces/Duration.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Duration {
-    /// Seconds.
+    /// The whole seconds.
     pub sec: i32,
-    /// Nanoseconds.
+    /// The nanoseconds of that second.
     pub nanosec: u32,
 }
 
@@ -85,7 +85,7 @@ pub struct Marker {
     pub action: i32,
     /// The pose.
     pub pose: Pose,
-    /// Metres along, across and up.
+    /// The lengths along, across and up, in metres.
     pub scale: Xyz,
     /// The colour.
     pub color: Color,
@@ -130,9 +130,9 @@ const RING_RADIUS: f64 = 2.5;
 /// The lifetime of a marker: this number of periods, and at least this number of seconds.
 const LIFETIME_PERIODS: f64 = 5.0;
 const LEAST_LIFETIME: f64 = 1.0;
-/// The width of the line of an obstacle's outline, metres.
+/// The width of the line of an obstacle's outline, in metres.
 const OUTLINE_WIDTH: f64 = 0.08;
-/// The height of an obstacle's name, metres.
+/// The height of an obstacle's name, in metres.
 const NAME_HEIGHT: f64 = 0.5;
 /// The most benches named at once: two of the event, and the two nearest.
 const MOST_NAMED: usize = 4;
@@ -174,7 +174,7 @@ impl Marker {
 pub struct MarkerArray {
     /// The benches from the head on, then `contact`, `coming`, `sentence`, the `numbers` and the ground.
     pub markers: Vec<Marker>,
-    /// The deadline of the latest frame, nanoseconds; 0 before the first.
+    /// The deadline of the latest frame, in nanoseconds; 0 before the first.
     #[serde(skip)]
     latest_deadline_ns: u64,
 }
@@ -274,7 +274,7 @@ impl HasStamp for MarkerArray {
     }
 }
 
-/// Returns the width of the widest board, metres: signs and words have its size.
+/// Returns the width of the widest board, in metres: signs and words have its size.
 fn greatest_width(stage: &Stage) -> f64 {
     stage.dragons.iter().map(|dragon| dragon.width).fold(0.0, f64::max)
 }

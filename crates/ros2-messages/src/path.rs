@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{HasStamp, Header, Pose, Time};
 use bench_dragon_messages::{StageMessage, StageSegment};
 
-/// The turn between two points, radians: the chord of a circle of 9 m is 9 mm off.
+/// The turn between two points, in radians: the chord of a circle of 9 m is 9 mm off.
 const TURN: f64 = std::f64::consts::PI / 36.0;
 /// The most points of a path. A path with more turns gets fewer points for each.
 const MOST_POINTS: f64 = 10_000.0;

@@ -156,7 +156,7 @@ pub struct DiagnosticLimits {
     pub skipped_warn: u64,
     /// Skipped periods for an error; by default a tenth of the loop's rate, at least 2 and at least `skipped_warn`.
     pub skipped_error: Option<u64>,
-    /// Wake-up lateness for a warning, 99th percentile, seconds; infinite by default: lateness within a period is
+    /// Wake-up lateness for a warning, 99th percentile, in seconds; infinite by default: lateness within a period is
     /// harmless.
     pub lateness_warn: f64,
     /// The same for an error.
@@ -179,7 +179,7 @@ impl DiagnosticLimits {
 /// The ROS 2 settings of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ros2Settings {
-    /// Frames per second on ROS 2; by default the smaller of 60 and the loop's rate.
+    /// The rate on ROS 2, in frames per second; by default the smaller of 60 and the loop's rate.
     pub rate: Option<f64>,
     /// The topics and the quality of service of each.
     pub topics: BTreeMap<Topic, Qos>,

@@ -12,7 +12,7 @@ pub struct TransformStamped {
     pub header: Header,
     /// `<name>/head` or `<name>/tail`; with several dragons `<name>/<dragon>/head`.
     pub child_frame_id: String,
-    /// Metres.
+    /// The translation, in metres.
     pub translation: Xyz,
     /// The heading.
     pub rotation: Quaternion,

@@ -2,8 +2,7 @@
 //!
 //! In: the events of the feed of each name. Out: for each run of a show its node, topics and services, from its first
 //! frame until the show has ended. The scene, which the show sends along, has the topics, their quality of service and
-//! the limits of the diagnostics. Called by `send ros2` through
-//! [`poll_until`](bench_dragon_client::polling::poll_until).
+//! the limits of the diagnostics.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

@@ -1,6 +1,6 @@
 //! Commands to the show from the ROS 2 services: tickets, and the answers of `<name>/control`.
 //!
-//! In: a [`Command`]. Out: an [`Answer`] with the ticket of the command. Called by the control thread.
+//! In: a [`Command`]. Out: an [`Answer`] with the ticket of the command.
 
 use std::sync::mpsc::{Receiver, channel};
 

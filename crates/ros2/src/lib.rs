@@ -1,8 +1,7 @@
 //! ROS 2 topics, by ros2-client on RustDDS, of shows in other processes. On another thread the services of the node:
 //! its parameter services and, on request, those that control the show.
 //!
-//! In: the feed of a show and the process's environment. Out: a [`bridge`]. Called by `send ros2`, which `run` and
-//! `replay` start as a child process; both call [`describe`] first.
+//! In: the feed of a show and the process's environment. Out: a [`bridge`].
 
 pub mod bridge;
 mod commands;

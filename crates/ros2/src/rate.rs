@@ -1,4 +1,4 @@
-//! The frames of a show that go to ROS 2 at a lower rate than the loop's. Pure. Called by the bridge for each frame.
+//! The frames of a show that go to ROS 2 at a lower rate than the loop's. Pure.
 
 use bench_dragon_messages::FrameHeader;
 

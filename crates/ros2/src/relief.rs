@@ -1,4 +1,4 @@
-//! The relief of a volatile writer by a second one of the same topic. Pure. Called by the topic's writer.
+//! The relief of a volatile writer by a second one of the same topic. Pure.
 //!
 //! For each new subscriber a volatile writer of RustDDS 0.15.1 lists the number of every message that it has written,
 //! about 13 bytes each (`RtpsReaderProxy::set_pending_gap_up_to`). The list stays until the subscriber acknowledges,

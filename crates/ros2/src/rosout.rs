@@ -2,8 +2,7 @@
 //!
 //! In: records of the program's logger ([`enqueue`]), and those of a parent process, which has no node
 //! ([`take_queued`], [`enqueue_line`]). A queue keeps records from the start of the process, so that warnings before
-//! the node exists are sent too. Out: messages. Stamps are wall time, as in every node of ROS 2. Called by the topics'
-//! thread, which alone sends, and by the program's logger.
+//! the node exists are sent too. Out: messages. Stamps are wall time, as in every node of ROS 2.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};

@@ -1,7 +1,6 @@
 //! The alert rules: from the timeline and the clearance to a level with hysteresis, and to alerts.
 //!
-//! In: a frame's tick, time and nearest pair, and the events. Out: the level, and the alerts of that frame. The show
-//! calls it once per frame.
+//! In: a frame's tick, time and nearest pair, and the events. Out: the level, and the alerts of that frame.
 
 #[cfg(test)]
 mod tests;
@@ -16,13 +15,13 @@ use bench_dragon_messages::state::Level;
 /// before, between and behind them. Approaching and clear are alone. Several dragons can have more.
 pub const MOST_PER_FRAME: usize = 7;
 
-/// Clearance at which the level may be released, as a multiple of the clearance that raised it. Without this
+/// The clearance at which the level may be released, as a multiple of the clearance that raised it. Without this
 /// hysteresis, a clearance that oscillates about the threshold would make the level flicker.
 const HYSTERESIS_RATIO: f64 = 1.5;
 
-/// Time for which the clearance must stay that wide, as a share of the approach time. The ratio alone is not enough.
-/// The paper's head passes from one bench to the next: its clearance rises from 0.050 m to 0.082 m and falls back
-/// within 4 s. The clearance is above 0.075 m for 0.6 s.
+/// The time for which the clearance must stay that wide, as a share of the approach time. The ratio alone is not
+/// enough. The paper's head passes from one bench to the next: its clearance rises from 0.050 m to 0.082 m and falls
+/// back within 4 s. The clearance is above 0.075 m for 0.6 s.
 const RELEASE_HOLD: f64 = 0.1;
 
 /// A change of the alert level or a step of the countdown.
@@ -48,7 +47,7 @@ pub struct LevelTracker {
     announced_tick: u64,
     /// Whole seconds of wall time counted down since then.
     seconds_counted: u64,
-    /// Time of the previous frame of this showing; `None` before the first.
+    /// The time of the previous frame of this showing; `None` before the first.
     previous_time: Option<f64>,
     /// Time since which the clearance is wide enough to release the level.
     open_since: Option<f64>,

@@ -1,8 +1,8 @@
 //! The show clock: from ticks and commands to simulated time.
 //!
-//! Pure and computed from the integer tick: sim0 + time_scale * (tick - tick0) / rate. Each loop, and each command that
-//! changes the time or the rate, sets a new (sim0, tick0, time_scale). Such a command can round sim0 once. Between
-//! these changes no error accumulates. The same ticks with the same commands give the same bits. The show calls it.
+//! The time is computed from the integer tick: sim0 + time_scale * (tick - tick0) / rate. Each loop, and each command
+//! that changes the time or the rate, sets a new (sim0, tick0, time_scale), which can round sim0 once. Between these
+//! changes no error accumulates, so the same ticks with the same commands give the same bits. Pure.
 
 #[cfg(test)]
 mod tests;
@@ -24,9 +24,9 @@ pub struct ShowTime {
     pub playback: PlaybackState,
     /// Jumps of simulated time so far: loops, seeks, restarts.
     pub epoch: u32,
-    /// Number of times that the show has ended and started again.
+    /// The number of times that the show has ended and started again.
     pub shows_played: u64,
-    /// Number of cues passed, in the order of their times.
+    /// The number of cues passed, in the order of their times.
     pub cues_passed: usize,
 }
 
@@ -109,7 +109,7 @@ impl ShowClock {
         clock
     }
 
-    /// Returns the simulated time at which the show ends, seconds.
+    /// Returns the simulated time at which the show ends, in seconds.
     pub fn freeze_time(&self) -> f64 {
         self.freeze_time
     }

@@ -1,7 +1,6 @@
 //! One dragon in play: from its own time to its chain on the stage, with the nearest of its boards.
 //!
-//! In: a motion and its own time. Out: the chain and its clearance. The show calls it, for its one dragon or for each
-//! of several.
+//! In: a motion and its own time. Out: the chain and its clearance.
 
 use crate::scene::Scene;
 use bench_dragon_motion::clearance::{ClearanceMonitor, ObstacleMonitor, PairClearance};
@@ -15,7 +14,7 @@ pub(crate) struct Dancer {
     /// Solves in the path's own coordinates, where the clearance has more digits.
     solver: Box<dyn Solver>,
     velocities: Velocities,
-    /// Travel of the head per second, metres; NaN if the method does not follow the path exactly.
+    /// The travel of the head per second, in metres; NaN if the method does not follow the path exactly.
     metres_per_second: f64,
     clearance: Option<ClearanceMonitor>,
     obstacles: Option<ObstacleMonitor>,
@@ -24,7 +23,7 @@ pub(crate) struct Dancer {
     pub solved: Option<(f64, bool)>,
     /// The name of the solver and the reason for its choice.
     pub reason: String,
-    /// Greatest error of a clearance, metres.
+    /// The greatest error of a clearance, in metres.
     pub clearance_error: f64,
 }
 

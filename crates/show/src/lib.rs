@@ -1,8 +1,7 @@
 //! The show: from a scene and a tick to one [`Frame`], always with the same bits.
 //!
 //! In: a scene, its timeline, and ticks. Out: frames. The show uses the solver, the events and the alert rules, but no
-//! wall clock and no transport. The live loop, the verification of logs and the stage page call
-//! the show.
+//! wall clock and no transport. So the live loop, the verification of logs and the stage page all get the same frames.
 
 pub mod alerts;
 pub mod clock;
@@ -52,8 +51,8 @@ pub struct Frame {
     pub playback: PlaybackState,
     /// The pose of every handle.
     pub chain: Chain,
-    /// The least clearance, metres: of two boards that share no handle, or of a board and an obstacle; NaN if it is not
-    /// computed.
+    /// The least clearance, in metres: of two boards that share no handle, or of a board and an obstacle; NaN if it is
+    /// not computed.
     pub min_clearance: f64,
     /// The alerts that go with this frame, in order. Its capacity is reserved in advance.
     pub alerts: Vec<Alert>,
@@ -65,12 +64,12 @@ pub struct Frame {
     pub cues: Vec<ReachedCue>,
     /// The commands at the beginning of this period and a finished step, in order. Its capacity is reserved in advance.
     pub commands: Vec<CommandRecord>,
-    /// Number of times that the show has ended and started again.
+    /// The number of times that the show has ended and started again.
     pub shows_played: u64,
-    /// Number of contacts that no search had found: boards that overlapped each other, or the keep-out of an obstacle,
-    /// before the timeline's event.
+    /// The number of contacts that no search had found: boards that overlapped each other, or the keep-out of an
+    /// obstacle, before the timeline's event.
     pub unforeseen_contacts: u64,
-    /// Number of frames without a solution: the chain is the latest solution.
+    /// The number of frames without a solution: the chain is the latest solution.
     pub unsolved_frames: u64,
 }
 
@@ -102,7 +101,7 @@ impl Frame {
 pub struct ReachedCue {
     /// The cue's number, from 1 in the order of times.
     pub number: u32,
-    /// The cue's time, simulated seconds.
+    /// The cue's time, in simulated seconds.
     pub time: f64,
     /// True if the show waits at the cue for [`Command::Go`].
     pub pauses: bool,
@@ -169,7 +168,7 @@ pub struct Show {
     level: Option<LevelTracker>,
     /// True if boards are measured against obstacles.
     has_obstacles: bool,
-    /// Greatest overlap in metres that rounding explains before a contact; `None` if the solver does not follow the
+    /// The greatest overlap in metres that rounding explains before a contact; `None` if the solver does not follow the
     /// searched motion.
     overlap_tolerance: Option<f64>,
     /// The time requested for the chain, and true if the chain moves then.
@@ -253,7 +252,7 @@ impl Show {
         &self.timeline
     }
 
-    /// Returns the simulated time at which the show ends, seconds.
+    /// Returns the simulated time at which the show ends, in seconds.
     pub fn freeze_time(&self) -> f64 {
         self.clock.freeze_time()
     }

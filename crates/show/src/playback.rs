@@ -7,17 +7,17 @@ use bench_dragon_messages::state::EventKind;
 /// The settings for playing a scene that the command line may override.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
-    /// Start of the show, simulated seconds.
+    /// Start of the show, in simulated seconds.
     pub start: f64,
     /// Simulated seconds per second of wall time.
     pub time_scale: f64,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
     /// The reaction to a contact.
     pub on_contact: OnContact,
     /// The behaviour at the end of the show.
     pub at_end: AtEnd,
-    /// Seconds of wall time for which a looping show stands at its end.
+    /// The wall time for which a looping show stands at its end, in seconds.
     pub end_hold: f64,
     /// True if the show waits at its start for [`Command::Go`](bench_dragon_messages::control::Command::Go).
     pub paused: bool,
@@ -39,9 +39,9 @@ impl Playback {
     kind.name()
 )]
 pub struct StartError {
-    /// The requested start, simulated seconds.
+    /// The requested start, in simulated seconds.
     pub start: f64,
-    /// The end of the motion, simulated seconds.
+    /// The end of the motion, in simulated seconds.
     pub end: f64,
     /// The event that ends the motion.
     pub kind: EventKind,

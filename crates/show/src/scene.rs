@@ -1,6 +1,6 @@
 //! The scene file, checked once and converted to the types of the model.
 //!
-//! In: TOML text. Out: a [`Scene`]: all its numbers are in range and its start is legal. Errors name the file, the
+//! In: TOML text. Out: a [`Scene`], whose numbers are all in range and whose start is legal. Errors name the file, the
 //! line, the field and the expected value.
 
 pub mod accepted;
@@ -48,9 +48,9 @@ use bench_dragon_ros2_messages::settings::Ros2Settings;
 
 /// The paper's scene, built into the program.
 const PAPER: &str = include_str!("../../../config/paper.toml");
-/// Default limit of subscribers of each iceoryx2 service.
+/// The default limit of subscribers of each iceoryx2 service.
 const DEFAULT_SUBSCRIBERS: usize = 8;
-/// Default wall time for which a looping show stands at its end, seconds.
+/// The default wall time for which a looping show stands at its end, in seconds.
 const DEFAULT_END_HOLD: f64 = 5.0;
 
 /// Invalid input, in one sentence that names the place and the expected value.
@@ -95,7 +95,7 @@ pub enum AtEnd {
 pub struct AlertRules {
     /// Simulated seconds before an event.
     pub approach_time: f64,
-    /// Metres between two boards.
+    /// The distance between two boards, in metres.
     pub approach_clearance: f64,
 }
 
@@ -136,13 +136,13 @@ pub struct Scene {
     pub on_contact: OnContact,
     /// The behaviour at the end of the show.
     pub at_end: AtEnd,
-    /// Seconds of wall time for which a looping show stands at its end.
+    /// The wall time for which a looping show stands at its end, in seconds.
     pub end_hold: f64,
     /// The cues, in the order of the file.
     pub cues: Vec<Cue>,
     /// The limits for warnings; `None` for a scene without alerts.
     pub alerts: Option<AlertRules>,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
     /// The velocities: computed or not.
     pub velocities: Velocities,
@@ -271,8 +271,8 @@ impl Scene {
     }
 }
 
-/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is no TOML has none: its errors
-/// are the errors of a scene of one dragon.
+/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is not TOML has none, so its
+/// errors are those of a scene of one dragon.
 fn several(text: &str) -> Option<Spanned<serde::de::IgnoredAny>> {
     // Most scenes have one dragon, and are read once.
     text.contains("dragons").then(|| toml::from_str::<Probe>(text).ok()?.dragons).flatten()

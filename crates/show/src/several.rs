@@ -1,8 +1,8 @@
 //! The frames of a scene with several dragons: one chain with all handles, and the nearest two
 //! boards of all dragons.
 //!
-//! In: the scene and a time of the show. Out: the chain on the stage, the handles of all dragons one after the other,
-//! and its clearance. The show calls it in place of its one dragon.
+//! In: the scene and a time of the show. Out: the chain on the stage, with the handles of all dragons one after the
+//! other, and its clearance.
 
 use std::ops::Range;
 
@@ -53,12 +53,12 @@ impl Several {
         reasons.join("; ")
     }
 
-    /// Returns the greatest error of a clearance, metres.
+    /// Returns the greatest error of a clearance, in metres.
     pub(crate) fn clearance_error(&self) -> f64 {
         self.members.iter().map(|member| member.dancer.clearance_error).fold(0.0, f64::max)
     }
 
-    /// Returns the longest link of any dragon, metres.
+    /// Returns the longest link of any dragon, in metres.
     pub(crate) fn longest_link(&self) -> f64 {
         self.members.iter().map(|member| member.dragon.motion.team().longest_link()).fold(0.0, f64::max)
     }

@@ -1,4 +1,4 @@
-//! A chain as text: rows of a CSV table, or a line of JSON. Called by the command `solve`.
+//! A chain as text: rows of a CSV table, or a line of JSON.
 
 use bench_dragon_messages::sentence::number;
 use bench_dragon_motion::solve::Chain;
@@ -15,7 +15,7 @@ struct TimeLine {
     handles: Vec<[f64; 6]>,
 }
 
-/// Appends a row for each handle at `time`, simulated seconds; NaN becomes an empty field.
+/// Appends a row for each handle at `time`, in simulated seconds; NaN becomes an empty field.
 pub fn csv_rows(time: f64, chain: &Chain, text: &mut String) {
     let time = number(time);
     for handle in 0..chain.handles() {
@@ -30,7 +30,7 @@ pub fn csv_rows(time: f64, chain: &Chain, text: &mut String) {
     }
 }
 
-/// Appends a line of JSON with all handles at `time`, simulated seconds.
+/// Appends a line of JSON with all handles at `time`, in simulated seconds.
 pub fn json_line(time: f64, chain: &Chain, text: &mut String) {
     let line = TimeLine { t: time, handles: (0..chain.handles()).map(|handle| numbers(chain, handle)).collect() };
     // Numbers and names of fields only: nothing that JSON does not have.

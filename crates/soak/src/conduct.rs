@@ -21,7 +21,7 @@ use bench_dragon_publisher::live::statistics::Percentiles;
 pub struct Conducted {
     /// The seed of its commands.
     pub seed: u64,
-    /// Nanoseconds of a period of the publisher.
+    /// The period of the publisher, in nanoseconds.
     pub period_ns: f64,
     /// Commands sent.
     pub sent: u64,

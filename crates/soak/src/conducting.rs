@@ -1,5 +1,4 @@
-//! The processes that send commands in a soak test: the load generator, and clients that are killed. Owned by the
-//! [`fleet`](super::fleet).
+//! The processes that send commands in a soak test: the load generator, and clients that are killed.
 
 use std::process::Child;
 use std::sync::mpsc::Sender;

@@ -1,8 +1,8 @@
-//! The check that each frame follows from the frame before. Time stands still while paused or held, and advances at the
-//! rate in force while playing. The epoch changes exactly at jumps of simulated time.
+//! The check that each frame follows from the frame before: time stands still while paused or held, and advances at the
+//! rate in force while playing; the epoch changes exactly at jumps of simulated time.
 //!
 //! In: the frames of a publisher that loops without a hold at its end, as the soak test starts it. A frame is checked
-//! against earlier frames, never against the commands. Called by the [`observer`](super::observer).
+//! against earlier frames, never against the commands.
 
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{FrameHeader, HandlePose};

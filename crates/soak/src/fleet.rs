@@ -1,8 +1,7 @@
 //! The processes of a soak test: one publisher, and subscribers that keep up, are slow, or die and return.
 //!
 //! In: a [`Plan`], and the output of the processes. Out: the observations of the subscribers, the counts of the
-//! publisher. Used by the command `soak`, which calls [`Fleet::poll`] often and takes a row of
-//! [`figures`](super::figures) once a second.
+//! publisher.
 
 use std::process::{Child, ExitStatus};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};

@@ -2,9 +2,8 @@
 //!
 //! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, with two lines for
 //! each ten seconds. Their tags are `lateness` and `step`, their values nanoseconds. Each histogram is encoded as V2
-//! and compressed. HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read the file.
-//! The sum over all lines of a tag is the distribution of the percentiles in the run's summary. The command `run` calls
-//! this module for `soak`.
+//! and compressed, so that HistogramLogProcessor, HistogramLogAnalyzer and the readers of HdrHistogram's ports read the
+//! file. The sum over all lines of a tag is the distribution of the percentiles in the run's summary.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -19,7 +18,7 @@ use bench_dragon_publisher::live::statistics::{Durations, Sample};
 
 /// The header of every interval log.
 const LEGEND: &str = "\"StartTimestamp\",\"Interval_Length\",\"Interval_Max\",\"Interval_Compressed_Histogram\"\n";
-/// Seconds of an interval: short enough to find a bad minute, long enough for a small log of a night.
+/// The length of an interval, in seconds: short enough to find a bad minute, long enough for a small log of a night.
 const INTERVAL_S: f64 = 10.0;
 
 /// The log of a run's distributions.

@@ -1,4 +1,4 @@
-//! A soak test's figures over time, in bounded memory. Filled once a second, read by the report.
+//! A soak test's figures over time, in bounded memory.
 
 use serde::Serialize;
 
@@ -9,10 +9,11 @@ const MOST_STRETCHES: usize = 1024;
 /// percentiles, the latest for counts that only grow.
 #[derive(Debug, Clone, Serialize)]
 pub struct History {
-    /// Seconds of a row.
+    /// The length of a row, in seconds.
     seconds_per_row: u64,
     columns: Vec<String>,
-    /// Seconds since the start at the end of each row, and its figures; NaN (null in JSON) for unknown figures.
+    /// The time of the end of each row, in seconds since the start, and its figures; NaN (null in JSON) for unknown
+    /// figures.
     rows: Vec<Row>,
     #[serde(skip)]
     seconds_in_last: u64,
@@ -62,7 +63,7 @@ impl History {
         self.seconds_per_row *= 2;
     }
 
-    /// Seconds of a row.
+    /// Returns the length of a row, in seconds.
     pub fn seconds_per_row(&self) -> u64 {
         self.seconds_per_row
     }

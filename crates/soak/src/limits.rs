@@ -1,4 +1,4 @@
-//! The limits of a soak test, and their notation. Called by the command `soak`.
+//! The limits of a soak test, and their notation.
 
 /// The limits of a soak test.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,7 +9,7 @@ pub struct Limits {
     pub skipped_share: f64,
     /// Wake-up lateness: 99.9th percentile, ns.
     pub lateness_p999_ns: u64,
-    /// Growth of the resident memory of the publisher, and of the ROS 2 process, after the first minute, bytes.
+    /// Growth of the resident memory of the publisher, and of the ROS 2 process, after the first minute, in bytes.
     pub resident_growth_bytes: u64,
 }
 

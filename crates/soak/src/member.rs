@@ -1,5 +1,4 @@
-//! One subscriber of a soak test: its role, its present process, and the observations of all its starts. Owned by the
-//! [`fleet`](super::fleet), which starts and signals the processes; read by the verdict and the report.
+//! One subscriber of a soak test: its role, its present process, and the observations of all its starts.
 
 use std::process::Child;
 use std::time::Instant;

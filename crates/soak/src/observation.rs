@@ -1,7 +1,7 @@
 //! The observation of a subscriber process, which the process prints once a second and the soak test reads.
 //!
 //! In: counts and percentiles from the [`observer`](super::observer). Out: JSON through a pipe; sums over the processes
-//! of a subscriber. Used by the [`fleet`](super::fleet), the verdict and the report.
+//! of a subscriber.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ pub struct Observation {
     pub links_checked: u64,
     /// Frames with a link of another length than the stage's.
     pub wrong_links: u64,
-    /// The largest difference of a link from its length, metres.
+    /// The largest difference of a link from its length, in metres.
     pub worst_link_error: f64,
     /// Frames that do not follow from the frame before by the rules of playing, pausing and jumping.
     pub disobedient: u64,
@@ -33,7 +33,7 @@ pub struct Observation {
     pub times_checked: u64,
     /// `epoch` of the latest frame.
     pub epoch: u32,
-    /// The largest distance of a deadline from first deadline + tick / rate, nanoseconds.
+    /// The largest distance of a deadline from first deadline + tick / rate, in nanoseconds.
     pub phase_error_ns: f64,
     /// Runs of the publishers of the frames.
     pub runs: u64,
@@ -109,7 +109,7 @@ impl Latencies {
 /// The fields of a [`LoopStatus`] that a soak test records.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Status {
-    /// The nominal rate, frames per second.
+    /// The nominal rate, in frames per second.
     pub rate: f64,
     /// Frames published in the last second, divided by its true length.
     pub measured_rate: f64,
@@ -119,13 +119,13 @@ pub struct Status {
     pub skipped: u64,
     /// Frames published since the start.
     pub frames: u64,
-    /// Times the show has been played to its end.
+    /// The number of times that the show has been played to its end.
     pub shows_played: u64,
     /// Wake-up lateness of the last second: median, 99th percentile and maximum, ns.
     pub lateness_second: [u64; 3],
     /// Wake-up lateness since the start: 99.9th percentile, ns.
     pub lateness_p999_total: u64,
-    /// Step cost of the last second: median, 99th percentile and maximum, ns.
+    /// The step cost of the last second: median, 99th percentile and maximum, ns.
     pub step_second: [u64; 3],
 }
 

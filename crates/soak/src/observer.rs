@@ -45,7 +45,7 @@ impl Histograms {
 /// The links of one dragon.
 struct Links {
     handles: Range<usize>,
-    /// Lengths of the head's link and of the other links, metres.
+    /// Lengths of the head's link and of the other links, in metres.
     lengths: [f64; 2],
 }
 
@@ -62,7 +62,7 @@ pub struct Observer {
     seen: Observation,
     /// The links of each dragon.
     links: Vec<Links>,
-    /// The tolerance of links besides rounding, metres.
+    /// The tolerance of links besides rounding, in metres.
     link_tolerance: f64,
     /// The first frame of the present run.
     first: FrameHeader,

@@ -21,7 +21,7 @@ fn colour(hex: &str) -> RGBColor {
 pub struct PlotLine {
     /// Its name.
     pub label: String,
-    /// Seconds since the start, and values.
+    /// The times, in seconds since the start, and the values.
     pub points: Vec<(f64, f64)>,
 }
 

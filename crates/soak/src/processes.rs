@@ -1,5 +1,4 @@
-//! Starts, signals and reads the processes of a soak test: a thread for each pipe turns its lines into events. Called
-//! by the [`fleet`](super::fleet).
+//! Starts, signals and reads the processes of a soak test: a thread for each pipe turns its lines into events.
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read};
@@ -38,7 +37,7 @@ pub struct Plan {
 pub struct ConductPlan {
     /// The seed of the commands.
     pub seed: u64,
-    /// Frames per second, if not the scene's.
+    /// The rate, in frames per second, if not the scene's.
     pub rate: Option<f64>,
     /// Further clients of the control service, each killed during a request and started again.
     pub flaky_clients: usize,

@@ -38,7 +38,7 @@ pub struct Report {
     pub machine: Machine,
     /// CLOCK_REALTIME in seconds when the test began.
     pub began_at: u64,
-    /// Wall time from the first frame of all subscribers to the end, seconds.
+    /// The wall time from the first frame of all subscribers to the end, in seconds.
     pub seconds: f64,
     /// The summary that the publisher printed at its end; null if the publisher did not end properly.
     pub publisher: Option<RunSummary>,

@@ -1,21 +1,21 @@
-//! The resources of a process, read from /proc. Called by the soak test for its publisher and the process of ROS 2.
+//! The resources of a process, read from /proc.
 
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;
 
 /// The folder of Linux for shared memory.
 const SHARED_MEMORY: &str = "/dev/shm/";
-/// The unit of a file's blocks, bytes.
+/// The unit of a file's blocks, in bytes.
 const BLOCK: u64 = 512;
 
 /// The resources of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Resources {
-    /// Resident memory with used shared memory, bytes.
+    /// Resident memory with used shared memory, in bytes.
     pub resident_bytes: u64,
     /// Open file descriptors.
     pub file_descriptors: u64,
-    /// Pages in use of the files in /dev/shm that the process has mapped, bytes.
+    /// Pages in use of the files in /dev/shm that the process has mapped, in bytes.
     pub shared_memory_bytes: u64,
 }
 

@@ -1,8 +1,7 @@
 //! The show as the contract of `control` describes it: periods counted one by one, commands executed as the table
 //! states.
 //!
-//! Independent of the show clock, which computes each period from the beginning of its stretch. Used by the tests of
-//! that clock and by the simulated nights.
+//! It shares nothing with the show clock, which computes each period from the beginning of its stretch.
 
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
@@ -123,7 +122,7 @@ pub struct Model<T> {
     periods_at_end: u64,
     /// Jumps of simulated time.
     pub epoch: u32,
-    /// Times the show has begun again.
+    /// The number of times that the show has begun again.
     pub shows_played: u64,
     /// Cues passed, in the order of their times.
     pub passed: usize,

@@ -21,7 +21,7 @@ pub enum Wake {
     Early(u64),
 }
 
-/// Nanoseconds that only sleeping and [`SimulatedClock::advance`] move.
+/// A time in nanoseconds that only sleeping and [`SimulatedClock::advance`] move.
 #[derive(Debug)]
 pub struct SimulatedClock {
     now_ns: Cell<u64>,

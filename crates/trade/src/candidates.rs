@@ -1,5 +1,5 @@
 //! The solvers to measure: the selections for several requested accuracies, on all instruction sets; the safe solver;
-//! the paper's solver. Only [`super::measure`] calls it.
+//! the paper's solver.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use bench_dragon_motion::solve::selection;
 use bench_dragon_motion::solve::table::{FollowerTable, Instructions};
 use bench_dragon_show::scene::Scene;
 
-/// The requested accuracies, metres. The last selects the most exact table.
+/// The requested accuracies, in metres. The last selects the most exact table.
 const REQUESTED_ACCURACIES: [f64; 5] = [1e-4, 1e-6, 1e-7, 1e-9, 1e-18];
 
 /// Returns all candidates for a scene, the most exact table on the fastest instructions first.

@@ -1,5 +1,5 @@
 //! The cost of collision search on a scene: per frame, the live clearance and all pairs; per show, the exact search and
-//! sampled searches. Only [`super::measure`] calls it.
+//! sampled searches.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
 
-/// Sampling intervals of the sampled contact searches, seconds.
+/// Sampling intervals of the sampled contact searches, in seconds.
 const SAMPLING_INTERVALS: [f64; 3] = [1.0, 0.1, 0.01];
 
 /// Measures all pairs against the live clearance, and sampled searches against the exact search. `exact_error` is the
@@ -55,7 +55,7 @@ pub(super) fn measure(
     measurements
 }
 
-/// Returns the first sample at or after `contact` at which boards overlap, simulated seconds.
+/// Returns the first sample at or after `contact` at which boards overlap, in simulated seconds.
 fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64) -> Option<f64> {
     let mut solver = scene.motion.in_own_frame().solver(scene.velocities).solver;
     let mut chain = Chain::new(scene.team().handles());

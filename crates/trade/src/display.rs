@@ -1,8 +1,8 @@
-//! The error at the time of display against bytes per second. This is the gain of a publishing rate for readers that
+//! The error at the time of display against bytes per second: the gain of a higher publishing rate, for readers that
 //! hold, and for readers with linear or Hermite interpolation.
 //!
 //! In: a scene, its timeline, a display. Out: one [`DisplayMeasurement`] per reader, rate and precision. The stream is
-//! simulated: every frame arrives at its deadline, so transport adds neither delay nor jitter. No clock is read: the
+//! simulated: every frame arrives at its deadline, so transport adds neither delay nor jitter. No clock is read, so the
 //! same scene gives the same errors.
 
 use serde::Serialize;
@@ -20,14 +20,14 @@ use bench_dragon_show::solve_at_or_just_before;
 
 /// The publishing rates, hertz.
 pub const RATES: [f64; 9] = [1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 240.0, 1000.0];
-/// Length of the window of display samples, seconds. The window ends at the last whole second before the end of the
-/// show.
+/// The length of the window of display samples, in seconds. The window ends at the last whole second before the end of
+/// the show.
 pub const WINDOW: f64 = 2.0;
-/// Number of further display samples, spread evenly over the show.
+/// The number of further display samples, spread evenly over the show.
 pub const SPREAD_SAMPLES: usize = 20;
 /// The least and the greatest number of display samples in the window, for any display rate.
 const WINDOW_SAMPLES: [usize; 2] = [120, 2000];
-/// Greatest rounding error of a clock of whole nanoseconds, seconds: two roundings.
+/// The greatest rounding error of a clock of whole nanoseconds, in seconds: two roundings.
 const CLOCK_ROUNDING: f64 = 2e-9;
 
 /// The interpolation between two frames. No reader extrapolates: without the next frame, each holds the last.
@@ -85,10 +85,10 @@ impl Precision {
 pub struct Display {
     /// Display rate, pictures per second.
     pub rate: f64,
-    /// Delay of every reader's display behind the stream, seconds. `None` means 0 for [`Reader::Hold`] and one
+    /// Delay of every reader's display behind the stream, in seconds. `None` means 0 for [`Reader::Hold`] and one
     /// publishing period for the others.
     pub delay: Option<f64>,
-    /// Time of the publisher to compute a frame, nanoseconds.
+    /// The time of the publisher to compute a frame, in nanoseconds.
     pub frame_ns: f64,
 }
 
@@ -99,19 +99,20 @@ pub struct DisplayMeasurement {
     pub r#type: &'static str,
     /// The reader.
     pub reader: Reader,
-    /// Publishing rate, frames per second.
+    /// The publishing rate, in frames per second.
     pub rate_hz: f64,
     /// Display rate, pictures per second.
     pub display_rate_hz: f64,
-    /// Delay of the display behind the stream, seconds.
+    /// Delay of the display behind the stream, in seconds.
     pub delay_s: f64,
-    /// The greatest distance of a displayed handle from its true position at the simulated time of the display, metres.
+    /// The greatest distance of a displayed handle from its true position at the simulated time of the display, in
+    /// metres.
     pub max_position_error: f64,
-    /// Bytes of headers and poses per second, without the overhead of a transport.
+    /// The bytes of headers and poses per second, without the overhead of a transport.
     pub bytes_per_second: f64,
     /// The precision of the poses.
     pub precision: Precision,
-    /// Share of a core for computing the frames, without transport.
+    /// The share of a core for computing the frames, without transport.
     pub cpu_share: f64,
     /// True if no other measurement has both fewer bytes per second and a smaller error. Errors below the noise are
     /// equal.
@@ -246,7 +247,7 @@ impl Stream {
         Self { solver, rate, end, chain: Chain::new(scene.team().handles()), latest: [None, None] }
     }
 
-    /// Returns the greatest error of a reader over all samples, in both precisions, metres.
+    /// Returns the greatest error of a reader over all samples, in both precisions, in metres.
     fn errors(&mut self, reader: Reader, delay: f64, truth: &[DisplaySample]) -> Result<[f64; 2], String> {
         let mut worst = [0.0; 2];
         let mut shown = Vec::new();
@@ -337,8 +338,8 @@ fn show(
     time
 }
 
-/// Returns the greatest distance of a handle from its position `later` seconds after the chain's time, metres. Within
-/// the rounding of the clock, a linear motion is exact to 1e-17 m.
+/// Returns the greatest distance of a handle from its position `later` seconds after the chain's time, in metres.
+/// Within the rounding of the clock, a linear motion is exact to 1e-17 m.
 fn distance(chain: &Chain, later: f64, shown: &[HandlePose]) -> f64 {
     let of_handle = |(handle, pose): (usize, &HandlePose)| {
         let x = chain.x[handle] + later * chain.vx[handle];

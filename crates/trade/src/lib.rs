@@ -22,15 +22,15 @@ use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
 
-/// Number of samples of the error, spread evenly over the motion before its last second.
+/// The number of samples of the error, spread evenly over the motion before its last second.
 pub const SPREAD_SAMPLES: usize = 200;
-/// Number of further samples, spread evenly over the last second of the motion.
+/// The number of further samples, spread evenly over the last second of the motion.
 pub const LAST_SECOND_SAMPLES: usize = 10;
 /// Warm-up frames before each sample, as in a running show.
 const WARM_UP_FRAMES: usize = 4;
 /// Limit of timed frames per solver, for slow solvers and long shows.
 const TIMED_FRAMES: usize = 26_000;
-/// Limit of the time to measure one solver, seconds.
+/// Limit of the time to measure one solver, in seconds.
 const TIMING_LIMIT: f64 = 0.7;
 
 /// The cost and the error of one solver.
@@ -38,33 +38,33 @@ const TIMING_LIMIT: f64 = 0.7;
 pub struct Measurement {
     /// The solver and its settings.
     pub solver: String,
-    /// The requested accuracy, metres; `None` for a solver that is not selected by accuracy.
+    /// The requested accuracy, in metres; `None` for a solver that is not selected by accuracy.
     pub accuracy: Option<f64>,
     /// True if the requested accuracy is met, except where the motion itself amplifies rounding: see
     /// [`Measurement::noise`].
     pub meets: Option<bool>,
-    /// Nanoseconds per frame: the median over the motion, without the time of reading the clock.
+    /// The time of a frame, in nanoseconds: the median over the motion, without the time of reading the clock.
     pub frame_ns: f64,
-    /// Nanoseconds per frame: the 99th percentile.
+    /// The time of a frame, in nanoseconds: the 99th percentile.
     pub frame_ns_p99: f64,
-    /// Number of timed frames, in runs evenly over the motion.
+    /// The number of timed frames, in runs evenly over the motion.
     pub frames_timed: usize,
-    /// The greatest distance of a handle from its true position, metres.
+    /// The greatest distance of a handle from its true position, in metres.
     pub max_position_error: f64,
-    /// Metres below which errors are rounding: the greatest 8 eps (r + distance travelled) max(1, ratio of the handle's
-    /// speed to the head's) at any sample. The same for all solvers.
+    /// The error, in metres, below which errors are rounding: the greatest 8 eps (r + distance travelled) max(1, ratio
+    /// of the handle's speed to the head's) at any sample. It is the same for all solvers.
     pub noise: f64,
     /// The greatest relative error of a handle's speed; `None` without velocities.
     pub max_speed_error: Option<f64>,
-    /// Error of this solver's contact time, seconds; `None` without a contact.
+    /// The error of this solver's contact time, in seconds; `None` without a contact.
     pub contact_time_error: Option<f64>,
-    /// The greatest error of a link's length, metres.
+    /// The greatest error of a link's length, in metres.
     pub max_link_error: f64,
-    /// Memory of the solver, bytes.
+    /// Memory of the solver, in bytes.
     pub memory_bytes: usize,
     /// Table bytes that a frame reads per handle; `None` for a solver without a table.
     pub bytes_per_handle: Option<f64>,
-    /// Time to make the solver, once, including its measurements, seconds.
+    /// The time to make the solver, once, including its measurements, in seconds.
     pub make_s: f64,
     /// The cost of collision search on this scene; only with the first solver.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -78,11 +78,11 @@ pub struct Measurement {
 pub struct CollisionMeasurement {
     /// The method.
     pub method: String,
-    /// Nanoseconds per frame for the least clearance; `None` for a search.
+    /// The time of a frame for the least clearance, in nanoseconds; `None` for a search.
     pub frame_ns: Option<f64>,
-    /// Time to find the contact from the start of the scene, seconds.
+    /// The time to find the contact from the start of the scene, in seconds.
     pub search_s: Option<f64>,
-    /// Delay of the contact that it finds, seconds; `None` without a contact, and for a method per frame.
+    /// Delay of the contact that it finds, in seconds; `None` without a contact, and for a method per frame.
     pub contact_time_error: Option<f64>,
 }
 
@@ -173,7 +173,7 @@ fn noise(scene: &Scene, samples: &[ReferenceSample]) -> f64 {
     all.fold(0.0, f64::max)
 }
 
-/// Errors of the contact times of the exact motion and of the paper's rule, seconds.
+/// Errors of the contact times of the exact motion and of the paper's rule, in seconds.
 #[derive(Debug, Clone, Copy)]
 struct ContactErrors {
     exact: f64,
@@ -232,7 +232,7 @@ fn measured(scene: &Scene, mut candidate: Candidate, samples: &[ReferenceSample]
     }
 }
 
-/// Returns the time below which a share of sorted times lies, nanoseconds; NaN without times.
+/// Returns the time below which a share of sorted times lies, in nanoseconds; NaN without times.
 fn quantile(times: &[u64], share: f64) -> f64 {
     times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64)
 }

@@ -1,5 +1,4 @@
 //! Keys in the bytes that a terminal sends. If the rest of a sequence does not come, its first byte was the key Escape.
-//! Called by `terminal`.
 
 /// A key that `watch` knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

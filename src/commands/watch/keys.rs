@@ -49,8 +49,8 @@ pub struct Keyboard {
     client: CommandClient<()>,
     answers: Receiver<ActionResult>,
     waiting: VecDeque<Action>,
-    /// Commands without an answer, holds included. At most one of them is no hold, so that each key acts on the state
-    /// that the key before left.
+    /// The number of commands without an answer, holds included. At most one pending command is other than a hold, so
+    /// that each key acts on the state that the key before left.
     unanswered: usize,
     /// Simulated seconds per second while the show plays, if known.
     rate: Option<f64>,

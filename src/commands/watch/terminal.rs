@@ -1,9 +1,8 @@
 //! The terminal while keys are read: each key at once and without an echo. Every exit restores the settings.
 //!
-//! Reading never waits for the rest of an incomplete sequence: the display must continue.
+//! Reading never waits for the rest of an incomplete sequence, because the display must continue.
 //!
-//! Signals of the terminal (Ctrl-C) and ends of lines are unchanged. Called by `watch`, and by the handler that ends
-//! the program if shared memory is full.
+//! Signals of the terminal (Ctrl-C) and ends of lines are unchanged.
 
 use std::io::{IsTerminal, stdin};
 use std::os::fd::AsFd;

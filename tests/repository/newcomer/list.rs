@@ -67,13 +67,13 @@ pub const INSTEAD: &[(&str, &str, &str)] = &[
     ("--duration 10m", "--duration 2", "shorter"),
     ("--duration 75", "--duration 2", "shorter"),
     ("--duration 60 ", "--duration 2 ", "shorter"),
+    ("--duration 60s ", "--duration 2 ", "shorter"),
     ("--duration 40s", "--duration 2", "shorter"),
     ("--seconds 60", "--seconds 2", "shorter"),
     ("--rate RATE", "--rate 60", "the reader's own number"),
     ("--name NAME", "--name mine", "the reader's own name"),
     ("events --certify FILE", "--scene tests/scenes/tiny_1.toml events --certify proof.jsonl", "the reader's own file"),
     ("verify FILE", "verify proof.jsonl", "the reader's own file"),
-    ("--plot FILE.svg", "--plot trade.svg", "the reader's own file"),
 ];
 
 const LIGHT_SCENE: &str = "sed '/^\\[publish\\]/a precision = \"f32\"' config/paper.toml > light.toml";

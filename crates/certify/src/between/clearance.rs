@@ -1,6 +1,6 @@
-//! The least clearances of a show of several dragons: first those of each dragon alone, then those of each two. For
-//! each two, stretches of time show that the boards are further apart than a number of metres. One more time shows two
-//! boards that are no further apart. Lemma 12 of `docs/proofs.md`.
+//! The least clearances of a show of several dragons, first of each dragon alone, then of each two. For each two,
+//! stretches of time show that the boards are further apart than a number of metres, and one more time shows two boards
+//! that are no further apart. Lemma 12 of `docs/proofs.md`.
 
 use super::side::{Extent, Side};
 use super::{Aim, PairSearch, Write};
@@ -13,22 +13,22 @@ use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::timeline::TimedEvent;
 
-/// Width of an enclosure in metres, with room for the rounding of both ends.
+/// The width of an enclosure in metres, with room for the rounding of both ends.
 pub(super) const WIDTH: f64 = 0.9e-9;
 
-/// Metres by which a new upper bound must be lower than the one before.
+/// The difference, in metres, by which a new upper bound must be lower than the one before.
 const LOWER: f64 = 1e-3 * WIDTH;
 
-/// Metres that are added to an upper bound for the rounding of the checker.
+/// An allowance for the rounding of the checker, in metres, which is added to an upper bound.
 const SPARE: f64 = 1e-12;
 
-/// Metres of travel of the faster head before a lock at which the steps stop.
+/// The travel of the faster head before a lock at which the steps stop, in metres.
 const BEFORE_LOCK: f64 = 1e-9;
 
 /// Rounding of the time of a path's end, as a share.
 const ENDING: f64 = 1e-12;
 
-/// Seconds of the first step of a show that ends at its start or at a contact.
+/// The length of the first step of a show that ends at its start or at a contact, in seconds.
 const FIRST: f64 = 1e-6;
 
 /// An upper bound of the clearance of a board of each of two dragons, and its time.
@@ -53,16 +53,16 @@ pub struct SeveralClearances {
 pub struct BetweenEnclosure {
     /// The dragons.
     pub dragons: [usize; 2],
-    /// Lower bound in metres for all boards of the two; `None` if nothing is proved.
+    /// The lower bound in metres for all boards of the two; `None` if nothing is proved.
     pub lo: Option<f64>,
-    /// Upper bound in metres.
+    /// The upper bound in metres.
     pub hi: Option<f64>,
-    /// Seconds of the show at which two boards are that near.
+    /// The time of the show at which two boards are that near, in seconds.
     pub time: f64,
     /// A bench of each, counted from 0.
     pub benches: [usize; 2],
-    /// Seconds of the show up to which `lo` is proved, if not up to the show's end. The end of a show that ends with
-    /// the lock of one of the two counts as reached a nanometre of travel before.
+    /// The time of the show up to which `lo` is proved, in seconds, if not up to the show's end. If a lock of one of
+    /// the two ends the show, the proof may end a nanometre of travel before it and still counts as complete.
     pub until: Option<f64>,
 }
 

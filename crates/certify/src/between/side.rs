@@ -23,7 +23,7 @@ pub(super) struct Side<'a> {
     frame: Frame,
     pub delay: f64,
     pub head_speed: f64,
-    /// Seconds at which its motion ends.
+    /// The time at which its motion ends, in seconds.
     pub end: f64,
     /// True if it ends with a lock.
     pub locks: bool,

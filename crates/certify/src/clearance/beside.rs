@@ -41,7 +41,7 @@ impl Descent<'_, '_> {
     /// Takes the places of the ordinary search, or the start if the show ends there.
     pub(super) fn begin_beside(&mut self, hints: &[TimedObstacleClearance], is_at_start: bool) {
         for TimedObstacleClearance { obstacle, least, .. } in hints {
-            // Steps in vain would use up the limit.
+            // Skipped, because it cannot succeed and its steps would use up the limit.
             if !self.chain.barriers.get(*obstacle).is_some_and(|barrier| barrier.is_decidable(least.value)) {
                 continue;
             }

@@ -12,7 +12,7 @@ use crate::interval::Interval;
 use crate::lines::{About, CertificateLine, CertifiedClearance, CertifiedObstacleClearance, Links, Until};
 use crate::path::Place;
 
-/// Metres that are added to an upper bound for the rounding of the checker.
+/// An allowance for the rounding of the checker, in metres, which is added to an upper bound.
 const SPARE: f64 = 1e-12;
 
 /// Writes the first line.

@@ -21,10 +21,10 @@ use bench_dragon_show::scene::Accepted;
 /// `value_hi` are not covered: with some of them boards may overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastPitch {
-    /// Lower bound, metres per turn: with every pitch from `from` up to this, two boards overlap or a link locks before
-    /// the radius is reached. Equal to `from` if this is shown for no pitch.
+    /// The lower bound, metres per turn: with every pitch from `from` up to this, two boards overlap or a link locks
+    /// before the radius is reached. Equal to `from` if this is shown for no pitch.
     pub value_lo: f64,
-    /// Upper bound, metres per turn: with this pitch the radius is reached. `None` if this is shown for no pitch.
+    /// The upper bound, metres per turn: with this pitch the radius is reached. `None` if this is shown for no pitch.
     pub value_hi: Option<f64>,
     /// The least pitch that is tested, metres per turn: half of the boards' width, or a millimetre if that is more.
     pub from: f64,
@@ -32,7 +32,7 @@ pub struct LeastPitch {
     pub overlap: Option<Overlap>,
     /// True if `value_lo` and `value_hi` are within a nanometre. Otherwise the search was given up.
     pub proved: bool,
-    /// Number of intervals into which the pitches from `from` to `value_lo` are divided.
+    /// The number of intervals into which the pitches from `from` to `value_lo` are divided.
     pub intervals: u64,
 }
 
@@ -43,12 +43,12 @@ pub struct Overlap {
     pub bench_a: u32,
     /// The other bench.
     pub bench_b: u32,
-    /// Distance of the head's front handle from the centre at that moment, metres.
+    /// The distance of the head's front handle from the centre at that moment, in metres.
     pub head_radius: f64,
 }
 
-/// Distance of the two numbers in metres, with room for rounding. The second distance is kept on both sides of a pitch
-/// that the search has found.
+/// The distance of the two numbers in metres, with room for rounding. The second distance is kept on both sides of a
+/// pitch that the search has found.
 const WIDTH: f64 = 0.95e-9;
 const BESIDE: f64 = 0.45e-9;
 
@@ -61,14 +61,14 @@ const MOST_STEPS: u64 = 100_000;
 /// Limit of pitches that the search may propose.
 const MOST_PROPOSALS: u32 = 8;
 
-/// Length of an interval as a share of its pitch, at least and at first; and its growth after an interval that is
+/// The length of an interval as a share of its pitch, at least and at first; and its growth after an interval that is
 /// shown.
 const LEAST_SHARE: f64 = 1e-14;
 const FIRST_SHARE: f64 = 1e-4;
 const GROWTH: f64 = 1.1;
 
-/// Share of a pair's first depth. At a smaller depth, another pair of boards is searched for that overlaps more deeply.
-/// The share is squared after a search that finds the same pair.
+/// The share of a pair's first depth. At a smaller depth, another pair of boards is searched for that overlaps more
+/// deeply. The share is squared after a search that finds the same pair.
 const SHALLOW: f64 = 0.5;
 
 /// Encloses the least pitch with which the head of a team comes in to `radius` metres from the centre, within a
@@ -123,7 +123,7 @@ fn written(found: &LeastPitch, proof: Proof, radius: f64, scene: &str, write: Wr
 /// A function that proposes the least pitch between two with which the radius might be reached.
 type Propose<'p> = &'p mut dyn FnMut(f64, f64, &mut dyn FnMut(f64)) -> Proposal;
 
-/// Encloses the least pitch with any proposals. Wrong proposals only cost time. `keeps` requests the lines of the
+/// Encloses the least pitch with any proposals; wrong proposals only cost time. `keeps` requests the lines of the
 /// intervals.
 fn decided(
     team: &Team,
@@ -218,7 +218,7 @@ struct Blocked<'a> {
     deepest: Option<Deepest>,
     /// The boards that were shown to overlap with that pitch; `None` for a lock.
     shown: Option<Overlap>,
-    /// Share of its first depth below which the overlap is shallow.
+    /// The share of its first depth below which the overlap is shallow.
     shallow: f64,
     /// The proposal for the pitches from here on.
     proposal: Proposal,

@@ -15,10 +15,10 @@ use bench_dragon_show::scene::Scene;
 /// The greatest speed of the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GreatestSpeed {
-    /// Lower bound, metres per second: with the head no faster than this, no handle exceeds the limit. 0 if nothing is
-    /// proved.
+    /// The lower bound, in metres per second: with the head no faster than this, no handle exceeds the limit. 0 if
+    /// nothing is proved.
     pub value_lo: f64,
-    /// Upper bound, metres per second: with the head any faster, the handle exceeds the limit.
+    /// The upper bound, in metres per second: with the head any faster, the handle exceeds the limit.
     pub value_hi: f64,
     /// Simulated seconds of the scene, at its own speed, at which the handle has the speed `ratio`.
     pub time: f64,
@@ -28,15 +28,15 @@ pub struct GreatestSpeed {
     pub ratio: f64,
     /// True if the two speeds are within the tolerance. Otherwise the search was given up.
     pub proved: bool,
-    /// Number of steps of the head that were enclosed.
+    /// The number of steps of the head that were enclosed.
     pub steps: u64,
 }
 
-/// Greatest distance of the two speeds, metres per second. For limits above [`LARGE`] it grows as the limit over
+/// The greatest distance of the two speeds, in metres per second. For limits above [`LARGE`] it grows as the limit over
 /// [`LARGE`].
 const TOLERANCE: f64 = 1e-9;
 
-/// The limit from which on the tolerance grows, metres per second.
+/// The limit from which on the tolerance grows, in metres per second.
 const LARGE: f64 = 4.0;
 
 /// Encloses the greatest constant speed of the head at which no handle exceeds `limit` metres per second, from the

@@ -10,16 +10,16 @@ use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::singularities::Singularities;
 
-/// Turns outside the radius, or outside the longest link, within which most teams touch if they ever do.
+/// The number of turns outside the radius, or outside the longest link, within which most teams touch if they ever do.
 const TURNS_BEFORE: f64 = 3.0;
 
-/// Turns outside a touch at which a trial starts that follows it.
+/// The number of turns outside a touch at which the trial that follows it starts.
 const TURNS_ABOUT: f64 = 1.0;
 
-/// Factor of the pitch from one trial to the next while the same two boards touch.
+/// The factor of the pitch from one trial to the next while the same two boards touch.
 const GROWTH: f64 = 1.005;
 
-/// Distance from a touch, in links, within which the same two boards are followed.
+/// The distance from a touch, in links, within which the same two boards are followed.
 const WINDOW: f64 = 0.3;
 
 /// Work for one trial of a pitch, in units of [`Budget`]: some seconds.
@@ -58,9 +58,9 @@ pub(super) struct Proposal {
 
 /// Returns the least pitch between two with which the search finds no obstacle.
 ///
-/// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. The pitch
-/// grows in steps of half a percent. So a pitch is missed if the two boards come free and meet again within one step.
-/// `progress` receives each pitch.
+/// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. Because
+/// the pitch grows in steps of half a percent, a pitch is missed if the two boards come free and meet again within one
+/// step. `progress` receives each pitch.
 pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progress: &mut dyn FnMut(f64)) -> Proposal {
     let (mut pitch, mut proposal) = (from, Proposal::default());
     while let Some(mut found) = obstacle(team, pitch, radius) {
@@ -131,11 +131,11 @@ impl Obstacle {
 /// The least clearance of two boards while the head is near a radius.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nearest {
-    /// Clearance in metres, negative for an overlap.
+    /// The clearance in metres, negative for an overlap.
     pub clearance: f64,
     /// The two benches, counted from 0.
     pub pair: (u32, u32),
-    /// Distance of the head from the centre at that moment, metres.
+    /// The distance of the head from the centre at that moment, in metres.
     pub head_radius: f64,
 }
 
@@ -165,7 +165,7 @@ struct Trial {
     team: Team,
     path: Path,
     singularities: Singularities,
-    /// Travel at which the radius is reached, metres.
+    /// The travel at which the radius is reached, in metres.
     limit: f64,
 }
 

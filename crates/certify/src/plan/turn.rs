@@ -1,5 +1,5 @@
-//! The least turn radius, enclosed. With every radius up to the lower number a link stalls or locks or boards overlap.
-//! With the upper number none of these happens.
+//! The least turn radius, enclosed: with every radius up to the lower number a link stalls or locks, or boards overlap;
+//! with the upper number none of these happens.
 //!
 //! In: a team, a pitch, the ratio of the arcs. Out: the two numbers. "The least turn" in `docs/proofs.md` has the
 //! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
@@ -12,22 +12,22 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
-/// The least radius of a turnaround with which a team turns round. The head comes in from any distance. Until the last
-/// handle has left the turn, no two boards touch that share no handle, and no link stalls or locks. Radii above
+/// The least radius of a turnaround with which a team turns round. The head comes in from any distance, and until the
+/// last handle has left the turn, no two boards that share no handle touch, and no link stalls or locks. Radii above
 /// `value_hi` are not covered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastTurn {
-    /// Lower bound, metres: with every radius from `from` up to this, a link stalls or locks or two boards overlap.
-    /// Equal to `from` if this is shown for no radius.
+    /// The lower bound, in metres: with every radius from `from` up to this, a link stalls or locks or two boards
+    /// overlap. Equal to `from` if this is shown for no radius.
     pub value_lo: f64,
-    /// Upper bound, metres: with this radius the team turns round. `None` if this is shown for no radius.
+    /// The upper bound, in metres: with this radius the team turns round. `None` if this is shown for no radius.
     pub value_hi: Option<f64>,
-    /// Least radius with which the ordinary search finds no event, metres. It is within 1e-9 m of `value_lo`, and equal
-    /// to `value_hi` if that is within a nanometre too. `None` if the search was given up before.
+    /// The least radius with which the ordinary search finds no event, in metres. It is within 1e-9 m of `value_lo`,
+    /// and equal to `value_hi` if that is within a nanometre too. `None` if the search was given up before.
     pub value: Option<f64>,
-    /// Metres of the S with the radius `value`.
+    /// The length of the S with the radius `value`, in metres.
     pub length: Option<f64>,
-    /// The least radius that is tested, metres.
+    /// The least radius that is tested, in metres.
     pub from: f64,
     /// The radius of the first arc over the radius of the second.
     pub arc_ratio: f64,
@@ -35,9 +35,9 @@ pub struct LeastTurn {
     pub limit: Option<TurnLimit>,
     /// True if `value_lo` and `value_hi` are within 1e-8 m. Otherwise the search was given up.
     pub proved: bool,
-    /// Number of intervals into which the radii from `from` to `value_lo` are divided.
+    /// The number of intervals into which the radii from `from` to `value_lo` are divided.
     pub intervals: u64,
-    /// Metres of path before and after the S that the proof for `value_hi` covers.
+    /// The lengths of path before and after the S that the proof for `value_hi` covers, in metres.
     pub leads: Option<[f64; 2]>,
 }
 
@@ -50,37 +50,37 @@ pub struct TurnLimit {
     pub bench_a: u32,
     /// The other of two benches that touch.
     pub bench_b: Option<u32>,
-    /// Metres of path past the beginning of the S, negative before the S. They lead to the rear handle of a lock, the
-    /// front handle of a stall, or the head at a contact.
+    /// The place of the rear handle of a lock, of the front handle of a stall, or of the head at a contact, in metres
+    /// of path past the beginning of the S. It is negative before the S.
     pub past: f64,
 }
 
-/// Distance of the two numbers in metres, with room for rounding.
+/// The distance of the two numbers in metres, with room for rounding.
 const WIDTH: f64 = 0.95e-9;
 
 /// Multiples of [`WIDTH`] that are tried. Next to a lock the follower is so fast that doubles cannot resolve its way,
 /// and the proof needs a greater distance from the lock.
 const FURTHER: [f64; 7] = [1.0, 4.0, 10.0, 40.0, 160.0, 640.0, 4096.0];
 
-/// Number of benches with which a radius is tried first.
+/// The number of benches with which a radius is tried first.
 const FEW: usize = 4;
 
 /// Limit of intervals of radii.
 const MOST_INTERVALS: u64 = 200_000;
 
-/// Length of an interval in metres, at least and at first; the factors after an interval that is shown and one that is
-/// not.
+/// The length of an interval in metres, at least and at first; the factors after an interval that is shown and one that
+/// is not.
 const LEAST_INTERVAL: f64 = 1e-12;
 const FIRST_INTERVAL: f64 = 1e-3;
 const GROWTH: f64 = 1.5;
 const SHRINK: f64 = 0.5;
 
-/// Greatest width below which other events are tried beside the same event. After such a trial, they are tried again
-/// below a share of the width that the trial has left.
+/// The greatest width below which other events are tried beside the same event. After such a trial, they are tried
+/// again below a share of the width that the trial has left.
 const OTHERS_BELOW: f64 = 1e-4;
 const OTHERS_AGAIN: f64 = 0.1;
 
-/// Share of a radius within which a better ratio must be better, and the steps of the ratio's logarithm.
+/// The share of a radius within which a better ratio must be better, and the steps of the ratio's logarithm.
 const BETTER: f64 = 1e-7;
 const FIRST_RATIO_STEP: f64 = 0.7;
 const LEAST_RATIO_STEP: f64 = 2e-3;

@@ -14,42 +14,42 @@ use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::singularities::Singularities;
 use bench_dragon_show::scene::Accepted;
 
-/// Turns outside the turn or the longest link at which a trial of the links starts. The trial ends a number of lengths
-/// of the longest link after the turn.
+/// The number of turns outside the turn or the longest link at which a trial of the links starts. The trial ends a
+/// number of lengths of the longest link after the turn.
 const TURNS_BEFORE: f64 = 2.0;
 const LINKS_AFTER: f64 = 6.0;
 
-/// Turns outside the turn at which a trial of the boards starts.
+/// The number of turns outside the turn at which a trial of the boards starts.
 const BOARDS_BEFORE: f64 = 3.0;
 
 /// Work for one trial, in units of [`Budget`]: some seconds.
 const TRIAL_BUDGET: u64 = 20_000_000;
 
-/// Coordinate of a pivot just behind a junction, radians.
+/// The coordinate of a pivot just behind a junction, in radians.
 const BESIDE_JUNCTION: f64 = 1e-13;
 
-/// Distances from an event, in links, within which a pivot is searched for. For each distance, a number of offsets is
-/// tried. A pivot keeps a share of a fold's depth off the ends of the S.
+/// The distances from an event, in links, within which a pivot is searched for. For each distance, a number of offsets
+/// is tried. A pivot keeps a share of a fold's depth off the ends of the S.
 const REACHES: [f64; 4] = [0.5, 0.1, 0.01, 1e-3];
 const OFFSETS: i32 = 48;
 const ASIDE: f64 = 0.05;
 
-/// Steps between two handles in which the distance is followed.
+/// The steps between two handles in which the distance is followed.
 const STEPS: u32 = 64;
 
-/// Distance from the last contact, in links, within which the same two boards are followed.
+/// The distance from the last contact, in links, within which the same two boards are followed.
 const WINDOW: f64 = 0.3;
 
-/// Difference of two radii from which the rate of the deepest place is taken, metres.
+/// The difference of two radii from which the rate of the deepest place is taken, in metres.
 const RATE_STEP: f64 = 1e-6;
 
-/// Greatest multiple of a fold's depth by which the end of the fold's stretch is beyond the other handle. The multiple
-/// is halved in a number of trials. A share of the depth must remain at the end.
+/// The greatest multiple of a fold's depth by which the end of the fold's stretch is beyond the other handle. The
+/// multiple is halved in a number of trials. A share of the depth must remain at the end.
 const BEYOND: f64 = 2.0;
 const BEYOND_TRIALS: i32 = 8;
 const REMAINS: f64 = 0.5;
 
-/// Greatest depth of a fold, in multiples of the metres by which its end is further than the link.
+/// The greatest depth of a fold, in multiples of the metres by which its end is further than the link.
 const ROOM: f64 = 4.0;
 
 /// The turnarounds of a team with one pitch and one ratio of the arcs.
@@ -288,7 +288,7 @@ fn bisect(holds: impl Fn(f64) -> bool, low: f64, high: f64) -> f64 {
 struct Folded {
     /// A place beyond the other handle, but not so far that the product changes its sign.
     end: Param,
-    /// Product of the pivot's tangent and the link, metres. If it is negative, the link has stalled or locked. The
+    /// Product of the pivot's tangent and the link, in metres. If it is negative, the link has stalled or locked. The
     /// number is then at least minus a multiple of the metres by which `end` is further than the link from the pivot.
     merit: f64,
 }

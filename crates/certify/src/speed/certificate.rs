@@ -11,9 +11,10 @@ use crate::lines::{About, CertificateLine, CertifiedSpeed};
 use crate::path::Place;
 use bench_dragon_motion::Motion;
 
-/// Share of the tolerance that the search uses: the checker has other capsules, and its bounds may be a little greater.
+/// The share of the tolerance that the search uses: the checker has other capsules, and its bounds may be a little
+/// greater.
 const SHARE: f64 = 0.9;
-/// Share of a ratio by which the checker's enclosure of it may be wider.
+/// The share of a ratio by which the checker's enclosure of it may be wider.
 const SPARE: f64 = 2e-12;
 
 /// Encloses the greatest ratio as [`super::greatest_ratio`] does, and writes a certificate that no handle exceeds

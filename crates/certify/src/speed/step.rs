@@ -12,7 +12,7 @@ use bench_dragon_motion::linkage::follower;
 /// Pads of the span of the follower of one place, in units in the last place, tried in this order.
 const PADS: [f64; 4] = [4.0, 64.0, 1024.0, 16384.0];
 
-/// Number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
+/// The number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
 const ROUNDS: usize = 2;
 
 /// The ratio of a handle's speed to the head's.
@@ -37,12 +37,12 @@ struct SpeedSample {
 /// The bounds that are proved for a step.
 #[derive(Debug, Clone)]
 pub(super) struct Bounds {
-    /// Upper bound of the ratio of every handle anywhere in the step.
+    /// An upper bound of the ratio of every handle anywhere in the step.
     pub upper: f64,
     /// The fastest handle with the head at the middle, and its ratio there.
     pub fastest: usize,
     pub speed: Interval,
-    /// Number of handles that were enclosed.
+    /// The number of handles that were enclosed.
     pub handles: u64,
 }
 

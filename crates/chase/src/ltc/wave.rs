@@ -1,7 +1,7 @@
 //! Sound as `arecord`, `ffmpeg` and files have it: RIFF WAVE. In: a stream of bytes. Out: samples of the first channel.
 //!
-//! A program that records into a pipe does not know the length of its sound, and writes 0 or the greatest number. So
-//! the samples continue to the end of the stream.
+//! A program that records into a pipe does not know the length of its sound, and writes 0 or the greatest number
+//! instead. So the samples continue to the end of the stream, whatever length is stated.
 
 use std::io::{self, ErrorKind, Read};
 
@@ -27,7 +27,7 @@ pub enum WaveError {
 pub struct Format {
     /// Samples per second and channel.
     pub sample_rate: u32,
-    /// Bytes of the samples of all channels at one time.
+    /// The number of bytes of the samples of all channels at one time.
     pub block_bytes: usize,
     sample_bytes: usize,
     is_float: bool,

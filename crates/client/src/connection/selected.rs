@@ -1,5 +1,5 @@
-//! The origin of a message, and the selected publisher. A service admits two publishers, of which one can be the end of
-//! a tunnel to other machines. The origin of a tunnel's samples distinguishes the tunnel from the show.
+//! The origin of a message, and the selected publisher. A service admits two publishers, one of which can be the end of
+//! a tunnel to other machines. The tunnel is told from the show by the origin of its samples.
 
 use iceoryx2::identifiers::{UniqueNodeId, UniquePublisherId};
 use iceoryx2::prelude::*;

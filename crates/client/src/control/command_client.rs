@@ -1,7 +1,6 @@
 //! Commands sent by a separate thread, so that the caller never waits for an answer or for a publisher that hangs.
 //!
-//! In: an [`Action`] with a tag. Out: the tag and the result, passed to a function on that thread. Called by `watch`
-//! for its keys, by the stage picture's server for its browsers, by the ROS 2 services and by the chase.
+//! In: an [`Action`] with a tag. Out: the tag and the result, passed to a function on that thread.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

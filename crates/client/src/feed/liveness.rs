@@ -1,5 +1,5 @@
 //! The liveness of a publisher that sends no frames: silent or gone. The caller passes the time and the test, so that
-//! nothing here waits. Called by the feed after every read.
+//! nothing here waits.
 
 use std::time::{Duration, Instant};
 

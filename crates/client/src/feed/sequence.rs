@@ -1,4 +1,4 @@
-//! Gaps in the frames of a publisher, and the beginnings of runs. Pure; the feed calls it once for each frame.
+//! Gaps in the frames of a publisher, and the beginnings of runs. Pure.
 
 /// Follows the `sequence` of received frames, which counts a run's frames without gaps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -19,9 +19,9 @@ impl SequenceTracker {
         self.latest.map(|latest| latest.run_id)
     }
 
-    /// Records a frame. Returns the number of frames missing between the latest frame of its run and this frame.
-    /// Returns `None` for the first received frame of a run. A frame that is not newer than the latest has no gap
-    /// before it and closes no gap.
+    /// Records a frame. Returns the number of frames missing between the latest frame of its run and this frame, or
+    /// `None` for the first received frame of a run. A frame that is not newer than the latest has no gap before it and
+    /// closes no gap.
     pub fn advance(&mut self, run_id: u64, sequence: u64) -> Option<u64> {
         match &mut self.latest {
             Some(latest) if latest.run_id == run_id => {

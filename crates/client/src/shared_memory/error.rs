@@ -39,9 +39,9 @@ pub enum OpenError {
         queue: usize,
         /// The most subscribers.
         subscribers: usize,
-        /// Bytes needed.
+        /// The number of bytes needed.
         needed: u64,
-        /// Bytes left.
+        /// The number of bytes left.
         free: u64,
     },
     /// A service stays incomplete.
@@ -53,7 +53,7 @@ pub enum OpenError {
     /// There is no room even for bookkeeping.
     #[error("{SHARED_MEMORY} has {free} bytes left, which is too little: remove files from it, or make it larger")]
     Full {
-        /// Bytes left.
+        /// The number of bytes left.
         free: u64,
     },
     /// The services on this machine belong to another user.
@@ -80,9 +80,9 @@ pub enum OpenError {
     OtherLayout {
         /// The service.
         service: String,
-        /// Names of the service's layouts.
+        /// The names of the service's layouts.
         theirs: String,
-        /// Names of this program's layouts.
+        /// The names of this program's layouts.
         own: String,
     },
     /// A service of this name exists with other attributes.

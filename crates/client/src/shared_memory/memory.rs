@@ -6,7 +6,7 @@ use std::fs::OpenOptions;
 use super::SHARED_MEMORY;
 use super::error::OpenError;
 
-/// Bytes that a subscriber needs for its bookkeeping, with a margin.
+/// The number of bytes that a subscriber needs for its bookkeeping, with a margin.
 const SUBSCRIBER_BYTES: u64 = 500_000;
 
 /// Refuses to subscribe if the shared memory is almost full.

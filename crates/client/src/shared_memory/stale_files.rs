@@ -1,14 +1,14 @@
 //! Stale files of processes that were killed during their start. The library iceoryx2 cleans up after killed processes
-//! whenever a node is created or dropped. Its version 0.10.0 fails at files that such a process had not finished:
+//! whenever a node is created or dropped, but its version 0.10.0 fails at files that such a process had not finished:
 //!
 //! - in a node's folder: it cannot remove the folder, leaves the whole dead node, and fails again each time;
 //! - in shared memory: it waits without end for the file to be finished, and so does the program that created the node;
 //! - among the services: every later attempt to open that service fails.
 //!
-//! A node is created after a call of [`remove_unfinished_files`]. Publishers of frames and subscribers also call
-//! [`spawn_reaper`], on a thread that is not real-time. The mode of a file shows that it is unfinished: its
-//! creator sets the mode last. A file that is still being created is left alone. On a busy disk this takes seconds,
-//! since iceoryx2 syncs the files of nodes and services.
+//! So [`remove_unfinished_files`] is called before a node is created. Publishers of frames and subscribers also call
+//! [`spawn_reaper`], on a thread that is not real-time. The mode of a file shows whether it is finished, because its
+//! creator sets the mode last. A file that is still being created is left alone; on a busy disk this takes seconds,
+//! because iceoryx2 syncs the files of nodes and services.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

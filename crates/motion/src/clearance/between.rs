@@ -1,21 +1,21 @@
 //! The nearest two boards of different dragons of a frame.
 //!
 //! In: the chain of all dragons on the stage, and the clearance of the nearest two boards found so far. Out: a nearer
-//! pair, if there is one. The show calls it if a scene has several dragons and alerts.
+//! pair, if there is one.
 //!
 //! Where all dragons have tables of their frames, a table lists the pairs that can be the nearest at each time of the
 //! show ([`super::between_table`]). Otherwise the pairs are found from frame to frame.
 //!
 //! The broad phase is the same as in [`super::search`]. Every bench carries from frame to frame a lower bound of its
-//! distance to the boards of later dragons. Each frame lowers all bounds by the greatest approach of two boards. A
-//! bench is tested again only when its bound comes within the limit. The box about each dragon gives a wide bound to
-//! benches that are far from all later dragons. For the other benches a grid finds the boards nearby.
+//! distance to the boards of later dragons, and each frame lowers all bounds by the greatest approach of two boards. A
+//! bench is tested again only when its bound comes within the limit. For benches that are far from all later dragons,
+//! the box about each dragon gives a wide bound. For the other benches a grid finds the boards nearby.
 //!
 //! Dragons that go side by side hardly approach each other, however fast they go. So a bench keeps a list of the boards
-//! near it. Each entry has a distance and the places of the board's handles at that time, as seen from the bench. Seen
-//! so, the bench's front handle is the origin and its link is an axis. A point of a board is a linear function of the
-//! board's two handles. So two boards have approached by no more than [`corner_reach`] times the movement of the
-//! handles as seen from the bench. A board of the list is measured again only when this bound comes within the limit.
+//! near it. Each entry has a distance and the places of the board's handles at that time, as seen from the bench: the
+//! bench's front handle is then the origin and its link an axis. A point of a board is a linear function of the board's
+//! two handles, so two boards have approached by no more than [`corner_reach`] times the movement of the handles as
+//! seen from the bench. A board of the list is measured again only when this bound comes within the limit.
 
 use super::between_table::{BetweenTable, TabledDragon};
 use super::grid::Grid;
@@ -26,19 +26,20 @@ use crate::model::team::Team;
 use crate::model::{Point, Vector};
 use crate::solve::Chain;
 
-/// Metres beyond the limit up to which boards are listed.
+/// The distance beyond the limit up to which boards are listed, in metres.
 const SKIN: f64 = 1.0;
 
 /// The most boards in the list of a bench.
 const MOST_LISTED: usize = 12;
 
-/// Error of a place in single precision, as a share of it; twice as much, for the sum of the places.
+/// The error of a place in single precision, as a share of it; twice as much, for the sum of the places.
 const SINGLE_ROUNDING: f64 = 2.0 * f32::EPSILON as f64;
 
-/// Metres of approach after which all bounds are computed again, so that their rounding stays within its allowance.
+/// The approach, in metres, after which all bounds are computed again, so that their rounding stays within its
+/// allowance.
 const MOST_MOVED: f64 = 100.0;
 
-/// Margin for rounding: metres, and as a share of the coordinates.
+/// The margin for rounding: metres, and as a share of the coordinates.
 const ROUNDING: (f64, f64) = (1e-9, 1e-12);
 
 /// The board of no bench.
@@ -83,7 +84,7 @@ impl Part {
 #[derive(Debug, Clone, Copy, Default)]
 struct Listed {
     bench: u32,
-    /// A lower bound of the distance of the boards at the time of the places, metres.
+    /// A lower bound of the distance of the boards at the time of the places, in metres.
     distance: f32,
     /// The handles of the board as seen from the bench.
     places: [[f32; 2]; 2],
@@ -136,7 +137,7 @@ impl Listed {
 /// The moment of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment<'a> {
-    /// Seconds of the show.
+    /// The time of the show, in seconds.
     pub time: f64,
     /// By dragon: the metres that its head has travelled.
     pub travelled: &'a [f64],
@@ -146,16 +147,17 @@ pub struct Moment<'a> {
 #[derive(Debug, Clone)]
 pub struct BetweenMonitor {
     parts: Vec<Part>,
-    /// Metres by which a dragon's points may be outside the box about its handles, and the radius of the largest board.
+    /// The distance, in metres, by which a dragon's points may be outside the box about its handles, and the radius of
+    /// the largest board.
     beyond: f64,
-    /// Greatest approach of two boards per metre of displacement of their handles.
+    /// The greatest approach of two boards per metre of displacement of their handles.
     reach: f64,
-    /// Greatest approach of the points of a board while it is a seat: its link may be off its length, metres.
+    /// The greatest approach of the points of a board while it is a seat: its link may be off its length, in metres.
     link_slack: f64,
     /// The handles of the previous frame.
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Greatest approach of two boards since the beginning, metres.
+    /// The greatest approach of two boards since the beginning, in metres.
     closed: f64,
     /// By bench: a bound plus the value of `closed` when the bound was made; infinite where there is no bench.
     sums: Vec<f64>,

@@ -1,16 +1,16 @@
-//! The boards of two dragons that can be the nearest, for every time of a show. These boards are listed before the
-//! show, so that a frame tests only the listed boards.
+//! The boards of two dragons that can be the nearest, for every time of a show. They are listed before the show, so
+//! that a frame tests only the listed boards.
 //!
 //! The time is divided into equal cells. Throughout a cell every handle is near a quadratic polynomial of the cell's
-//! time. The polynomials give a lower and an upper bound of the distance of every two boards (see [`super::moving`]).
-//! The list of a cell has the pairs whose lower bound is within the least upper bound, in ascending order. Its last
-//! entry stands for all other pairs.
+//! time, and these polynomials give a lower and an upper bound of the distance of every two boards (see
+//! [`super::moving`]). The list of a cell has the pairs whose lower bound is within the least upper bound, in ascending
+//! order. Its last entry stands for all other pairs.
 //!
-//! The polynomials follow from the rows of each dragon's table ([`crate::solve::table::rows`]). Throughout a cell,
-//! alpha of the second handle is nearly a linear function of the time. The polynomials hold while alpha and the head
-//! are within assumed errors, which every frame checks.
+//! The polynomials follow from the rows of each dragon's table ([`crate::solve::table::rows`]), because throughout a
+//! cell alpha of the second handle is nearly a linear function of the time. They hold while alpha and the head are
+//! within assumed errors, which every frame checks.
 //!
-//! In: the dragons of a show and its end. Out: a list for every frame. Only [`super::between`] calls it.
+//! In: the dragons of a show and its end. Out: a list for every frame.
 
 use super::between::Moment;
 use super::cells::track;
@@ -29,21 +29,21 @@ use crate::solve::table::rows::Alpha;
 /// Cells while the fastest head passes the shortest link.
 const CELLS: f64 = 4.0;
 
-/// Greatest work to make a table, in nanoseconds on a processor of 2025: in a cell for each dragon, each handle, and
-/// each two boards. That of dragons also limits the memory.
+/// The greatest work to make a table, in nanoseconds on a processor of 2025: in a cell for each dragon, each handle,
+/// and each two boards. That of dragons also limits the memory.
 const MOST_WORK: usize = 5_000_000_000;
 const WORK_OF_DRAGON: usize = 10_000;
 const WORK_OF_HANDLE: usize = 400;
 const WORK_OF_PAIR: usize = 60;
 
-/// Greatest number of entries.
+/// The greatest number of entries.
 const MOST_ENTRIES: usize = 1 << 22;
 
-/// Greatest change of alpha in a cell, and the greatest and the least assumed error of alpha.
+/// The greatest change of alpha in a cell, and the greatest and the least assumed error of alpha.
 const MOST_CHANGE: f64 = 0.5;
 const ALPHA_ERRORS: (f64, f64) = (1e-3, 1e-7);
 
-/// Least assumed error of the head, metres.
+/// The least assumed error of the head, in metres.
 const HEAD_ERROR: f64 = 1e-6;
 
 /// A dragon whose frames come from a table.
@@ -56,14 +56,14 @@ pub struct TabledDragon<'a> {
     pub placement: Placement,
     /// The table of its frames, in the path's own coordinates.
     pub table: &'a FollowerTable,
-    /// Metres per second.
+    /// The speed of the head, in metres per second.
     pub head_speed: f64,
 }
 
 /// Two boards that can be the nearest.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
-    /// Lower bound of their signed distance, metres.
+    /// A lower bound of their signed distance, in metres.
     pub bound: f32,
     /// The benches, by the numbers of the show; `None` for all pairs without an entry.
     pub pair: Option<(u32, u32)>,
@@ -75,7 +75,7 @@ struct State {
     /// Alpha of the second handle at the beginning of the cell, and its change in the cell.
     alpha: f64,
     change: f64,
-    /// Greatest difference of alpha and the linear function of the time.
+    /// The greatest difference of alpha and the linear function of the time.
     error: f64,
     /// The head on the stage, with the greatest distance from it.
     head: Quadratic,
@@ -154,11 +154,11 @@ struct Builder<'a> {
     dragons: &'a [TabledDragon<'a>],
     /// By dragon: the number of its first handle.
     firsts: Vec<usize>,
-    /// Greatest radius of a board, metres.
+    /// The greatest radius of a board, in metres.
     radius: f64,
-    /// Upper limit of every bound, metres: in every frame two boards of one dragon are nearer.
+    /// Upper limit of every bound, in metres: in every frame two boards of one dragon are nearer.
     farthest: f64,
-    /// Error of a bound per metre of error of a handle, and the greatest error of a handle of a frame, metres.
+    /// The error of a bound per metre of error of a handle, and the greatest error of a handle of a frame, in metres.
     error_factor: f64,
     handle_error: f64,
     /// By bench; `None` for the last handle of a dragon.

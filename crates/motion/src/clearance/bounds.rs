@@ -1,22 +1,22 @@
-//! Lower bounds of the distance of boards to the boards behind them, for every place on the path. The bounds are
-//! computed before the show, so that a frame tests only the few pairs that can be the nearest.
+//! Lower bounds of the distance of boards to the boards behind them, for every place on the path. They are computed
+//! before the show, so that a frame tests only the few pairs that can be the nearest.
 //!
 //! If the second handle stands at T(alpha), the next ones stand at T(alpha + 1), T(alpha + 2) and so on: see
 //! [`crate::solve::table::rows`]. So the distances of a body bench to those behind it depend on the alpha of its front
-//! handle alone. Every row of T is divided into [`CELLS`] equal cells. While one handle is in a cell, the next is in
-//! the same cell of the next row. Each (row, cell) has a list of the benches that can be near. The list has a proven
-//! lower bound of the signed distance to each bench (see [`super::moving`]), in ascending order. The last entry stands
-//! for all others. Far behind, where boards hardly move against each other while all advance by a link, one list is
-//! valid for all cells of a row.
+//! handle alone. Every row of T is divided into [`CELLS`] equal cells, and while one handle is in a cell, the next is
+//! in the same cell of the next row. Each (row, cell) has a list of the benches that can be near, with a proven lower
+//! bound of the signed distance to each (see [`super::moving`]), in ascending order. The last entry stands for all
+//! others. Far behind, boards hardly move against each other while all advance by a link, so there one list is valid
+//! for all cells of a row.
 //!
-//! The rows are grouped into blocks. The least bound of each block is also kept cell by cell. So the least bounds of a
-//! whole chain are adjacent in memory. A frame reads only the blocks whose least bound is within its limit.
+//! The rows are grouped into blocks, and the least bound of each block is also kept, cell by cell, so that the least
+//! bounds of a whole chain are adjacent in memory. A frame reads only the blocks whose least bound is within its limit.
 //!
-//! The head's link differs. But while the second handle is in a cell, the head too is near a known quadratic polynomial
-//! of the cell's time. The head's list is valid while the head is within the assumed error, which every frame checks.
-//! Past a stall the head is elsewhere and has no list.
+//! The head's link differs from the others. But while the second handle is in a cell, the head too is near a known
+//! quadratic polynomial of the cell's time. The head's list is valid while the head is within the assumed error, which
+//! every frame checks. Past a stall the head is elsewhere and has no list.
 //!
-//! In: a path and a team. Out: lists for every frame. Only the clearance calls it.
+//! In: a path and a team. Out: lists for every frame.
 
 use std::time::{Duration, Instant};
 
@@ -35,19 +35,19 @@ pub(super) const BLOCK: usize = 64;
 /// Rows at the front that always have lists for every cell: the nearest pairs are most often there.
 const FINE_ROWS: usize = 1024;
 
-/// Greatest number of rows for which the head has lists: about 10 MB.
+/// The greatest number of rows for which the head has lists: about 10 MB.
 const MOST_HEAD_ROWS: usize = 1 << 14;
 
-/// Greatest slack of a block's bounds, in links, if one list is used for all cells of a row.
+/// The greatest slack of a block's bounds, in links, if one list is used for all cells of a row.
 const MOST_SLACK: f64 = 1e-3;
 
-/// Greatest work to make a table, in nanoseconds on a processor of 2025.
+/// The greatest work to make a table, in nanoseconds on a processor of 2025.
 const MOST_WORK: usize = 5_000_000_000;
 
-/// Greatest size of all lists, bytes.
+/// The greatest size of all lists, in bytes.
 const MOST_BYTES: usize = 128 << 20;
 
-/// Place of a frame's second handle in the table.
+/// The place of a frame's second handle in the table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Located {
     /// Its row, which is also the row of the bench it leads.
@@ -61,16 +61,16 @@ pub(super) struct Located {
 #[derive(Debug, Clone, Copy)]
 struct HeadCell {
     track: Quadratic,
-    /// Index of the first entry of its list.
+    /// The index of the first entry of its list.
     begin: u32,
 }
 
-/// Places of the lists of a block.
+/// The places of the lists of a block.
 #[derive(Debug, Clone, Copy)]
 struct Block {
     /// The place of its first row in the table's `bounds` and `begins`, in its first cell.
     begin: usize,
-    /// Number of cells with separate lists.
+    /// The number of cells with separate lists.
     cells: usize,
 }
 
@@ -179,7 +179,7 @@ impl BoundTable {
         Some(false)
     }
 
-    /// Makes the lists of a cell of a block. Returns the greatest slack of a first bound, metres.
+    /// Makes the lists of a cell of a block. Returns the greatest slack of a first bound, in metres.
     fn fill(&mut self, block: usize, cell: usize, present: usize, builder: &mut ListBuilder) -> f64 {
         let (mut least, mut slack) = (f32::INFINITY, 0.0f64);
         // The last row has no board.
@@ -256,7 +256,7 @@ impl BoundTable {
         begin + if cells == 1 { 0 } else { cell * BLOCK }
     }
 
-    /// Returns the size of the table, bytes.
+    /// Returns the size of the table, in bytes.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.least.as_slice())
             + size_of_val(self.blocks.as_slice())

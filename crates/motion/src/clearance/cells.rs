@@ -1,5 +1,5 @@
-//! Places of the handles and the head while the second handle is in a cell of the table. The places are quadratic
-//! polynomials of the cell's time with error bounds. Used only to make the table, except for [`CELLS`].
+//! The places of the handles and of the head while the second handle is in a cell of the table, as quadratic
+//! polynomials of the cell's time with error bounds. Except for [`CELLS`], they are used only while the table is made.
 
 use super::moving::Quadratic;
 use crate::model::Vector;
@@ -17,11 +17,11 @@ pub(super) struct HeadGridPoint {
     place: Vector,
     /// Its derivative by the cell's time.
     slope: Vector,
-    /// Error bound of the place, metres.
+    /// The error bound of the place, in metres.
     error: f64,
 }
 
-/// Error bound of the head's place at the end of the first cell, in links: the path's start is within the cell.
+/// The error bound of the head's place at the end of the first cell, in links: the path's start is within the cell.
 const ERROR_BEHIND_START: f64 = 1e-3;
 
 /// Returns the first row for which T is known while the phase goes from `begin` to `end`. Returns also the handles from

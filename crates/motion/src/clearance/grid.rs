@@ -1,7 +1,7 @@
-//! Points by squares of the stage: points near a place are found without testing the others.
+//! Points by squares of the stage, so that points near a place are found without testing the others.
 //!
-//! A hash of the square leads to a list of points, linked through an array and in descending order of their numbers.
-//! Different squares can share a list. Only the clearance uses it.
+//! A hash of the square leads to a list of points, which are linked through an array in descending order of their
+//! numbers. Different squares can share a list.
 
 /// The end of a list.
 const NONE: u32 = u32::MAX;
@@ -32,7 +32,7 @@ impl Grid {
         }
     }
 
-    /// Empties the grid and sets the side of a square, metres.
+    /// Empties the grid and sets the side of a square, in metres.
     pub(super) fn clear(&mut self, side: f64) {
         self.squares_per_metre = side.recip();
         self.last.fill(NONE);

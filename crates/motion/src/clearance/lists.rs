@@ -1,5 +1,4 @@
-//! The lists of the table: which boards can be near a board throughout a cell, and how near. Called by the making of
-//! the table; the search reads the entries.
+//! The lists of the table: which boards can be near a board throughout a cell, and how near.
 
 use super::cells::handles;
 use super::grid::Grid;
@@ -15,8 +14,8 @@ const MOST_ENTRIES: usize = 24;
 /// Boards farther than the nearest by more than this, in links, have no entry.
 const ALLOWANCE: f64 = 0.02;
 
-/// Nanoseconds on a processor of 2025 for a row's handle, for its list, for a visited board, and for a bound of its
-/// distance.
+/// The work for a row's handle, for its list, for a visited board, and for a bound of its distance, in nanoseconds on a
+/// processor of 2025.
 const WORK_OF_HANDLE: usize = 400;
 const WORK_OF_LIST: usize = 300;
 const WORK_OF_VISIT: usize = 15;
@@ -25,9 +24,9 @@ const WORK_OF_BOUND: usize = 250;
 /// Benches that can be near another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbour {
-    /// Lower bound of their signed distance, metres.
+    /// A lower bound of their signed distance, in metres.
     pub bound: f32,
-    /// Number of benches further behind; [`Neighbour::ALL`] for all benches without an entry.
+    /// The number of benches further behind; [`Neighbour::ALL`] for all benches without an entry.
     pub behind: u32,
 }
 
@@ -39,11 +38,11 @@ impl Neighbour {
 /// A finished list.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct List {
-    /// Index of its first entry.
+    /// The index of its first entry.
     pub begin: u32,
-    /// Its first bound, metres.
+    /// Its first bound, in metres.
     pub bound: f32,
-    /// Greatest difference of the distance to the nearest board and that bound, metres.
+    /// The greatest difference of the distance to the nearest board and that bound, in metres.
     pub slack: f64,
 }
 
@@ -58,22 +57,22 @@ pub(super) struct ListBuilder<'a> {
     /// The handles in the cell, from row `first` on.
     handles: Vec<Quadratic>,
     first: usize,
-    /// By row from `first` on: greatest travel of its board and of those behind, metres.
+    /// By row from `first` on: greatest travel of its board and of those behind, in metres.
     travel_behind: Vec<f64>,
     grid: Grid,
-    /// No list is made if boards may move farther, metres.
+    /// The displacement of boards, in metres, above which no list is made.
     longest_reach: f64,
-    /// Greatest error of a handle of a frame, metres: twice the errors of T and the frame.
+    /// The greatest error of a handle of a frame, in metres: twice the errors of T and the frame.
     handle_error: f64,
-    /// Upper limit of every bound, metres. Two benches with one between them are never farther apart than its link, so
-    /// that in every frame some pair is nearer.
+    /// Upper limit of every bound, in metres. Two benches with one between them are never farther apart than its link,
+    /// so that in every frame some pair is nearer.
     farthest: f64,
     /// Rows from a board to its nearest one, in the latest list.
     likely: usize,
     candidates: Vec<(usize, f64)>,
     /// All lists.
     pub neighbours: Vec<Neighbour>,
-    /// Nanoseconds of work so far, on a processor of 2025.
+    /// The work so far, in nanoseconds on a processor of 2025.
     pub work: usize,
 }
 
@@ -95,7 +94,7 @@ impl<'a> ListBuilder<'a> {
         }
     }
 
-    /// Returns the greatest distance of the front handles of two boards in one list, metres.
+    /// Returns the greatest distance of the front handles of two boards in one list, in metres.
     pub(super) fn longest_distance(&self) -> f64 {
         let from_handle = self.team.longest_link() + self.team.hole_inset + self.team.width;
         self.farthest + 2.0 * from_handle

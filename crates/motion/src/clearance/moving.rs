@@ -1,19 +1,19 @@
-//! Boards that move through a cell of the table, and bounds of the distance of two of them. Used only to make the
-//! table.
+//! Boards that move through a cell of the table, and bounds of the distance of two of them. They are used only while
+//! the table is made.
 //!
 //! **The bound.** Time t runs from -1 to 1 over the cell. Every handle is a quadratic polynomial of t with an error of
-//! at most `error` metres. The middle of a board is such a polynomial, too. So is its unit axis u, since its link is
-//! rigid. Take any direction w that is fixed to board a. Then w = p u + q n with p^2 + q^2 = 1 and n the unit normal of
-//! a. Between a and b there is the gap
+//! at most `error` metres. The middle of a board is such a polynomial, too, and so is its unit axis u, because its link
+//! is rigid. Take any direction w that is fixed to board a, so that w = p u + q n with p^2 + q^2 = 1 and n the unit
+//! normal of a. Between a and b there is the gap
 //!
 //! (c_b - c_a) . w - h_a(w) - L_b |u_b . w| - W_b |n_b . w|,
 //!
 //! with the middles c, half the length L_b and width W_b of b, and h_a(w) = L_a |p| + W_a |q|, which is constant. The
-//! signed distance is the greatest such gap over all w, by the separating axis theorem where the boards overlap. So
-//! each gap is a lower bound. The gap is the least of four functions, one for each corner of b. Each function is a sum
-//! of products of two known quadratics. The powers up to t^2 of every product are kept. The other powers are bounded by
-//! their coefficients. Let A and B have errors e and f, and let B be a unit vector. Then A . B has an error of at most
-//! e + |A| f. The rest is the least value of a quadratic between -1 and 1. Motion of b along a does not weaken the
+//! signed distance is the greatest such gap over all w (where the boards overlap, by the separating axis theorem), so
+//! each gap is a lower bound. A gap is the least of four functions, one for each corner of b, each of which is a sum of
+//! products of two known quadratics. The powers up to t^2 of every product are kept, and the other powers are bounded
+//! by their coefficients. If A and B have errors e and f, and B is a unit vector, then A . B has an error of at most
+//! |A| f + e. What remains is the least value of a quadratic between -1 and 1. Motion of b along a does not weaken the
 //! bound, at any speed.
 //!
 //! The distance of any two points, one fixed to each board, bounds the distance of the boards from above.
@@ -29,7 +29,7 @@ use crate::model::{Point, Vector};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Quadratic {
     pub terms: [Vector; 3],
-    /// Upper bound of the distance to the true vector, in the vector's unit.
+    /// An upper bound of the distance to the true vector, in the vector's unit.
     pub error: f64,
 }
 
@@ -97,7 +97,7 @@ pub(super) struct MovingBoard {
     axis: Quadratic,
     half_length: f64,
     half_width: f64,
-    /// Upper bound of the distance of its points from their places at 0, metres.
+    /// An upper bound of the distance of its points from their places at 0, in metres.
     pub travel: f64,
 }
 

@@ -1,12 +1,12 @@
 //! The bench of a frame that is nearest to an obstacle.
 //!
-//! In: the chain of a frame and the clearance of its nearest two boards. Out: a board nearer to an obstacle, if there
-//! is one. The show calls it if a scene has obstacles and alerts.
+//! In: the chain of a frame and the clearance of its nearest two boards. Out: a board that is nearer to an obstacle, if
+//! there is one.
 //!
-//! Obstacles stand still. So the clearance of a body bench depends on the place of its front handle alone. A follower
+//! Obstacles stand still, so the clearance of a body bench depends on the place of its front handle alone. A follower
 //! table gives this place as a row and a phase (see [`super::bounds`]). Each row is divided into [`CELLS`] equal cells.
-//! For each row and cell a table has a lower bound of the clearance of all obstacles. The bound is the clearance in the
-//! middle of the cell, less the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the
+//! For each row and cell a table has a lower bound of the clearance of all obstacles. It is the clearance in the middle
+//! of the cell, less the way of the board's points from there ([`lower_bound`]). A frame tests the head, and the
 //! benches that the bounds do not exclude.
 
 use super::cells::handles;
@@ -25,10 +25,10 @@ const CELLS: usize = 32;
 /// Rows of a block, whose least bound is kept, too.
 const BLOCK: usize = 32;
 
-/// Greatest number of rows times obstacles of a table: about a second of work.
+/// The greatest number of rows times obstacles of a table: about a second of work.
 const MOST_ROWS: usize = 1 << 17;
 
-/// Margin of the bounds for rounding, metres and as a share of the coordinates.
+/// The margin of the bounds for rounding, metres and as a share of the coordinates.
 const ROUNDING: (f64, f64) = (1e-9, 1e-12);
 
 /// Lower bounds of the clearance of every body bench, for every place of the second handle.
@@ -130,7 +130,7 @@ impl ObstacleMonitor {
         Self { team, ground, table, last_bench: 0 }
     }
 
-    /// Returns the bench and the obstacle with the least clearance, if it is below `limit`, metres. `bench_b` is the
+    /// Returns the bench and the obstacle with the least clearance, if it is below `limit`, in metres. `bench_b` is the
     /// number of handles plus the obstacle's place on the ground, `point_b` a point of the obstacle. `travelled` is as
     /// in [`ClearanceMonitor::least_clearance`](super::ClearanceMonitor::least_clearance).
     pub fn nearest<'a>(

@@ -1,5 +1,4 @@
-//! The search for the nearest pair of one chain: it tests the pairs that known bounds do not exclude. Only the
-//! clearance calls it.
+//! The search for the nearest pair of one chain: it tests the pairs that known bounds do not exclude.
 
 use std::ops::Range;
 
@@ -19,23 +18,24 @@ const DISTANCES_AT_ONCE: usize = 8;
 /// Benches that are tested against all others before a grid is cheaper.
 const MOST_SCANS: usize = 16;
 
-/// Margin of carried bounds beyond the limit, in lengths of a body board.
+/// The margin of carried bounds beyond the limit, in lengths of a body board.
 const SKIN: f64 = 0.05;
 
-/// Metres of approach after which carried bounds are computed again, so that their rounding stays within its allowance.
+/// The approach, in metres, after which carried bounds are computed again, so that their rounding stays within its
+/// allowance.
 const MOST_MOVED: f64 = 100.0;
 
 /// For every bench a lower bound of its distance to those behind it, carried from frame to frame.
 ///
-/// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D.
-/// If links have errors, this length is a little more. No two boards are nearer by more than twice this length. So an
-/// earlier bound, less this amount for all movement since, still holds.
+/// If no handle is farther than D from its earlier place, no point of a board is farther than [`corner_reach`] times D,
+/// or a little more if links have errors. So no two boards are nearer by more than twice this length, and an earlier
+/// bound, less this amount for all movement since, still holds.
 #[derive(Debug, Clone)]
 pub(super) struct CarriedBounds {
     /// The handles of the previous frame.
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Greatest approach of two boards since the beginning, metres.
+    /// The greatest approach of two boards since the beginning, in metres.
     closed: f64,
     /// By bench: a bound plus the value of `closed` when the bound was made.
     sums: Vec<f64>,
@@ -87,7 +87,7 @@ pub(super) struct ClearanceSearch<'a> {
     first: ((usize, usize), f64),
     /// A body board's length over its link's.
     board_per_link: f64,
-    /// Metres that a link may be off its length.
+    /// The length, in metres, by which a link may be off.
     link_error: f64,
     /// Pairs tested.
     pub tested: u64,
@@ -243,7 +243,7 @@ impl<'a> ClearanceSearch<'a> {
         bound
     }
 
-    /// Returns an upper bound of the radius of the circle about a body board, metres.
+    /// Returns an upper bound of the radius of the circle about a body board, in metres.
     fn body_radius(&self) -> f64 {
         circle_radius(self.team, 1) + 0.5 * self.link_error
     }

@@ -1,12 +1,12 @@
 //! First contact and least clearance of boards of two dragons of a show, by the steps of [`super`].
 //!
-//! **Why nothing is skipped.** The proof in [`super`] does not use that two boards belong to one chain. It needs the
-//! clearances at both ends of a step. It also needs bounds C of the paths of the boards' points on the stage. Here a
-//! step is an interval of time. Each head goes forward along its path, or stands. So C of each board follows from its
-//! own dragon, and B = C_a + C_b. Boards that stand have no path. Let two boards be on straight lines, and let neither
-//! begin or end to move within the step. Then they move relative to each other by the difference of their two vectors,
-//! along a straight line. B is the length of this difference. So two dragons that go side by side, or one behind the
-//! other, cost few steps.
+//! **Why nothing is skipped.** The proof in [`super`] does not use that two boards belong to one chain. It needs only
+//! the clearances at both ends of a step, and bounds C of the paths of the boards' points on the stage. Here a step is
+//! an interval of time, in which each head goes forward along its path, or stands. So C of each board follows from its
+//! own dragon, and B = C_a + C_b; a board that stands has no path. If two boards are on straight lines, and neither
+//! begins or ends to move within the step, they move relative to each other by the difference of their two vectors,
+//! along a straight line. Then B is the length of this difference, so that two dragons that go side by side, or one
+//! behind the other, need few steps.
 
 use crate::event::Budget;
 use crate::linkage::NoFollower;
@@ -27,7 +27,7 @@ pub struct MovingDragon<'a> {
     placement: Placement,
     delay: f64,
     head_speed: f64,
-    /// Metres of travel at which it stands or the motion ends, and from which on rounding may prevent a solution.
+    /// The travel, in metres, at which it stands or the motion ends, and from which on rounding may prevent a solution.
     end: f64,
     rounding_from: f64,
 }
@@ -61,9 +61,9 @@ impl<'a> MovingDragon<'a> {
 /// Boards of two dragons at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meeting {
-    /// Seconds of the show.
+    /// The time of the show, in seconds.
     pub time: f64,
-    /// Metres between the boards; 0 or less at a contact.
+    /// The distance between the boards, in metres; 0 or less at a contact.
     pub value: f64,
     /// The bench of each dragon, counted from 0 within it.
     pub benches: [usize; 2],
@@ -281,7 +281,7 @@ impl<'s, 'a, 'b> BetweenSearch<'s, 'a, 'b> {
         Ok(steps)
     }
 
-    /// Returns an upper bound of the relative motion of any two boards, metres.
+    /// Returns an upper bound of the relative motion of any two boards, in metres.
     fn most_motion(&self, steps: &[Displacements; 2]) -> f64 {
         let most = |k: usize| {
             let dragon = self.moving[k];

@@ -17,7 +17,7 @@ pub(super) type Pair = (usize, usize);
 /// The foremost handles and boards of a team.
 #[derive(Debug, Clone)]
 pub(super) struct Configuration {
-    /// Metres that the head has travelled.
+    /// The distance that the head has travelled, in metres.
     pub travelled: f64,
     /// The handles solved so far: one more than the boards.
     pub places: Vec<Param>,
@@ -46,7 +46,7 @@ impl Configuration {
         Ok(())
     }
 
-    /// Returns the signed distance of two boards, metres.
+    /// Returns the signed distance of two boards, in metres.
     pub fn clearance(&self, (a, b): Pair) -> f64 {
         signed_distance_board_board(&self.boards[a], &self.boards[b])
     }

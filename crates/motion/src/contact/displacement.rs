@@ -1,5 +1,5 @@
 //! Bounds of the relative motion of two boards while the head goes from one place to another. The search rests on these
-//! bounds; the proof is in the header of [`super`].
+//! bounds, which are proved in the header of [`super`].
 
 use crate::event::Budget;
 use crate::linkage::follower;
@@ -17,7 +17,7 @@ use super::stepped_search::Halt;
 /// The motion of one handle in a step.
 #[derive(Debug, Clone, Copy)]
 struct HandleMotion {
-    /// Metres of path that it passed over, forth and back: an upper bound of its total variation.
+    /// The length of path that it passed over, back and forth, in metres: an upper bound of its total variation.
     length: f64,
     /// Handles with one number, and all handles between them, went one way.
     run: u32,
@@ -152,7 +152,7 @@ impl Displacements {
         seen(a).zip(seen(b)).map_or(stage, |(one, other)| stage.min(one + other))
     }
 
-    /// Returns an upper bound of the relative motion of any two of the foremost boards, metres.
+    /// Returns an upper bound of the relative motion of any two of the foremost boards, in metres.
     pub fn most_relative_motion(&self, chain: &ConservativeAdvancement, benches: usize) -> f64 {
         2.0 * (0..benches).map(|bench| self.on_stage(chain, bench, Weights::Additive)).fold(0.0, f64::max)
     }
@@ -206,7 +206,7 @@ impl Displacements {
         (stays && self.handles[bench].run == self.handles[bench + 1].run).then_some(curvature)
     }
 
-    /// Returns an upper bound of the displacement of a board's points on the stage, metres.
+    /// Returns an upper bound of the displacement of a board's points on the stage, in metres.
     pub fn on_stage(&self, chain: &ConservativeAdvancement, bench: usize, weights: Weights) -> f64 {
         weights.board(chain.team, bench, self.handles[bench].length, self.handles[bench + 1].length)
     }
@@ -236,7 +236,7 @@ fn turned((before, after): (&Configuration, &Configuration), handle: usize) -> f
 /// The way in which the displacements of a board's two handles bound the displacements of its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Weights {
-    /// Upper bound for one point of the board: sufficient to exclude a clearance above zero.
+    /// The upper bound for one point of the board: sufficient to exclude a clearance above zero.
     OnePoint,
     /// A bound that is additive over sub-steps, for overlaps.
     Additive,

@@ -1,18 +1,21 @@
 //! First touches of the obstacles of a ground and the least clearance of each, by the steps of [`super`].
 //!
 //! **Why nothing is skipped.** An obstacle stands still, so the proof in [`super`] holds with B = C of the board.
-//! Assume that the board's distance d from the shape is at most x >= 0 at some time of a step. Take the nearest points
-//! P of the board and Q of the shape at that time, or a common point. At both ends of the step P is at least as far
-//! from Q as the distances d_start and d_end. P goes along a path no longer than C. So d_start + d_end <= 2 x + C.
-//! Where the clearance sought is an overlap, d < 0, the displacements that are additive take C's place. This holds for
-//! a convex shape. Out of a pocket of another shape the least translation may jump. There a board that is C longer and
-//! wider to each side takes the board's place. In the whole step the board is within this larger board. So the least
-//! translation of the larger board frees the board at any time of the step.
+//! Suppose that the board's distance d from the shape is at most x >= 0 at some time of a step. Let P of the board and
+//! Q of the shape be the nearest points at that time, or a common point. At both ends of the step P is at least as far
+//! from Q as the distances d_start and d_end, and P moves along a path no longer than C. It follows that d_start +
+//! d_end <= 2 x + C. Where the clearance sought is an overlap, d < 0, the displacements that are additive take C's
+//! place.
 //!
-//! **Along a straight line** a board only moves by a vector D. Its distance from a side of a shape is a convex function
-//! of the way. The slopes at both ends of the step bound this function from below. So along a wall nothing is lost.
-//! **Along a circle** the board and the circle's centre keep their distance. So a round obstacle moves past the board
-//! by the turn times the distance of the two centres.
+//! This holds for a convex shape. For another shape it fails where a board leaves a pocket, because the least
+//! translation may jump there. So a board that is C longer and wider to each side takes the board's place. In the whole
+//! step the board is within this larger board, and therefore the least translation that frees the larger board also
+//! frees the board at any time of the step.
+//!
+//! **Along a straight line** a board only moves by a vector D, so its distance from a side of a shape is a convex
+//! function of the way. The slopes at both ends of the step bound this function from below, and along a wall nothing is
+//! lost. **Along a circle** the board and the circle's centre keep their distance, so a round obstacle moves past the
+//! board by the turn times the distance of the two centres.
 //!
 //! **Which boards.** A body board is where board 1 is when handle 1 is at the front handle's place. So boards behind
 //! board 1 matter only in steps in which handle 2 is somewhere behind the first place of handle 1, as in [`super`].
@@ -37,7 +40,7 @@ use super::stepped_search::{GUESS_SHARE, Goal, Halt, MOST_GUESSES, SearchState, 
 pub struct Touch {
     /// The obstacle's number on its ground.
     pub obstacle: usize,
-    /// Metres that the head has travelled.
+    /// The distance that the head has travelled, in metres.
     pub travelled: f64,
     /// The bench that touches, counted from 0; of several the one deepest within the keep-out.
     pub bench: u32,
@@ -48,9 +51,9 @@ pub struct Touch {
 /// The least clearance of an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObstacleClearance {
-    /// Metres; negative if a board is within the keep-out.
+    /// The clearance, in metres; negative if a board is within the keep-out.
     pub value: f64,
-    /// Metres that the head has travelled.
+    /// The distance that the head has travelled, in metres.
     pub travelled: f64,
     /// The bench, counted from 0.
     pub bench: u32,
@@ -73,9 +76,9 @@ struct GroundSearch<'s, 'a, 'b> {
     touches: Vec<Option<Touch>>,
     /// By obstacle: the least clearance so far.
     best: Vec<Option<ObstacleClearance>>,
-    /// Place of handle 1 at the beginning.
+    /// The place of handle 1 at the beginning.
     second_handle: Param,
-    /// Metres of travel from which on rounding may prevent a solution.
+    /// The travel, in metres, from which on rounding may prevent a solution.
     rounding_from: f64,
 }
 

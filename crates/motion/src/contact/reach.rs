@@ -1,5 +1,5 @@
-//! Limits of the search. The first limit is the rearmost place of the path from which a board can come near the
-//! foremost boards. The second limit is the place behind which no boards come near each other.
+//! Limits of the search: the rearmost place of the path from which a board can come near the foremost boards, and the
+//! place behind which no boards come near each other.
 
 use crate::model::Point;
 use crate::model::curve::{Curve, ReachedDisc};
@@ -13,7 +13,7 @@ use crate::model::team::Team;
 pub(super) struct Reach {
     pub centre: Point,
     pub radius: f64,
-    /// Metres from the origin to the outermost point of the boards.
+    /// The distance from the origin to the outermost point of the boards, in metres.
     pub outermost: f64,
 }
 

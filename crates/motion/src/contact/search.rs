@@ -44,11 +44,11 @@ pub(super) struct ChainSearch<'s, 'a, 'b> {
     contact: Option<Event>,
     /// The least clearance so far.
     best: Option<LeastClearance>,
-    /// Place of handle 1 at the beginning: S of the proof.
+    /// The place of handle 1 at the beginning: S of the proof.
     pub(super) second_handle: Param,
     /// The quiet place, if there is one.
     pub(super) quiet: Option<Param>,
-    /// Metres of travel from which on rounding may prevent a solution: the motion's end may be a lock.
+    /// The travel, in metres, from which on rounding may prevent a solution, because the motion's end may be a lock.
     rounding_from: f64,
 }
 

@@ -3,7 +3,8 @@
 //!
 //! In: a [`SteppedSearch`], which knows the bodies and the bounds of their motion. The bodies are the boards of one
 //! chain (`search`), the boards of two dragons (`between`), or boards and obstacles (`ground`). Out: calls of
-//! [`SteppedSearch::record`]. No pair is at or below the limit anywhere else.
+//! [`SteppedSearch::record`] for every step that may contain something nearer; no pair is at or below the limit
+//! anywhere else.
 
 use crate::event::{Budget, Spent};
 use crate::linkage::NoFollower;
@@ -12,7 +13,7 @@ use crate::linkage::NoFollower;
 /// the only part of the least clearance without proof.
 const UNIMODAL_SHARE: f64 = 1e-2;
 
-/// Greatest number of configurations for a first guess of the least clearance.
+/// The greatest number of configurations for a first guess of the least clearance.
 pub(super) const MOST_GUESSES: f64 = 1000.0;
 
 /// The share of a search for the least clearance that its guess takes, for the report of progress.
@@ -112,11 +113,11 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
         pairs: &mut Vec<Self::Pair>,
     ) -> Result<(), Halt>;
 
-    /// Returns the clearance of a pair, metres.
+    /// Returns the clearance of a pair, in metres.
     fn clearance(&self, at: &Self::Bodies, pair: Self::Pair) -> f64;
 
     /// Records the deepest pair if it touches, or the nearest pair if it is below the least clearance so far. With
-    /// obstacles, the pair of each obstacle is recorded. Returns true if nothing is left to search.
+    /// obstacles, the pair of each obstacle is recorded. Returns true if the search is finished.
     fn record(&mut self, at: &Self::Bodies, pairs: &[Self::Pair]) -> Result<bool, Halt>;
 
     /// Searches from one coordinate to another. Returns the coordinate up to which the result is proved.
@@ -129,8 +130,8 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
         }
     }
 
-    /// Goes from `start` to `to` in steps, until nothing is left to search. A step without uncertain pairs doubles the
-    /// next; others are halved, and shorten it.
+    /// Goes from `start` to `to` in steps, until the search is finished. After a step without uncertain pairs the next
+    /// is twice as long; other steps are halved, and the next ones are shorter.
     fn advance(&mut self, start: Self::Bodies, to: f64) -> Result<(), Halt> {
         let (from, unit) = (Self::coordinate(&start), self.step_unit());
         let least = self.state().goal == Goal::Least;
@@ -164,7 +165,7 @@ pub(super) trait SteppedSearch<'s, 'b: 's> {
     }
 
     /// Halves a step, the earlier half first, until its pairs are certain or the doubles are exhausted. Returns true if
-    /// nothing is left to search.
+    /// the search is finished.
     fn narrow(&mut self, before: &Self::Bodies, after: &Self::Bodies, pairs: &[Self::Pair]) -> Result<bool, Halt> {
         if pairs.is_empty() {
             return Ok(false);

@@ -16,7 +16,7 @@ pub struct Arc {
     pub direction: Vector,
     /// Unit vector from the point at 0 towards the centre.
     pub inward: Vector,
-    /// Metres.
+    /// The radius, in metres.
     pub radius: f64,
 }
 

@@ -1,5 +1,4 @@
-//! The rectangle of a board. Separation, clearance and the drawings use this module, which is independent of team and
-//! path.
+//! The rectangle of a board, independent of team and path.
 
 use super::{Point, Vector};
 
@@ -10,9 +9,9 @@ pub struct Board {
     pub centre: Point,
     /// Unit direction along the board, from its rear handle to its front one.
     pub axis: Vector,
-    /// Half the whole board's length, metres.
+    /// Half the whole board's length, in metres.
     pub half_length: f64,
-    /// Half the board's width, metres.
+    /// Half the board's width, in metres.
     pub half_width: f64,
 }
 

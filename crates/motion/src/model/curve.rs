@@ -1,13 +1,13 @@
 //! [`Curve`]: the contract of every curve that a path is made of. Units and formulas of a curve are in its own file.
 //!
 //! Every curve has a coordinate: metres on a line, radians on an arc, the polar angle on a spiral. The coordinate is
-//! kept as two doubles, so that a place far along loses no digits. The coordinate may grow or fall in the direction of
+//! kept as two doubles, so that a place far along the curve loses no digits. It may grow or fall in the direction of
 //! travel.
 //!
-//! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`. It also needs a variant of
-//! [`Segment`](super::segment::Segment) with its outline, and one of `description` that constructs it. No other code of
-//! `model` matches on kinds of curves, but `Path::as_spiral`. The methods with a default have one that is valid for
-//! every curve; the default of a bound costs time only.
+//! **A new kind of curve** needs a file beside `line` and `arc` with its `impl Curve`, a variant of
+//! [`Segment`](super::segment::Segment) with its outline, and a variant of `description` that constructs it. Except for
+//! `Path::as_spiral`, no other code of `model` matches on kinds of curves. A default method is valid for every curve;
+//! the default of a bound only makes a search slower.
 
 use super::double_double::DoubleDouble;
 use super::team::Team;
@@ -75,7 +75,7 @@ impl Follower {
 pub struct ReachedDisc {
     /// Centre of the disc.
     pub centre: Point,
-    /// Radius of the disc, metres.
+    /// The radius of the disc, in metres.
     pub radius: f64,
     /// Radius, metres, of the circle about the origin with the same property for boards on an inward spiral about it.
     pub about_origin: f64,

@@ -1,5 +1,5 @@
-//! A path by its numbers in a scene: from them [`Path`] is built in doubles, and the reference builds its path with
-//! more digits.
+//! A path by its numbers in a scene. [`Path`] is built from them in doubles, and the reference builds its path from
+//! them with more digits.
 
 use super::curve::Side;
 use super::double_double::DoubleDouble;
@@ -11,22 +11,22 @@ use super::spiral::Direction;
 pub enum PathDescription {
     /// Inward to the centre: see [`Path::spiral`].
     Spiral {
-        /// Metres per turn.
+        /// The pitch, in metres per turn.
         pitch: f64,
         /// The turn on which the head starts.
         start_turn: f64,
     },
     /// Inward, through an S of two arcs, and outward: see [`Path::turnaround`].
     Turnaround {
-        /// Metres per turn.
+        /// The pitch, in metres per turn.
         pitch: f64,
-        /// Metres from the centre at which the turn begins.
+        /// The distance from the centre at which the turn begins, in metres.
         turn_radius: f64,
         /// The radius of the first arc over the radius of the second.
         arc_ratio: f64,
-        /// Metres of travel before the turn.
+        /// The travel before the turn, in metres.
         lead_in: f64,
-        /// Metres of travel after it.
+        /// The travel after it, in metres.
         lead_out: f64,
     },
     /// Lines, arcs and spirals: see [`Path::route`]. The head starts at the origin of the path's own coordinates; a
@@ -47,14 +47,14 @@ const FEW_PIECES: usize = 31;
 pub enum RouteStep {
     /// Straight on.
     Line {
-        /// Metres.
+        /// The length, in metres.
         length: f64,
     },
     /// Along a circle.
     Arc {
         /// The side on which the circle's centre is.
         side: Side,
-        /// Metres.
+        /// The radius, in metres.
         radius: f64,
         /// Change of direction, in turns (90 degrees are a quarter).
         turns: DoubleDouble,
@@ -65,11 +65,12 @@ pub enum RouteStep {
         side: Side,
         /// Towards the centre or away from it.
         direction: Direction,
-        /// Metres per turn.
+        /// The pitch, in metres per turn.
         pitch: f64,
-        /// Metres from the centre to its beginning.
+        /// The distance from the centre to its beginning, in metres.
         radius: f64,
-        /// Turns around the centre: its end is `pitch` times as many metres nearer to the centre, or further away.
+        /// The number of turns around the centre: its end is `pitch` times as many metres nearer to the centre, or
+        /// further away.
         turns: DoubleDouble,
     },
 }

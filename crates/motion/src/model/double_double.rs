@@ -1,7 +1,5 @@
-//! Numbers of about 32 digits as the sum of two doubles, for coordinates along a path. Far along a path, one double
-//! lacks the digits for a link's length.
-//!
-//! The curves and the reference solver call it.
+//! Numbers of about 32 digits as the sum of two doubles, for coordinates along a path, because far along a path one
+//! double lacks the digits for a link's length.
 
 use std::f64::consts::TAU;
 
@@ -44,7 +42,7 @@ impl DoubleDouble {
         Self { high, low }
     }
 
-    /// Returns the angle of a number of turns, radians.
+    /// Returns the angle of a number of turns, in radians.
     pub fn from_turns(turns: impl Into<Self>) -> Self {
         let Self { high: turns, low } = turns.into();
         let high = TAU * turns;

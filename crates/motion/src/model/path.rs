@@ -1,8 +1,8 @@
 //! The path that the handles ride: segments one after the other without a gap or a corner, travelled by arc length. A
 //! spiral is a path of one segment.
 //!
-//! Scenes construct it; the linkage, the solvers and the events use it. The head starts at distance 0. A path reaches
-//! as far behind its start as any team needs, and ends at [`Path::length`].
+//! The head starts at distance 0. A path reaches as far behind its start as any team needs, and ends at
+//! [`Path::length`].
 
 use std::f64::consts::TAU;
 
@@ -46,9 +46,9 @@ impl Param {
 pub struct Disjoint {
     /// The later of the two segments, counted from 0.
     pub segment: usize,
-    /// Metres between the end of one and the start of the other.
+    /// The distance between the end of one and the start of the other, in metres.
     pub gap: f64,
-    /// Radians between their directions.
+    /// The angle between their directions, in radians.
     pub corner: f64,
 }
 
@@ -56,15 +56,15 @@ pub struct Disjoint {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Placed {
     segment: Segment,
-    /// Metres of travel at which it begins; minus infinity for the first.
+    /// The travel at which it begins, in metres; minus infinity for the first.
     begin: f64,
-    /// Metres of travel at which it ends.
+    /// The travel at which it ends, in metres.
     end: f64,
-    /// Coordinate of its beginning. For the first segment: of the head's start or of the segment's end, whichever is
-    /// earlier. And the metres of travel there.
+    /// The coordinate of its beginning and the travel there, in metres. For the first segment this is the head's start
+    /// or the segment's end, whichever is earlier.
     anchor: Coordinate,
     anchor_travelled: f64,
-    /// Coordinate of its end.
+    /// The coordinate of its end.
     last: Coordinate,
 }
 
@@ -119,8 +119,9 @@ impl Path {
     /// turned by half a turn. Travel starts `lead_in` metres before the turn and ends `lead_out` metres after it.
     ///
     /// With R = `turn_radius` the chords of both arcs lie on the diameter through the two ends. They make the same
-    /// angle atan(R/a) with the tangents there. So both arcs turn by twice that angle. Their radii sum to sqrt(R^2 +
-    /// a^2), and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), for any `arc_ratio`, the first radius over the second.
+    /// angle atan(R/a) with the tangents there, so both arcs turn by twice that angle. Their radii sum to sqrt(R^2 +
+    /// a^2), and their lengths to 2 sqrt(R^2 + a^2) atan(R/a), for any `arc_ratio`, which is the first radius over the
+    /// second.
     ///
     /// # Errors
     /// [`Disjoint`] if the numbers are so extreme that rounding leaves a gap.

@@ -1,4 +1,4 @@
-//! A spiral piece of a route. It is a mirrored, rotated and moved [`Spiral`]: one of its places becomes a given point
+//! A spiral piece of a route: a [`Spiral`] mirrored, rotated and moved so that one of its places becomes a given point
 //! with a given direction of travel.
 
 use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc, Side};

@@ -80,13 +80,13 @@ forward! {
 /// The outline of a segment, for drawings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SegmentOutline {
-    /// Kind of the curve.
+    /// The kind of the curve.
     pub kind: OutlineKind,
     /// Its first point.
     pub start: Point,
-    /// Direction of travel there, radians counter-clockwise from x.
+    /// The direction of travel there, radians counter-clockwise from x.
     pub heading: f64,
-    /// Metres along it.
+    /// The length along it, in metres.
     pub length: f64,
 }
 
@@ -104,14 +104,14 @@ pub enum OutlineKind {
     Spiral {
         /// Towards the centre or away from it.
         direction: Direction,
-        /// Metres per turn.
+        /// The pitch, in metres per turn.
         pitch: f64,
-        /// Polar angle of its beginning on the unturned spiral, radians.
+        /// Polar angle of its beginning on the unturned spiral, in radians.
         first: f64,
-        /// Polar angle of its end on the unturned spiral, radians.
+        /// Polar angle of its end on the unturned spiral, in radians.
         last: f64,
-        /// Curvature at its beginning, 1/m, positive to the left. It is given for a piece of a route, and for a spiral
-        /// that a placement moves, turns or mirrors. It is NaN for a spiral about the origin.
+        /// The curvature at its beginning, 1/m, positive to the left. It is given for a piece of a route, and for a
+        /// spiral that a placement moves, turns or mirrors. It is NaN for a spiral about the origin.
         curvature: f64,
     },
 }

@@ -1,12 +1,12 @@
 //! The distance of two boards. Every value is **positive apart, negative overlapping, zero touching**, in metres.
 //!
-//! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). Overlapping: minus
-//!   the least translation that parts the boards. Apart: at most the distance, and equal to it unless two corners are
-//!   nearest.
-//! - [`signed_distance_board_board`] (its points: [`closest_points_board_board`]): the Euclidean distance apart, the
-//!   separation overlapping.
+//! - [`separation_board_board`]: the largest gap along an edge normal (the separating axis theorem). If the boards
+//!   overlap, this is minus the least translation that parts them. If they are apart, it is at most their distance, and
+//!   equal to it unless two corners are the nearest points.
+//! - [`signed_distance_board_board`] (its points: [`closest_points_board_board`]): the Euclidean distance if the boards
+//!   are apart, and the separation if they overlap.
 //!
-//! Positions are subtracted first. So the error is a few units in the last place of the boards' size and of their
+//! Positions are subtracted first, so the error is a few units in the last place of the boards' size and of their
 //! distance, plus the rounding of the centres. Swapping the boards gives the same bits.
 
 use super::board::Board;
@@ -72,7 +72,7 @@ pub fn circle_bound_board_board(a: &Board, b: &Board) -> f64 {
     (b.centre - a.centre).norm() - (a.circle_radius() + b.circle_radius())
 }
 
-/// Returns the signed separation by the separating axis theorem, metres: never more than the clearance.
+/// Returns the signed separation by the separating axis theorem, in metres: never more than the clearance.
 ///
 /// The normals of the Minkowski difference's edges are those of the boards. So the largest of the four gaps is minus
 /// the least translation if all are negative (Ericson, Real-Time Collision Detection, section 4.4).
@@ -83,7 +83,7 @@ pub fn separation_board_board(a: &Board, b: &Board) -> f64 {
     along_a.max(across_a).max(along_b.max(across_b))
 }
 
-/// Returns the clearance, metres: the Euclidean distance apart, minus the least translation that parts the boards
+/// Returns the clearance, in metres: the Euclidean distance apart, minus the least translation that parts the boards
 /// overlapping.
 ///
 /// The nearest points of two convex polygons that are apart include a corner of one of them.

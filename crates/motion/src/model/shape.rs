@@ -1,11 +1,11 @@
-//! Shapes that stand on the stage, and the signed distance of a board to each. The ground calls this module, which is
-//! independent of team, path and keep-out.
+//! Shapes that stand on the stage, and the signed distance of a board to each. They are independent of team, path and
+//! keep-out.
 //!
-//! The signed distance is positive apart, in metres: the Euclidean distance. It is negative where the board and the
-//! shape overlap: minus the least translation that frees the board (`escape`). The shape of a boundary is the plane
-//! outside its polygon.
+//! The signed distance is in metres. Where board and shape are apart, it is the Euclidean distance; where they overlap,
+//! it is minus the least translation that frees the board (`escape`). The shape of a boundary is the plane outside its
+//! polygon.
 //!
-//! Corners are first taken to the board's frame. So the error is a few units in the last place of the board's size, of
+//! Corners are first taken to the board's frame, so the error is a few units in the last place of the board's size, of
 //! the distance, and of the coordinates.
 
 mod escape;
@@ -38,7 +38,7 @@ pub struct Shape {
     kind: ShapeKind,
     /// The corners, or the centre of a circle.
     points: Vec<Point>,
-    /// Metres; 0 unless the shape is a circle.
+    /// The radius, in metres; 0 unless the shape is a circle.
     radius: f64,
     /// The sense of a convex shape: 1 if its corners stand counter-clockwise, -1 if clockwise, 0 for a circle or a
     /// segment.
@@ -111,7 +111,7 @@ impl Shape {
         &self.points
     }
 
-    /// Returns the radius of a circle, metres; 0 for other kinds.
+    /// Returns the radius of a circle, in metres; 0 for other kinds.
     pub fn radius(&self) -> f64 {
         self.radius
     }
@@ -155,7 +155,7 @@ impl Shape {
         }
     }
 
-    /// Returns a lower bound of [`signed_distance`](Self::signed_distance) from the circle about the board, metres.
+    /// Returns a lower bound of [`signed_distance`](Self::signed_distance) from the circle about the board, in metres.
     pub fn coarse_bound(&self, board: &Board) -> f64 {
         let radius = board.circle_radius();
         if self.kind != ShapeKind::Boundary {
@@ -169,7 +169,7 @@ impl Shape {
         if gap > 0.0 { gap } else { f64::NEG_INFINITY }
     }
 
-    /// Returns the signed distance of a board, metres; negative infinity if no translation frees the board from the
+    /// Returns the signed distance of a board, in metres; negative infinity if no translation frees the board from the
     /// plane outside a boundary.
     pub fn signed_distance(&self, board: &Board) -> f64 {
         self.signed_distance_below(board, f64::INFINITY)
@@ -295,14 +295,15 @@ impl Rectangle {
         hypot(beyond.x.max(0.0), beyond.y.max(0.0))
     }
 
-    /// Returns the signed separation of the box about a segment, metres: never more than the separation of the segment.
+    /// Returns the signed separation of the box about a segment, in metres: never more than the separation of the
+    /// segment.
     fn separation_of_box(&self, from: Vector, to: Vector) -> f64 {
         let gap = |one: f64, other: f64, half: f64| one.min(other).max(-one.max(other)) - half;
         gap(from.x, to.x, self.half.x).max(gap(from.y, to.y, self.half.y))
     }
 
-    /// Returns the signed separation of a segment by the separating axis theorem, metres. The separation is never more
-    /// than the distance. Where the segment and the rectangle overlap, it is minus the least translation.
+    /// Returns the signed separation of a segment by the separating axis theorem, in metres. The separation is never
+    /// more than the distance. Where the segment and the rectangle overlap, it is minus the least translation.
     fn separation(&self, from: Vector, to: Vector) -> f64 {
         let sides = self.separation_of_box(from, to);
         let along = to - from;

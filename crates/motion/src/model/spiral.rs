@@ -25,7 +25,7 @@ pub enum Direction {
     Outward,
 }
 
-/// The spiral. Its coordinate is the polar angle theta of the unturned spiral, radians.
+/// The spiral. Its coordinate is the polar angle theta of the unturned spiral, in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     pitch: f64,
@@ -62,13 +62,13 @@ impl Spiral {
         self.direction
     }
 
-    /// Returns the distance of a place from the centre, metres.
+    /// Returns the distance of a place from the centre, in metres.
     pub fn radius(&self, at: Coordinate) -> f64 {
         let DoubleDouble { high, low } = self.radius_per_radian;
         at.high.mul_add(high, at.high * low + at.low * high)
     }
 
-    /// Returns the arc length between `theta` and `theta - span`, metres.
+    /// Returns the arc length between `theta` and `theta - span`, in metres.
     ///
     /// The length follows from s = a/2 (theta w + asinh theta), w = sqrt(1 + theta^2). Both differences are written as
     /// products of the span, so that short spans far out keep all digits:
@@ -120,7 +120,7 @@ impl Spiral {
         }
     }
 
-    /// Returns the angle from a handle at radius `r` outward to the first point at the link's distance, radians.
+    /// Returns the angle from a handle at radius `r` outward to the first point at the link's distance, in radians.
     pub(crate) fn follower_angle(&self, r: f64, link: f64) -> Result<f64, NoFollower> {
         let a = self.radius_per_radian.high;
         let residual = self.chord_residual(r, link);
@@ -310,9 +310,9 @@ impl Curve for Spiral {
     }
 
     /// On the outward spiral, let the front handle be at theta and the rear one at theta - d. Then chord^2 = (a d)^2 +
-    /// 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta for fixed d. So
-    /// where that inequality holds at the follower it holds at all smaller d; d falls as theta grows, and it continues
-    /// to hold. The rear cosine is positive there, and the front one (see `pose`) is larger.
+    /// 4 a^2 theta (theta - d) sin^2(d/2) grows with d while tan(d/2) <= theta - d, and with theta for fixed d. So if
+    /// that inequality holds at the follower, it holds at all smaller d; and because d falls as theta grows, it
+    /// continues to hold. There the rear cosine is positive, and the front one (see `pose`) is larger.
     fn is_steady(&self, front: Coordinate, rear: Coordinate) -> bool {
         let d = front.minus(rear);
         self.direction == Direction::Outward && d < PI && tan(0.5 * d) < rear.high

@@ -6,13 +6,13 @@
 pub struct Team {
     /// The number of benches, at least 1; one less than the number of handles.
     pub benches: usize,
-    /// Metres along the head's board.
+    /// The length of the head's board, in metres.
     pub head_length: f64,
-    /// Metres along every other board.
+    /// The length of every other board, in metres.
     pub body_length: f64,
-    /// Metres across every board.
+    /// The width of every board, in metres.
     pub width: f64,
-    /// Metres from the centre of a handle's hole to the nearest end of the board.
+    /// The distance from the centre of a handle's hole to the nearest end of the board, in metres.
     pub hole_inset: f64,
 }
 
@@ -28,12 +28,12 @@ impl Team {
         board - 2.0 * self.hole_inset
     }
 
-    /// Returns the length of the shorter kind of link, metres.
+    /// Returns the length of the shorter kind of link, in metres.
     pub fn shortest_link(&self) -> f64 {
         self.link(0).min(self.link(1))
     }
 
-    /// Returns the length of the longer kind of link, metres.
+    /// Returns the length of the longer kind of link, in metres.
     pub fn longest_link(&self) -> f64 {
         self.link(0).max(self.link(1))
     }

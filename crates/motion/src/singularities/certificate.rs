@@ -1,35 +1,35 @@
 //! Proofs about a step of a link's front handle, from the configurations at its two ends.
 //!
 //! In: a link and two of its configurations. Out: that the follower map is continuous over the step, or that it jumps,
-//! and the number of turns of the rear handle. Only [`super`] calls it.
+//! and the number of turns of the rear handle.
 //!
 //! **Notation.** The front handle is at travel s in [s0, s1], h = s1 - s0, and u is a place behind it. P is the path, T
 //! its tangent, L the link, and D(s, u) = |P(s) - P(u)|. In the stretch concerned, the path's greatest curvature is k.
 //!
 //! **Continuous.** For fixed u, d2(D^2)/ds^2 = 2 (1 + (P(s) - P(u)) . P''(s)) lies within 2 (1 -+ k D). So over the
 //! step D^2 <= max(ends) + max(0, k D - 1) h^2 / 4 and D^2 >= min(ends) - (1 + k D) h^2 / 4.
-//! 1. With the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
+//! 1. By the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
 //!    step. D <= s - u proves this as far as s - u is less than L. From there the proof goes back in steps within which
-//!    D^2 cannot grow to L^2 ([`Link::nearer_throughout`]). So no nearer point comes to be at the link's distance.
-//! 2. With the second bound, a place `far` is further away than L throughout.
-//! 3. Between the two the distance grows backward: q(s, u) = T(u) . (P(s) - P(u)) > 0. This follows from its values at
-//!    the corners, |q_u| <= 1 + k D and |q_ss| <= k.
+//!    D^2 cannot grow to L^2 ([`Link::nearer_throughout`]), so no nearer point comes to be at the link's distance.
+//! 2. By the second bound, a place `far` is further away than L throughout.
+//! 3. Between the two the distance grows backward, that is, q(s, u) = T(u) . (P(s) - P(u)) > 0. This follows from its
+//!    values at the corners, because |q_u| <= 1 + k D and |q_ss| <= k.
 //!
-//! Hence there is one root between `far` and `near`. This root is the follower, and by 3 it moves continuously. Its
-//! cosine is at least min q / L.
+//! Hence there is exactly one root between `far` and `near`. This root is the follower, and because of 3 it moves
+//! continuously. Its cosine is at least min q / L.
 //!
-//! **Jump.** Let a place strictly between the two followers be nearer than L throughout, by the first bound. Then no
-//! follower passes this place, and the follower map has a discontinuity in the step.
+//! **Jump.** If a place strictly between the two followers is nearer than L throughout, by the first bound, then no
+//! follower passes this place, so the follower map has a discontinuity in the step.
 //!
-//! **Turns.** Let f be the front cosine, the rear cosine at least c, and m = max |f| over the step. The rear handle is
-//! at most m / c times as fast as the front handle. The link turns by at most (1 + m / c) / L per metre. So |f'| <= k +
-//! (1 + m / c) / L, and m is at most max(ends) + |f'| h / 2. Then f has no zero where |f0| + |f1| > max |f'| h.
-//! Further, with signed curvature K and normal n, f' = K n . b + (1 - f^2 - v t . t') / L. Here |v| <= m / c, and t and
-//! t' are the parts of the two tangents across the link. Where f' keeps its sign, f has at most one zero.
+//! **Turns.** Let f be the front cosine, let the rear cosine be at least c, and let m = max |f| over the step. The rear
+//! handle is at most m / c times as fast as the front handle, so the link turns by at most (1 + m / c) / L per metre.
+//! Hence |f'| <= k + (1 + m / c) / L, and m is at most max(ends) + |f'| h / 2. So f has no zero where |f0| + |f1| > max
+//! |f'| h. Further, f' = K n . b + (1 - f^2 - v t . t') / L, with the signed curvature K and the normal n. Here |v| <= m / c, and t and t' are the parts of the two tangents across the link. Where f' keeps its sign, f has at most one zero.
 //!
 //! All these bounds tighten in proportion to the step. The quantities that they must not exceed are f, c, and the
-//! difference of a nearer point's distance to L. These quantities fall in proportion to the distance from a singular
-//! configuration, even where all of them vanish at once. So the steps shrink in geometric progression towards it.
+//! difference of a nearer point's distance to L. These fall only in proportion to the distance from a singular
+//! configuration, even where all of them vanish at once. Therefore the steps shrink in geometric progression towards
+//! it.
 
 use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::curve::Curve;
@@ -40,16 +40,16 @@ use crate::model::{Point, Vector};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Link<'a> {
     pub path: &'a Path,
-    /// Metres between its handles.
+    /// The distance between its handles, in metres.
     pub length: f64,
 }
 
 /// A link with its front handle at one place.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Configuration {
-    /// Metres of travel of the front handle.
+    /// The travel of the front handle, in metres.
     pub front: f64,
-    /// Metres of travel of the rear handle.
+    /// The travel of the rear handle, in metres.
     pub rear: f64,
     /// t . b at the front handle: 0 is a stall.
     pub front_cosine: f64,
@@ -80,14 +80,14 @@ struct FrontCurvature {
     side: f64,
 }
 
-/// Distances from the front handle at both ends of a step to one place behind.
+/// The distances from the front handle at both ends of a step to one place behind.
 struct Distances {
     param: Param,
     /// 1/m, not negative.
     curvature: f64,
     /// The least square of the distance, m^2.
     square: f64,
-    /// The least q = T . (P(s) - P(u)), metres: growth of half the square per metre backward.
+    /// The least q = T . (P(s) - P(u)), in metres: growth of half the square per metre backward.
     slope: f64,
     /// The greatest |q_u|: half the second derivative of the square by u.
     second_derivative_bound: f64,
@@ -118,7 +118,7 @@ impl Link<'_> {
         })
     }
 
-    /// Returns the rounding of a place of the front handle, metres.
+    /// Returns the rounding of a place of the front handle, in metres.
     pub fn resolution(&self, at: &Configuration) -> f64 {
         8.0 * f64::EPSILON * (at.front.abs() + self.length + at.front_point.coords.norm())
     }
@@ -310,7 +310,7 @@ impl Link<'_> {
     }
 }
 
-/// Places between two followers at which a proof of a jump is tried. Nearly all of them succeed: up to the further
+/// The places between two followers at which a proof of a jump is tried. Nearly all of them succeed: up to the further
 /// follower every place is nearer than the link, in one of the two configurations at least.
 const JUMP_SAMPLES: i32 = 32;
 

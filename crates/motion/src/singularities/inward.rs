@@ -1,10 +1,9 @@
 //! A link on the inward spiral: its lock in closed form, its turns by bisection, for any number of turns of the spiral.
 //!
-//! In: a link whose path begins with an inward spiral. Out: the lock and the turns on that segment. Only the trace
-//! calls it.
+//! In: a link whose path begins with an inward spiral. Out: the lock and the turns on that segment.
 //!
-//! **Lock.** The chord for fixed d grows with theta and up to its first maximum with d. So no nearer point ever reaches
-//! the link's distance, and the follower vanishes only at the fold (`Spiral::fold`).
+//! **Lock.** For fixed d the chord grows with theta, and up to its first maximum it grows with d. So no nearer point
+//! ever reaches the link's distance, and the follower vanishes only at the fold (`Spiral::fold`).
 //!
 //! **Turns.** Let theta be the front handle's angle, d the angle from there to the follower, and t = tan(d/2). The
 //! front cosine has the sign of N = d + (theta + d) sin d (theta - t). This is the sign of sin d times g = theta^2 - (t
@@ -17,8 +16,8 @@
 //! - 3 pi/2 < d < 2 pi: again g has one positive zero, at most sqrt(d |cot d|). So (1 - t^2)/2 theta < d / sin^2 d, and
 //!   the zero too grows with d. The link comes to that curve at most once, where the stall ends.
 //!
-//! Before a fold d < 2 pi. Without a fold the link is shorter than the pitch. So d, which is link / a at the centre, is
-//! less than 2 pi, too. From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2, and there are neither
+//! Before a fold d < 2 pi. Without a fold the link is shorter than the pitch, so d, which is link / a at the centre, is
+//! less than 2 pi, too. From theta = max(1, link / a) outward sin(d/2) <= link / (2 r) <= 1/2, so there are neither
 //! stalls nor locks.
 
 use std::f64::consts::PI;
@@ -32,7 +31,7 @@ use super::certificate::{Configuration, Link};
 /// The singular configurations of a link while its front handle is on the inward spiral.
 #[derive(Debug, Default)]
 pub(super) struct InwardSingularities {
-    /// Metres of travel of the front handle at which the rear one turns round.
+    /// The places of the front handle, in metres of travel, at which the rear one turns round.
     pub turns: Vec<f64>,
     /// The last place of the front handle with a follower.
     pub lock: Option<f64>,
@@ -69,7 +68,7 @@ pub(super) fn singularities(link: &Link) -> InwardSingularities {
 
 struct Inward<'a> {
     link: &'a Link<'a>,
-    /// Metres of travel at which the segment ends.
+    /// The travel at which the segment ends, in metres.
     end: f64,
     /// The polar angle of the front handle at which the follower vanishes.
     fold: Option<f64>,

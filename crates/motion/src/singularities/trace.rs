@@ -2,13 +2,14 @@
 //! lock.
 //!
 //! In: a link and the start of its front handle. Out: turns and end, in metres of travel of the front handle. The
-//! search advances it step by step. An uncertain step is halved, the earlier half first, down to the resolution.
+//! search advances the link step by step. An uncertain step is halved, the earlier half first, down to the resolution.
 //!
-//! **At the resolution.** An unresolved stretch begins where a step of a few units in the last place is uncertain. Each
-//! further step in it may be as long as the stretch is already. Near a degenerate configuration, the effect of rounding
-//! grows in proportion to the distance from it. Over the whole stretch a jump is searched, and the signs of the front
-//! cosine at its ends are compared. A lock is a proven jump, found to the last digit; everything else is a graze. Jumps
-//! of less than about 1e-8 links and pairs of turns within one such stretch are below the resolution of doubles.
+//! **At the resolution.** An unresolved stretch begins where a step of a few units in the last place is uncertain. Near
+//! a degenerate configuration the effect of rounding grows in proportion to the distance from it, so each further step
+//! in the stretch may be as long as the stretch is already. Over the whole stretch a jump is searched, and the signs of
+//! the front cosine at its ends are compared. A lock is a proven jump, found to the last digit; everything else is a
+//! graze. Jumps of less than about 1e-8 links, and pairs of turns within one such stretch, are below the resolution of
+//! doubles.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -30,10 +31,10 @@ pub(super) enum TraceEnd {
     Undecided,
 }
 
-/// Cost of a bisection to the last digit, in links solved.
+/// The cost of a bisection to the last digit, in links solved.
 const BISECTION_WORK: u64 = 64;
 
-/// Cost of each link's length of a winding path, in links solved.
+/// The cost of each link's length of a winding path, in links solved.
 const WINDING_WORK: f64 = 32.0;
 
 /// The longest step that the certificates allow, in links.
@@ -48,9 +49,9 @@ pub(super) struct LinkTrace<'a> {
     at: Configuration,
     /// Configurations further on, the nearest last: the ends of uncertain steps.
     ahead: Vec<Configuration>,
-    /// Length of the next step, metres.
+    /// The length of the next step, in metres.
     step: f64,
-    /// Beginning of the unresolved stretch.
+    /// The beginning of the unresolved stretch.
     unresolved: Option<Configuration>,
     turns: Vec<f64>,
     furthest_rear: f64,
@@ -167,7 +168,7 @@ impl<'a> LinkTrace<'a> {
         self.ahead.pop();
     }
 
-    /// Returns the longest step that may be taken without a proof, metres.
+    /// Returns the longest step that may be taken without a proof, in metres.
     fn finest_step(&self) -> f64 {
         let stretch = self.unresolved.map_or(0.0, |start| self.at.front - start.front);
         stretch.min(LONGEST_UNRESOLVED * self.link.length).max(self.link.resolution(&self.at))

@@ -1,6 +1,6 @@
-//! The safe solver: exact motion along the arc, each follower found by a bracketed Newton iteration.
+//! The safe solver: exact motion along the arc, in which each follower is found by a bracketed Newton iteration.
 //!
-//! The safe solver is right wherever there is a solution, and every faster solver falls back to it.
+//! It is right wherever there is a solution, so every faster solver falls back to it.
 
 use super::{Chain, ChainMut, Solver, Velocities};
 use crate::linkage::{NoFollower, follower, link_pose};

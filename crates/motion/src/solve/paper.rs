@@ -18,11 +18,11 @@ use crate::model::team::Team;
 /// The parameters of the paper, which a scene may change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperRules {
-    /// Seconds of one Euler step of the head.
+    /// The time of one Euler step of the head, in seconds.
     pub time_step: f64,
-    /// Seconds over which a speed is a difference of positions.
+    /// The interval over which a speed is a difference of positions, in seconds.
     pub difference_interval: f64,
-    /// Radians at which the bisection for a follower stops.
+    /// The angle at which the bisection for a follower stops, in radians.
     pub bisection_tolerance: f64,
 }
 
@@ -78,7 +78,7 @@ impl EulerHead {
         Self { start, time_step, advance: head_speed * time_step / spiral.radius_per_radian(), steps: 0, theta: start }
     }
 
-    /// Returns the angle at a printed time, radians; 0 once the centre is reached.
+    /// Returns the angle at a printed time, in radians; 0 once the centre is reached.
     fn theta_at(&mut self, time: f64) -> f64 {
         let steps = (time / self.time_step).round() as u64 + 1;
         if steps < self.steps {
@@ -103,7 +103,7 @@ pub fn time_of_theta(spiral: &Spiral, start: f64, head_speed: f64, theta: f64) -
     0.5 * spiral.radius_per_radian() * (start - theta) * (start + theta) / head_speed
 }
 
-/// Finds the angle to the follower of a handle at `theta` by bisection to `tolerance`, radians.
+/// Finds the angle to the follower of a handle at `theta` by bisection to `tolerance`, in radians.
 fn bisected_follower_angle(spiral: &Spiral, theta: f64, link: f64, tolerance: f64) -> Result<f64, NoFollower> {
     let residual = spiral.chord_residual(spiral.radius_per_radian() * theta, link);
     let (mut low, mut high) = (0.0, PI);

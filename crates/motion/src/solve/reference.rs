@@ -1,9 +1,9 @@
-//! The chain to more than 30 digits, by an independent method: the solvers are measured against it.
+//! The chain to more than 30 digits, by an independent method, against which the solvers are measured.
 //!
 //! In: a path by the numbers of the scene, a team and a time. Out: every handle as sums of two doubles. Points are
-//! Cartesian, and the condition on a follower is the plain distance of two points; no formula is rearranged to save
-//! digits. The method shares only names with the path, the linkage and the solvers in doubles. The method takes some
-//! milliseconds per frame. `trade` and tests call it; a scene computes with it the turns of a spiral whose length is
+//! Cartesian, and the condition on a follower is the plain distance of two points, because no formula is rearranged to
+//! save digits. The method shares only names with the path, the linkage and the solvers in doubles, and takes some
+//! milliseconds a frame. `trade` and tests use it, and so does a scene, for the turns of a spiral whose length is
 //! given.
 
 mod curve;
@@ -27,11 +27,11 @@ use crate::model::team::Team;
 /// One handle of the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceHandle {
-    /// Metres to the right of the centre.
+    /// The coordinate to the right of the centre, in metres.
     pub x: DoubleDouble,
-    /// Metres up from the centre.
+    /// The coordinate up from the centre, in metres.
     pub y: DoubleDouble,
-    /// Signed speed along the path, metres per second.
+    /// Signed speed along the path, in metres per second.
     pub speed: f64,
 }
 
@@ -40,9 +40,9 @@ pub struct ReferenceHandle {
 pub struct Piece {
     /// Towards the centre or away from it.
     pub direction: Direction,
-    /// Metres per turn.
+    /// The pitch, in metres per turn.
     pub pitch: f64,
-    /// Metres from the centre to its beginning.
+    /// The distance from the centre to its beginning, in metres.
     pub radius: f64,
 }
 

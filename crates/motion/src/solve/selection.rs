@@ -1,13 +1,13 @@
-//! Selects the table for a requested accuracy. Among the tables measured to meet the accuracy on this path with this
-//! team, the selected table reads the fewest bytes per handle.
+//! The selection of the table for a requested accuracy. Among the tables measured to meet the accuracy on this path
+//! with this team, the selected table reads the fewest bytes per handle.
 //!
 //! In: the motion and the requested accuracy. Out: a table with its measured error. The same request gives the same
-//! table in every run: cost is counted in bytes, never timed. [`crate`] and `trade` call this module.
+//! table in every run, because cost is counted in bytes, never timed.
 //!
 //! Every candidate starts from one table of T whose polynomials have an error of a sixteenth of the requested accuracy.
-//! The loss of a format is bounded over all phases while the format is made. Then frames are compared with the safe
-//! solver's at test points over the whole path: positions, and velocities where they are computed. Test points include
-//! junctions, kinks and the last metres of the table. Half the requested accuracy is left for the error between them.
+//! While a format is made, its loss is bounded over all phases. Then frames are compared with the safe solver's at test
+//! points over the whole path, which include junctions, kinks and the last metres of the table: positions, and
+//! velocities where they are computed. Half the requested accuracy is left for the error between the test points.
 
 use std::time::{Duration, Instant};
 
@@ -18,8 +18,8 @@ use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::team::Team;
 
-/// Greatest numbers of test points: spread over the path, at each junction, where handles cross junctions, and towards
-/// the table's end.
+/// The greatest numbers of test points: spread over the path, at each junction, where handles cross junctions, and
+/// towards the table's end.
 const SPREAD_TEST_POINTS: usize = 200;
 const JUNCTION_TEST_POINTS: usize = 60;
 const KINK_TEST_POINTS: usize = 300;
@@ -67,18 +67,18 @@ pub fn link_tolerance(team: &Team, accuracy: f64) -> f64 {
 pub struct Selection {
     /// The solver.
     pub table: FollowerTable,
-    /// Metres: the requested accuracy, or a thousandth of the shortest link if that is less.
+    /// The requested accuracy, in metres, or a thousandth of the shortest link if that is less.
     pub accuracy: f64,
-    /// Metres: the largest distance of a handle from the safe solver's.
+    /// The largest distance of a handle from the safe solver's, in metres.
     pub error: f64,
-    /// Greatest measured error that is accepted, metres: the share of the requested accuracy, or the rounding of
+    /// The greatest measured error that is accepted, in metres: the share of the requested accuracy, or the rounding of
     /// doubles if that is more.
     pub allowed: f64,
-    /// Greatest measured error of a velocity, as a part of the accepted error; 0 without velocities.
+    /// The greatest measured error of a velocity, as a part of the accepted error; 0 without velocities.
     pub speed_error: f64,
     /// The number of test points.
     pub test_points: usize,
-    /// Time to make all candidates and to measure them.
+    /// The time to make all candidates and to measure them.
     pub made_in: Duration,
 }
 
@@ -94,8 +94,8 @@ impl Selection {
     }
 }
 
-/// Returns the cheapest table for `accuracy` metres, or the most exact table if none meets the accuracy. Returns `None`
-/// if there is no table for this team and path.
+/// Returns the cheapest table for `accuracy` metres, or the most exact table if none meets the accuracy, or `None` if
+/// there is no table for this team and path.
 ///
 /// Positions are within max(accuracy, 8 eps (r + distance travelled)), headings within 2 accuracy / link, and
 /// velocities within 10 accuracy / link of a handle's speed. So extrapolation over a tenth of a link adds one accuracy.

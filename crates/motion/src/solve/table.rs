@@ -1,9 +1,10 @@
-//! The cheapest solver: every frame is interpolated in a table of the places of a chain of equal links, made once.
+//! The cheapest solver: every frame is interpolated in a table of the places of a chain of equal links, which is made
+//! once.
 //!
 //! In: the time. Out: the chain, as exact as the safe solver's, on any path that begins with a straight line or an
 //! inward spiral. A frame does not depend on earlier frames. The table covers the travel for which it was measured to
 //! be exact. Beyond it, in the last metres before a lock or a stall within the body, the safe solver is used, and
-//! [`FollowerTable::fallbacks`] counts these frames. The show calls the table through [`Solver`].
+//! [`FollowerTable::fallbacks`] counts these frames.
 
 mod band;
 mod beginning;
@@ -115,12 +116,12 @@ pub struct FollowerTable {
     head: Arc<HeadTable>,
     newton: Newton,
     fallbacks: u64,
-    /// Greatest error of its frames, metres.
+    /// The greatest error of its frames, in metres.
     accuracy: f64,
     exact_bytes_per_handle: f64,
 }
 
-/// Greatest error of the frames of the most exact table, metres, on any path but the farthest.
+/// The greatest error of the frames of the most exact table, metres, on any path but the farthest.
 pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {

@@ -3,8 +3,8 @@
 //!
 //! Names and units follow Prometheus ("Metric and label naming"): seconds, bytes, metres, `_total` for counts. Every
 //! sample has the publisher's name as its label `name`, and the name of one of several dragons as its label `dragon`.
-//! Each new value of a label makes a new series. So only one sample has the run as a label, and an alert has no label
-//! with the number of a bench. An alert has labels with dragons and obstacles.
+//! Each new value of a label makes a new series. So only one sample has the run as a label, and an alert has labels
+//! with dragons and obstacles, but none with the number of a bench.
 
 use super::exposition::{Family, Kind};
 use crate::monitor::{IntervalReport, Presence};

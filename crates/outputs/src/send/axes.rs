@@ -46,7 +46,7 @@ impl Axes {
     }
 
     /// Returns a turn by `heading` radians from x towards y as axis times angle, in the receiver's axes. In any axes, a
-    /// positive turn about the first axis is from the second towards the third. So axes of the other handedness reverse
+    /// positive turn about the first axis is from the second towards the third, so axes of the other handedness reverse
     /// the turn.
     pub fn rotation(&self, heading: f64) -> [f64; 3] {
         let sign = self.handedness();

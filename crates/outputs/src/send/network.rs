@@ -1,8 +1,7 @@
 //! Datagrams over UDP and IPv4. In: bytes. Out: datagrams, and a line in the log when a destination fails or works
 //! again.
 //!
-//! A receiver that is gone costs nothing: the socket is not connected, so that no error of the receiver's machine
-//! reaches it.
+//! A receiver that is gone causes no error here, because the socket is not connected.
 
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, ToSocketAddrs, UdpSocket};
 

@@ -1,8 +1,9 @@
 //! The OSC messages (Open Sound Control 1.0), one function for each address. In: the messages of a publisher. Out: OSC
-//! messages whose arguments always have the same types. Pure; called by the [`sender`](super::osc_sender).
+//! messages whose arguments always have the same types. Pure.
 //!
-//! `docs/sending.md` lists the addresses. Users set up desks by hand, so handles and benches count from 1. The number
-//! of no bench is -1. The number of no time or no clearance is [`NEVER`], which is above every threshold of a desk.
+//! `docs/sending.md` lists the addresses. Handles and benches count from 1, because users set up desks by hand. The
+//! number of no bench is -1. The number of no time or no clearance is [`NEVER`], which is above every threshold of a
+//! desk.
 
 use rosc::encoder::encode;
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType};

@@ -1,5 +1,4 @@
-//! The times at which OSC messages are sent. In: the events of a feed. Out: datagrams by [`osc`](super::osc). Called by
-//! `send osc`.
+//! The times at which OSC messages are sent. In: the events of a feed. Out: datagrams by [`osc`](super::osc).
 
 use std::time::{Duration, Instant};
 
@@ -18,7 +17,7 @@ pub const MOST_RATE: u32 = 60;
 const COUNTDOWN_INTERVAL: Duration = Duration::from_millis(100);
 /// Resend interval of an unchanged state, for late receivers.
 const STATE_INTERVAL: Duration = Duration::from_secs(1);
-/// Time before the first received frame within which a cue is sent: connecting takes a moment, and a show can begin
+/// The time before the first received frame within which a cue is sent: connecting takes a moment, and a show can begin
 /// with a cue.
 const CUE_GRACE_NS: u64 = 1_000_000_000;
 

@@ -1,9 +1,9 @@
 //! The packets of PosiStageNet 2.03 (VYV and MA Lighting, "PosiStageNet protocol description v2.03", 2019). In:
-//! trackers, names, timestamps. Out: the bytes of UDP packets. Pure; called by the [`sender`](super::psn_sender).
+//! trackers, names, timestamps. Out: the bytes of UDP packets. Pure.
 //!
 //! All is little-endian. A chunk is a header of 32 bits and its content. Bits 0 to 15 of the header are its id, and
 //! bits 16 to 30 the length of the content. Bit 31 is set if the content is chunks. A frame is split into packets that
-//! all have its number and their count. A receiver puts them together, so they are sent back to back.
+//! all have its number and their count. They are sent back to back, because a receiver puts them together.
 
 /// The greatest size of a packet: an Ethernet frame of 1,500 bytes without the headers of IP and UDP. The protocol
 /// allows 1,500 bytes, which would be fragmented.
@@ -35,15 +35,15 @@ const PACKET_COUNT_AT: usize = 4 + 4 + 11;
 pub struct Tracker {
     /// Its number.
     pub id: u16,
-    /// Metres.
+    /// The position, in metres.
     pub position: [f32; 3],
-    /// Metres per second; left out of the packet if it is not known.
+    /// The speed, in metres per second; left out of the packet if it is not known.
     pub speed: Option<[f32; 3]>,
     /// The axis of its rotation; the length of the vector is the angle in radians.
     pub orientation: [f32; 3],
     /// 1 if the position is valid, 0 if it is not known any more.
     pub status: f32,
-    /// Microseconds from the sender's start to the moment of the position.
+    /// The time from the sender's start to the moment of the position, in microseconds.
     pub timestamp_us: u64,
 }
 

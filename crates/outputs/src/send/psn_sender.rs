@@ -1,8 +1,9 @@
 //! Trackers for lighting desks: their choice, their times, and their state while no frames come. In: the events of the
-//! feeds of one publisher or several. Out: datagrams by [`psn`](super::psn). Called by `send psn`.
+//! feeds of one publisher or several. Out: datagrams by [`psn`](super::psn).
 //!
-//! A receiver takes the trackers of the latest frame as present. So each frame has the trackers of all publishers, each
-//! with the time of its position. There is one count of frames: a desk would mix the counts of two senders.
+//! A receiver counts as present only the trackers of the latest frame, so each frame has the trackers of all
+//! publishers, each with the time of its position. There is one count of frames, because a desk would mix up the counts
+//! of two senders.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
 //! The trackers of one publisher: their handles, names, positions and arrivals. In: frames. Out: trackers, which the
-//! [`sender`](super::psn_sender), its only caller, puts into packets.
+//! [`sender`](super::psn_sender) puts into packets.
 
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
 //! The commands of browsers to `<name>/control`: their authorization, their parsing, and their answers.
 //!
 //! In: the text of a message. Out: JSON. An [`Authorization`] exists only with `--control`. Its command client has a
-//! separate thread, so that no command delays a picture. Called by the server and by `browser`.
+//! separate thread, so that no command delays a picture.
 
 use serde::Deserialize;
 use serde_json::{Value, json};

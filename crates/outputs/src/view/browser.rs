@@ -1,8 +1,8 @@
-//! Sends the newest picture to one browser, at the browser's pace. Called by the server.
+//! Sends the newest picture to one browser, at the browser's pace.
 //!
-//! A socket's buffers hold seconds of frames, so a writable socket does not show that the browser has read. Each frame
-//! is therefore followed by a ping, which every WebSocket answers when it has read that far. At most [`MAX_IN_FLIGHT`]
-//! frames stay unanswered: a slow browser gets fewer frames, not later ones.
+//! A socket's buffers hold seconds of frames, so a writable socket does not show that the browser has read. Therefore a
+//! ping follows each frame, which every WebSocket answers when it has read that far. At most [`MAX_IN_FLIGHT`] frames
+//! stay unanswered, so that a slow browser gets fewer frames, but not later ones.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
 // One dragon of a publisher's show: its present pose, its path and colours, its lanterns and its part of the marks.
-// Called by publisher.js. Knows the words at its ends, and no canvas.
+// Knows the words at its ends, and no canvas.
 
 import { centreOf, obstaclesOf, pathOf } from "./drawing.js";
 import { STRIDE, speedOf } from "./hermite.js";

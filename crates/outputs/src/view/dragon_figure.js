@@ -1,6 +1,6 @@
 // The dragon's head and tail in three dimensions, for the view from a seat: balls of lit paper and tapered tufts.
-// Called by seat.js. Metres: `u` forward, `v` to the left, `w` up. The origin is 1.1 m behind the end of the head's
-// board, and at the end of the tail's board.
+// Metres: `u` forward, `v` to the left, `w` up. The origin is 1.1 m behind the end of the head's board, and at the end
+// of the tail's board.
 
 import { hash } from "./sprites.js";
 

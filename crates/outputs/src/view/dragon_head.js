@@ -1,5 +1,5 @@
-// The dragon's head and tail of the lantern look, seen from above, each drawn once. Called by lanterns.js. Both look to
-// the right; lengths are metres before they are enlarged.
+// The dragon's head and tail of the lantern look, seen from above, each drawn once. Both look to the right; lengths are
+// metres before they are enlarged.
 
 import { blank } from "./sprites.js";
 

@@ -1,7 +1,7 @@
-//! Facts about scenes that no publisher sends, since they take time to compute.
+//! Facts about scenes that no publisher sends, because they take time to compute.
 //!
-//! In: the text of a scene, and the function that computes. Out: the facts, by the hash of the text. The command has
-//! the function, so that this crate needs no solver; the reader of each publisher requests the facts of its scene.
+//! In: the text of a scene, and the function that computes. Out: the facts, by the hash of the text. The function is a
+//! parameter, so that this crate needs no solver. The reader of each publisher requests the facts of its scene.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -22,7 +22,7 @@ pub struct SceneFacts {
     pub clearance: Option<ClearanceCurve>,
 }
 
-/// The clearance over a show, metres.
+/// The clearance over a show, in metres.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClearanceCurve {
     /// Points in order of time: simulated seconds, and metres, negative where boards overlap.
@@ -36,7 +36,7 @@ pub struct ClearanceCurve {
 pub struct LeastOfShow {
     /// Simulated seconds.
     pub time: f64,
-    /// Metres.
+    /// The clearance, in metres.
     pub clearance: f64,
     /// The lower bench, from 0.
     pub bench_a: u32,

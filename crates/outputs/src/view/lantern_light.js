@@ -1,5 +1,5 @@
 // The light of a dragon's lanterns: red for a single dragon, a colour of its own for each of several. The middle
-// lantern of a board is gold for every dragon. Called by the looks of #show and #seat.
+// lantern of a board is gold for every dragon.
 
 /** Red paper lanterns over a flame. Each colour is red, green and blue. */
 const FIRE = {

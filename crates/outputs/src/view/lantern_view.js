@@ -1,5 +1,4 @@
-// Geometry of the lantern look: boards in pixels of the canvas, and the part of the picture that light reaches. Called
-// by lanterns.js; `behindHead` also by seat.js.
+// Geometry of the lantern look: boards in pixels of the canvas, and the part of the picture that light reaches.
 
 import { STRIDE, speedOf } from "./hermite.js";
 

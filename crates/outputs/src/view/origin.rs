@@ -1,5 +1,4 @@
-//! The admission to the WebSocket: this server's page, programs, and the pages that the user admits. Called by the
-//! server, and by the server of `metrics` for the host.
+//! The admission to the WebSocket: this server's page, programs, and the pages that the user admits.
 
 use std::net::IpAddr;
 use std::str::FromStr;

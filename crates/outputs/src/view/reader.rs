@@ -1,5 +1,5 @@
 //! Reads the shared memory and keeps the newest picture. In: the events of a [`feed`](bench_dragon_client::feed). Out:
-//! a [`Picture`] in a channel. Called by the server, on a separate thread.
+//! a [`Picture`] in a channel.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,5 +1,5 @@
 // Pictures that the view from a seat draws many times: lanterns and dancers seen from the side, balls of lit paper,
-// reflections. Called by seat.js. Lengths are metres, upward; each picture is cut once for sizes that are nearly equal.
+// reflections. Lengths are metres, upward; each picture is cut once for sizes that are nearly equal.
 
 import { blank } from "./sprites.js";
 

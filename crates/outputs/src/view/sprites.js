@@ -1,5 +1,5 @@
 // Pictures that the lantern look draws many times, each made once: spots of light, lanterns, dancers and the paving,
-// all seen from above. Called by lanterns.js. Lengths are metres where nothing else is stated.
+// all seen from above. Lengths are metres where nothing else is stated.
 
 /** A number in [0, 1) of an integer, the same in every browser. */
 export function hash(n) {

@@ -1,6 +1,6 @@
 // The still background of the view from a seat, drawn once for each seat. The background is the stone floor, the night
-// over the village, and the heads of the spectators who sit in front. Called by seat.js. The village stands on a ring
-// around the stage, so that another seat sees other houses.
+// over the village, and the heads of the spectators who sit in front. The village stands on a ring around the stage, so
+// that another seat sees other houses.
 
 import { blank, hash } from "./sprites.js";
 

@@ -1,4 +1,4 @@
-//! The messages to a browser: frames as bytes, and JSON for rare changes. Called by the server only.
+//! The messages to a browser: frames as bytes, and JSON for rare changes.
 //!
 //! Everything is little-endian. A frame is a header of 72 bytes and 20 bytes for each handle, head first:
 //!

@@ -1,4 +1,4 @@
-//! The command queues: commands to the loop, answers back. The queues never block.
+//! The command queues: commands to the loop, answers back, without blocking.
 //!
 //! [`CommandReceiver`] is the loop's end, [`CommandSender`] the end of a thread that gets commands from clients. The
 //! loop executes at most one command at the beginning of a period, so that each has an exact tick. The queues take

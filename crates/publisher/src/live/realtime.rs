@@ -1,5 +1,5 @@
 //! Settings of the operating system for a thread with deadlines: timer slack, real-time priority, locked memory, a
-//! fixed CPU, CPUs that stay awake. Called once on the loop's thread, before the loop.
+//! fixed CPU, CPUs that stay awake. They are made once on the loop's thread, before the loop.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -19,7 +19,7 @@ pub struct Scheduling {
     pub realtime: Option<u8>,
     /// The CPU to stay on.
     pub cpu: Option<usize>,
-    /// The longest wake-up latency of all CPUs, microseconds.
+    /// The longest wake-up latency of all CPUs, in microseconds.
     pub cpu_latency: Option<u32>,
 }
 

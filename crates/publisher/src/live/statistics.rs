@@ -1,8 +1,8 @@
 //! Statistics of the loop: percentiles of lateness and step cost, the status once a second, the summary at the end.
 //!
 //! In: samples, alerts and cues from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts and cues to the
-//! caller, a [`Summary`]. Runs on its own thread, so that the loop's thread computes no percentile, reads no file and
-//! prints no line. [`accumulator`] does the arithmetic.
+//! caller, a [`Summary`]. All this runs on a thread of its own, so that the loop's thread computes no percentile, reads
+//! no file and prints no line. [`accumulator`] does the arithmetic.
 
 pub mod accumulator;
 #[cfg(test)]
@@ -24,7 +24,7 @@ pub use accumulator::{Accumulator, Durations, Percentiles, Sample, Summary};
 const QUEUED_SAMPLES: usize = 1 << 16;
 /// Alerts and cues that their queue holds.
 const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
-/// Nanoseconds between two polls of the queues.
+/// The time between two polls of the queues, in nanoseconds.
 const POLL_INTERVAL_NS: u64 = 20_000_000;
 
 /// Creates the queues between the loop and this thread.
@@ -64,7 +64,7 @@ pub struct RunSummary {
     pub skipped: u64,
     /// Wake-up lateness against the intended deadlines.
     pub wakeup_ns: Percentiles,
-    /// Cost of a step.
+    /// The cost of a step.
     pub step_ns: Percentiles,
     /// The reason for the end of the loop.
     pub end: End,

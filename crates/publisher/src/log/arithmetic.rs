@@ -1,5 +1,5 @@
 //! The arithmetic on which the bits of a frame depend: the processor's instructions and the crate of the elementary
-//! functions. The log names both, and `verify` compares them with those of its machine.
+//! functions. The log names both, so that `verify` can compare them with those of its machine.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! The hash of frames: BLAKE3 over the bytes that are equal whenever the same show is played.
 //!
-//! A frame contributes bytes of its message. Of [`FrameHeader`] these are the fields `sequence` and `tick` (bytes 8 to
-//! 23) and all from `sim_time` on (bytes 48 to 95). Every [`HandlePose`](bench_dragon_messages::HandlePose) follows.
-//! The run's number and its stamps are left out.
+//! A frame contributes bytes of its message: of [`FrameHeader`] the fields `sequence` and `tick` (bytes 8 to 23) and
+//! all from `sim_time` on (bytes 48 to 95), followed by every [`HandlePose`](bench_dragon_messages::HandlePose). The
+//! run's number and its stamps are left out, because they differ between runs.
 
 use bench_dragon_messages::FrameHeader;
 use bench_dragon_motion::solve::Chain;

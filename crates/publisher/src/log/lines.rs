@@ -1,7 +1,7 @@
 //! The lines of a log: JSON objects, each with a check over all bytes before it.
 //!
-//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged. Such a line is
-//! reported by its number, before anything is computed from it.
+//! [`HashChain`] creates and tests the checks. A line with a wrong check is damaged or forged, and is reported by its
+//! number before anything is computed from it.
 
 use serde::{Deserialize, Serialize};
 
@@ -94,7 +94,7 @@ pub struct ShowLine {
     pub run_id: String,
     /// CLOCK_REALTIME in nanoseconds at the start of the log, as text: for people.
     pub stamp_ns: String,
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub rate: f64,
     /// Simulated seconds at which the show begins.
     pub start: f64,
@@ -104,7 +104,7 @@ pub struct ShowLine {
     pub on_contact: String,
     /// `hold` or `loop`.
     pub at_end: String,
-    /// Seconds of wall time for which a looping show waits at its end.
+    /// The wall time for which a looping show stands at its end, in seconds.
     pub end_hold: f64,
     /// True if the show waits at its start.
     pub paused: bool,

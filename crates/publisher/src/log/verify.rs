@@ -2,8 +2,8 @@
 //!
 //! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The code of `run` computes the
 //! show, with the instructions that the log names. If this machine lacks these instructions, or has another
-//! architecture or other elementary functions, different bits prove nothing. Then, for each second with other bits, the
-//! handles in its line are compared with those of a second solver ([`mod@reference`]).
+//! architecture or other elementary functions, different bits prove nothing. Then the handles in the line of each
+//! second with other bits are compared with those of a second solver ([`mod@reference`]).
 
 mod player;
 pub mod reference;
@@ -40,8 +40,8 @@ pub enum VerifyError {
 /// The result of `verify`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// `same`: every bit. `close`: on a machine with another arithmetic, every position within the tolerance.
-    /// `differs`. `nothing`: the log has no second to compare.
+    /// `same`: every bit is the same. `close`: the machine has another arithmetic, and every position is within the
+    /// tolerance. `differs`: neither. `nothing`: the log has no second to compare.
     pub verdict: &'static str,
     /// The first difference.
     pub difference: Option<Difference>,
@@ -69,9 +69,9 @@ pub struct Verdict {
     pub instructions: String,
     /// True if this machine computes the same bits.
     pub same_arithmetic: bool,
-    /// Metres: the greatest distance of a sampled handle from the second solver's; `None` if bits were compared.
+    /// The greatest distance of a sampled handle from the second solver's, in metres; `None` if bits were compared.
     pub max_difference: Option<f64>,
-    /// Metres: the tolerance of that distance.
+    /// The tolerance of that distance, in metres.
     pub tolerance: Option<f64>,
 }
 

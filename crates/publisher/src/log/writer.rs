@@ -1,6 +1,6 @@
 //! Converts the contents of the queue, in the order of ticks, to the lines of a log.
 //!
-//! Called on the log's thread. Each line is one write, so that a killed process leaves whole lines.
+//! It runs on the log's thread. Each line is one write, so that a killed process leaves whole lines.
 
 use std::io::{self, Write};
 

@@ -1,15 +1,15 @@
 //! iceoryx2: frames, alerts, cues, status, stage and scene in shared memory, for any number of processes on this
 //! machine.
 //!
-//! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread; both are made
-//! there, since iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/status`,
+//! [`SharedMemoryPublisher`] lives on the loop's thread, [`StatusSender`] on the statistics thread. Each is made on its
+//! thread, because iceoryx2's ports stay on the thread that made them. The services are `<name>/poses`, `/status`,
 //! `/stage`, `/scene`, and the event service `<name>/tick`. If a scene requests them, there are also `/alerts`, `/cues`
 //! and `/poses32`.
 //!
-//! A name belongs to one show: the service of commands, `<name>/control`, admits one server and is opened first. The
-//! library iceoryx2 detects by a lock of the operating system whether the server's process lives. So a killed process
-//! does not block the name, and a stopped process keeps it. The other services admit a second publisher: a tunnel to
-//! other machines.
+//! A name belongs to one show, because the service of commands, `<name>/control`, admits one server and is opened
+//! first. The library iceoryx2 detects by a lock of the operating system whether the server's process lives, so a
+//! killed process does not block the name, while a stopped process keeps it. The other services admit a second
+//! publisher, for a tunnel to other machines.
 
 pub mod chase_status;
 mod control;

@@ -1,6 +1,4 @@
 //! The files of a bag: a directory that `ros2 bag record` wrote, with `metadata.yaml` and one or several recordings.
-//!
-//! Called by the [`reader`](super::reader), which reads them as one recording.
 
 use std::fs::read_dir;
 use std::io;

@@ -1,6 +1,6 @@
-//! The output file of a recording. A failed flush leaves the file as it was before the flush. A kill during a flush can
-//! leave a part of its bytes. Disk space is reserved in advance, so that a full disk still has room for the end of the
-//! file.
+//! The output file of a recording. A failed flush leaves the file as it was before the flush, while a kill during a
+//! flush can leave a part of its bytes. Disk space is reserved in advance, so that a full disk still has room for the
+//! end of the file.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -22,7 +22,7 @@ struct Inner {
     file: File,
     /// The bytes since the last flush.
     buffer: Vec<u8>,
-    /// Bytes in the file.
+    /// The number of bytes in the file.
     flushed: u64,
     /// The size of the file with the reserved space.
     reserved: u64,

@@ -1,5 +1,4 @@
-//! The reasons why a recording cannot be played. Returned by the [`reader`](super::reader), its
-//! index and its bags, and by the [`replay`](crate::replay).
+//! The reasons why a recording cannot be played.
 
 use std::io;
 

@@ -1,8 +1,7 @@
 //! One MCAP file: its channels, its chunks, and its end.
 //!
 //! The channels are before the first chunk and again in it, so that one damaged copy does no harm. A chunk is half a
-//! second of messages, or 4 MB of them. A finished chunk can be read whatever happens to the rest. Called by the
-//! [`recorder`](super::recorder).
+//! second of messages, or 4 MB of them. Once it is finished, a chunk can be read whatever happens to the rest.
 
 use std::collections::BTreeMap;
 use std::fs::File;

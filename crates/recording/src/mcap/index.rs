@@ -1,4 +1,4 @@
-//! The index at the end of a recording: its channels and chunks. Called by the [`reader`](super::reader).
+//! The index at the end of a recording: its channels and chunks.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
@@ -13,7 +13,7 @@ use mcap::{Channel, MAGIC, McapError, parse_record};
 
 use super::error::ReadError;
 
-/// Bytes of the footer with the final magic, and of the record before the index.
+/// The number of bytes of the footer with the final magic, and of the record before the index.
 const FOOTER_BYTES: usize = 37;
 const DATA_END_BYTES: u64 = 13;
 

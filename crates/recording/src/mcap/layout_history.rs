@@ -1,8 +1,7 @@
-//! The layouts of earlier versions, found by the fields of a recording's types: a bag of `ros2 bag record` names no
-//! version of this program.
+//! The layouts of earlier versions, found by the fields of a recording's types, because a bag of `ros2 bag record`
+//! names no version of this program.
 //!
-//! In: the type of a topic, as a recording describes it. Out: the name of its layout. Called by the
-//! [`reader`](super::reader), for the sentence that refuses a recording.
+//! In: the type of a topic, as a recording describes it. Out: the name of its layout.
 
 use bench_dragon_ros2_messages::settings::Topic;
 

@@ -1,7 +1,6 @@
 //! The messages of each recorded topic, as the ROS 2 transport would send them.
 //!
-//! In: a subscriber's messages. Out: a [`Batch`], whose memory is reused. Called by the
-//! [`recorder`](super::recorder).
+//! In: a subscriber's messages. Out: a [`Batch`], whose memory is reused.
 
 use super::file::Batch;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, Stage, StageMessage};

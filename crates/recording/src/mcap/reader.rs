@@ -2,8 +2,8 @@
 //!
 //! In: an MCAP file with an end, of `record` or of another recorder of the same ROS 2 topics, or a bag of several. Out:
 //! a [`Recording`], which has frames of a known type; then [`Item`]s, chunk by chunk, in the order of the files. That
-//! is the order of reception: log times decrease if the recording machine's clock was set back. Called by the
-//! [`replay`](crate::replay).
+//! is the order of reception, which can differ from the order of log times if the recording machine's clock was set
+//! back.
 
 use std::collections::HashMap;
 use std::fmt::Display;
@@ -95,7 +95,7 @@ pub struct Contents {
     pub scene: Option<String>,
     /// The played topics with messages, in order.
     pub topics: Vec<Topic>,
-    /// Frames per second of the publisher's loop.
+    /// The rate of the publisher's loop, in frames per second.
     pub rate: f64,
     /// The number of frames; `None` if the file does not count them.
     pub frames: Option<u64>,

@@ -1,7 +1,6 @@
 //! Records a show into files: the messages of each topic, the splitting, the counts.
 //!
-//! In: the messages of a subscriber, in the order of reception. Out: files of one run each. Called by the subscriber
-//! that records, on its thread.
+//! In: the messages of a subscriber, in the order of reception. Out: files of one run each.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -71,7 +70,7 @@ pub struct RecordedCounts {
     pub frames: u64,
     /// Frames dropped between the received frames of a run.
     pub missed: u64,
-    /// Bytes of all files.
+    /// The number of bytes of all files.
     pub bytes: u64,
     /// The sum over all runs of the nanoseconds from first to last frame.
     pub nanoseconds: u64,
@@ -94,7 +93,7 @@ pub struct Recorder {
     run: Option<Run>,
     early: Vec<Event>,
     recorded: Recorded,
-    /// Bytes of the files that are finished.
+    /// The number of bytes of the files that are finished.
     finished_bytes: u64,
     number: u64,
     messages: Messages,

@@ -2,8 +2,8 @@
 //!
 //! In: the bytes of the file. Out: a complete file with the messages of the finished chunks, in order, the attachments
 //! and the metadata. A file without chunks keeps its messages. Records are read one after another. Behind a damaged
-//! length the next record is the next chunk or attachment whose own lengths and check agree: the repair needs no
-//! readable summary. Called by the command `record --recover`.
+//! length the next record is the next chunk or attachment whose own lengths and check agree, so the repair needs no
+//! readable summary.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -19,26 +19,26 @@ use super::file::{io_error, options};
 
 /// A longer record counts as damaged: a chunk must fit into memory.
 const MOST_RECORD_BYTES: u64 = 1 << 30;
-/// Bytes of a record before its content: its opcode and its length.
+/// The number of bytes of a record before its content: its opcode and its length.
 const HEAD_BYTES: usize = 9;
-/// Bytes of the footer, and of the record that ends the messages.
+/// The number of bytes of the footer, and of the record that ends the messages.
 const FOOTER_BYTES: usize = 20;
 const DATA_END_BYTES: usize = 4;
-/// Bytes of a record with the place of a part of the index.
+/// The number of bytes of a record with the place of a part of the index.
 const SUMMARY_OFFSET_BYTES: usize = 17;
-/// Bytes of each message in the record that lists the messages of a chunk and a channel.
+/// The number of bytes of each message in the record that lists the messages of a chunk and a channel.
 const MESSAGE_INDEX_ENTRY_BYTES: usize = 16;
 /// Opcodes from here on are private to programs.
 const FIRST_PRIVATE: u8 = 0x80;
-/// Bytes of a chunk's record besides the name of its compression and its records.
+/// The number of bytes of a chunk's record besides the name of its compression and its records.
 const CHUNK_BYTES: usize = 40;
-/// Bytes of a chunk's record before the name of its compression.
+/// The number of bytes of a chunk's record before the name of its compression.
 const CHUNK_NAME_AT: usize = 28;
-/// Bytes of an attachment's record besides its two names and its data.
+/// The number of bytes of an attachment's record besides its two names and its data.
 const ATTACHMENT_BYTES: usize = 36;
-/// Bytes that show the length of a chunk: its head, and its content up to its records.
+/// The number of bytes that are needed to know the length of a chunk: its head, and its content up to its records.
 const CHUNK_HEAD_BYTES: usize = HEAD_BYTES + CHUNK_BYTES + "zstd".len();
-/// Bytes that are searched at a time for the beginning of a chunk.
+/// The number of bytes that are searched at a time for the beginning of a chunk.
 const BLOCK_BYTES: usize = 1 << 20;
 
 /// The counts of a repair.
@@ -56,7 +56,7 @@ pub struct Recovered {
     pub lost_messages: u64,
     /// Messages whose channel cannot be read.
     pub unknown: u64,
-    /// Bytes skipped after an invalid length, up to the next readable record or the end.
+    /// The number of bytes skipped after an invalid length, up to the next readable record or the end.
     pub lost_bytes: u64,
     /// True if the file has its end.
     pub whole: bool,
@@ -177,7 +177,7 @@ pub fn recover(input: impl Read + Seek, length: u64, output: impl Write) -> Resu
 /// The records of a file.
 struct Records<Input> {
     input: Input,
-    /// The bytes of the file.
+    /// The number of bytes of the file.
     length: u64,
     /// The byte after the last record read.
     at: u64,
@@ -185,8 +185,8 @@ struct Records<Input> {
     body: Vec<u8>,
     /// No chunk that is still to be found begins before this byte.
     searched: u64,
-    /// Bytes of possible chunks that may still be read in vain: a search costs no more than another reading of the
-    /// file.
+    /// The number of bytes of possible chunks that may still be read without success, so that a search costs no more
+    /// than another reading of the file.
     allowed: u64,
 }
 

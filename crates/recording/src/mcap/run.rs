@@ -1,4 +1,4 @@
-//! A run while it is recorded: its open file and its state. Called by the [`recorder`](super::recorder).
+//! A run while it is recorded: its open file and its state.
 
 use std::cmp::Ordering;
 use std::io;

@@ -1,8 +1,8 @@
 //! The frames of a recording from a start to its end, each with its alerts and cues.
 //!
-//! A recorder may receive an alert a little before or after its frame. Frames of a chunk are therefore returned after
-//! the next chunk has been read. A later file of a bag may begin with the alert and the cue that hold: they are not
-//! sent twice. Called by the [`replay`](super).
+//! A recorder may receive an alert a little before or after its frame, so the frames of a chunk are returned after the
+//! next chunk has been read. A later file of a bag may begin with the alert and the cue that hold; they are not sent
+//! twice.
 
 use std::collections::VecDeque;
 
@@ -134,7 +134,7 @@ impl Pass {
         Ok(self.frames.pop_front())
     }
 
-    /// Reads a chunk. Keeps nothing of a damaged chunk.
+    /// Reads a chunk. If the chunk is damaged, nothing of it is kept.
     fn read_chunk(&mut self, recording: &mut Recording) {
         let (mut frames, mut alerts, mut cues) = (VecDeque::new(), Vec::new(), Vec::new());
         let read = recording.read_chunk(self.next_chunk, &mut |item| match item {

@@ -1,6 +1,6 @@
 //! Converts a service call to commands of the show, and their results to the response.
 //!
-//! Pure: [`ServiceAdapter`] returns the next action for a call. Called by the control thread.
+//! Pure: [`ServiceAdapter`] returns the next action for a call.
 
 use super::services::{Call, CallResult, Features, Response, result, scope, state};
 use bench_dragon_messages::control::{Code, Command, RATES};

@@ -5,7 +5,7 @@
 //! is random numbers in the other. Requests that conduct the show have fixed lengths, so no bytes are a request in
 //! both. Requests for parameters must end where their lists end. The 8 bytes of Cyclone's client are random. A request
 //! of Cyclone would be taken for the other kind only if these bytes were the lengths of a fitting list. So each client
-//! gets its answer in its own mapping. Called by the control thread.
+//! gets its answer in its own mapping.
 
 /// Bytes that Cyclone puts before a message: its client (8 bytes) and the number of the call (8 bytes).
 pub const CYCLONE_HEADER: usize = 16;

@@ -1,7 +1,7 @@
 //! The parameter services of the node, which has no parameters: every node of ROS 2 has these services, and `ros2 param
 //! list` waits for all six.
 //!
-//! In: the bytes of a request. Out: a [`ParameterCall`], and its [`ParameterResponse`]. Called by the control thread.
+//! In: the bytes of a request. Out: a [`ParameterCall`], and its [`ParameterResponse`].
 
 use ros2_client::rcl_interfaces::{GetParametersRequest, ListParametersRequest, SetParametersRequest};
 use rustdds::RepresentationIdentifier;

@@ -2,8 +2,7 @@
 //!
 //! Packages: `simulation_interfaces` (the parts used here are alike from 1.0.0 to 2.1.0), `rosbag2_interfaces` and
 //! `std_srvs/Trigger`. The services of `rosbag2_interfaces` (Humble to Kilted, and the later `Resume`) have the names
-//! that rosbag2's player gives them. In: the bytes of a request. Out: a [`Call`]; back from a [`Response`]. Called by
-//! the control thread.
+//! that rosbag2's player gives them. In: the bytes of a request. Out: a [`Call`]; back from a [`Response`].
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! The ranges of numbers that a scene, or the command line, may request. Called by the scene and the commands.
+//! The ranges of numbers that a scene, or the command line, may request.
 
 use bench_dragon_messages::sentence;
 
@@ -14,13 +14,13 @@ pub struct Accepted {
 }
 
 impl Accepted {
-    /// Pitch and lengths of boards.
+    /// The pitch and lengths of boards.
     pub const LENGTH: Self = Self { least: 1e-3, greatest: 1e4, unit: "metres" };
     /// The turn on which the head starts.
     pub const START_TURN: Self = Self { least: 1e-9, greatest: 1e7, unit: "turns" };
     /// The first radius of a turnaround divided by the second.
     pub const ARC_RATIO: Self = Self { least: 1e-3, greatest: 1e3, unit: "metres per metre" };
-    /// Metres of path before or after a turnaround.
+    /// The length of path before or after a turnaround, in metres.
     pub const ROUTE: Self = Self { least: 0.0, greatest: 1e9, unit: "metres" };
     /// A line or arc of a route.
     pub const LEG: Self = Self { least: 1e-3, greatest: 1e9, unit: "metres" };
@@ -36,21 +36,21 @@ impl Accepted {
     pub const KEEP_OUT: Self = Self { least: 0.0, greatest: 1e6, unit: "metres" };
     /// The rotation of a path on the stage.
     pub const ROTATION: Self = Self { least: -1e3, greatest: 1e3, unit: "turns" };
-    /// Speed of the head.
+    /// The speed of the head.
     pub const SPEED: Self = Self { least: 1e-9, greatest: 1e6, unit: "metres per second" };
-    /// Frames per second.
+    /// The rate, in frames per second.
     pub const RATE: Self = Self { least: 0.1, greatest: 20_000.0, unit: "frames per second" };
     /// Simulated seconds per second of wall time.
     pub const TIME_SCALE: Self = Self { least: 1e-6, greatest: 1e6, unit: "simulated seconds per second" };
     /// Requested position error.
     pub const ACCURACY: Self = Self { least: 1e-18, greatest: 1e3, unit: "metres" };
-    /// Times and clearances of a warning.
+    /// The times and clearances of a warning.
     pub const WARNING: Self = Self { least: 0.0, greatest: 1e9, unit: "seconds or metres" };
     /// Simulated seconds of a cue.
     pub const CUE: Self = Self { least: 0.0, greatest: 1e20, unit: "seconds" };
-    /// Wall time at the end of a show before it starts again.
+    /// The wall time at the end of a show before it starts again.
     pub const END_HOLD: Self = Self { least: 0.0, greatest: 1e6, unit: "seconds" };
-    /// Seconds of the paper's time step and difference interval, radians of its tolerance.
+    /// The paper's time step and difference interval, in seconds, and its tolerance, in radians.
     pub const PAPER_RULE: Self = Self { least: 1e-15, greatest: 1e3, unit: "seconds or radians" };
     /// The number of benches.
     pub const BENCHES: Self = Self { least: 1.0, greatest: 1e6, unit: "benches" };

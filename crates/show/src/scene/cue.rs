@@ -1,6 +1,6 @@
 //! Cues: named times of a show that are announced, with an optional pause: `[[cues]]`.
 //!
-//! In: the tables of the file. Out: checked [`Cue`]s. The scene calls it; the show computes their times.
+//! In: the tables of the file. Out: checked [`Cue`]s, whose times the show computes.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -34,7 +34,7 @@ pub enum CueMoment {
         /// Simulated seconds before it.
         seconds: f64,
     },
-    /// Travel of the head along the path, metres.
+    /// The travel of the head along the path, in metres.
     Travelled(f64),
 }
 

@@ -1,6 +1,6 @@
 //! A scene of several dragons: `[[dragons]]` in place of `[team]`, `[path]` and `[placement]`.
 //!
-//! In: the tables from serde. Out: an [`Ensemble`], or one sentence about the wrong field. Only [`super`] calls it.
+//! In: the tables from serde. Out: an [`Ensemble`], or one sentence about the wrong field.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;

@@ -1,7 +1,6 @@
 //! The `[path]` table: a spiral, a turnaround, or a route of lines, arcs and spirals.
 //!
-//! In: the table from serde. Out: a [`PathDescription`], or one sentence about the wrong field. Only [`super`] calls
-//! it.
+//! In: the table from serde. Out: a [`PathDescription`], or one sentence about the wrong field.
 
 use std::f64::consts::TAU;
 
@@ -76,7 +75,7 @@ enum RawSide {
 }
 
 impl RawPath {
-    /// Returns the place where a route starts, metres.
+    /// Returns the place where a route starts, in metres.
     pub(super) fn start(&self, source: &Source) -> Result<Vector, SceneError> {
         source.place("path.start", self.start.as_ref())
     }

@@ -1,6 +1,6 @@
 //! The ROS 2 topics and services of a scene: `[publish.ros2]`.
 //!
-//! In: the table of the file. Out: checked [`Ros2Settings`]. The scene calls it; the ROS 2 transport reads the result.
+//! In: the table of the file. Out: checked [`Ros2Settings`].
 
 use std::collections::BTreeMap;
 

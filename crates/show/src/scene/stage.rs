@@ -1,7 +1,6 @@
 //! The `[stage]` table: the boundary and the obstacles.
 //!
-//! In: the table from serde. Out: a [`Ground`] in stage coordinates, or one sentence about the wrong field. [`super`]
-//! calls this module for a scene of one dragon, `dragons` for a scene of several.
+//! In: the table from serde. Out: a [`Ground`] in stage coordinates, or one sentence about the wrong field.
 
 use robust::{Coord, orient2d};
 use serde::Deserialize;

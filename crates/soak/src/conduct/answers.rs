@@ -1,11 +1,11 @@
 //! The check of responses against the table of commands: the codes and states that the responses so far allow.
 //!
-//! The check uses the times of the scene and of the responses. The [`record`](super::record) compares times with
-//! frames. A step or a cue may change the state between two responses. Every possible state is kept, and each response
-//! removes the states that would have answered otherwise.
+//! The check uses the times of the scene and of the responses; the [`record`](super::record) compares times with
+//! frames. Because a step or a cue may change the state between two responses, every possible state is kept, and each
+//! response removes the states that would have answered otherwise.
 //!
-//! The tests' model of a show (`crates/testing/src/model.rs`) cannot check a soak: it needs the period of each command,
-//! which no client knows.
+//! The tests' model of a show (`crates/testing/src/model.rs`) cannot check a soak, because it needs the period of each
+//! command, which no client knows.
 
 use bench_dragon_messages::control::{Code, Command, RATES, Refusal};
 use bench_dragon_messages::state::PlaybackState;
@@ -127,7 +127,7 @@ pub(super) struct AnswerCheck {
     /// Tick and simulated time of the latest response.
     tick: u64,
     time: f64,
-    /// Frames per second.
+    /// The rate, in frames per second.
     frame_rate: f64,
 }
 

@@ -1,6 +1,6 @@
 //! The load generator: a thread that sends the commands and checks their answers, and a thread that reads the frames.
 //!
-//! A second client sends the steps: a step is answered when it is over, and other commands come between.
+//! A second client sends the steps, because a step is answered only when it is over, and other commands come between.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};

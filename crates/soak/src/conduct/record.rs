@@ -16,7 +16,7 @@ use bench_dragon_publisher::live::statistics::Percentiles;
 const LONGEST_NS: u64 = 3_600_000_000_000;
 /// Faults that are kept in words.
 const MOST_FAULTS: usize = 10;
-/// Seconds for which frames are kept for comparison.
+/// The time for which frames are kept for comparison, in seconds.
 const KEPT_SECONDS: f64 = 2.0;
 
 /// A command and its answer.

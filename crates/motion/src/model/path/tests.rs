@@ -35,7 +35,7 @@ pub(crate) fn any_path() -> impl Strategy<Value = Path> {
     prop_oneof![spiral, turnaround, route].prop_map(|description| description.path().unwrap())
 }
 
-/// Returns the error bound of a place, metres: the promise for positions of a path a few metres from its origin.
+/// Returns the error bound of a place, in metres: the promise for positions of a path a few metres from its origin.
 fn rounding(travelled: f64) -> f64 {
     8.0 * f64::EPSILON * (100.0 + travelled.abs())
 }

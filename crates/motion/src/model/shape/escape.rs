@@ -1,6 +1,6 @@
 //! The least translation that frees a board from a shape with which it overlaps.
 //!
-//! In the board's frame the board is the rectangle of half sides (h, w) about the origin. Moved by t the board meets a
+//! In the board's frame the board is the rectangle of half sides (h, w) about the origin. Moved by t, the board meets a
 //! side of the shape if and only if t is in the side's Minkowski sum with the rectangle. This sum is a hexagon: the set
 //! |x - m_x| <= h + |e_x| / 2, |y - m_y| <= w + |e_y| / 2, |n . (t - m)| <= h |n_x| + w |n_y|. Here the side has the
 //! middle m, the vector e and the unit normal n. Moved by t the board meets no side but lies within the shape if and
@@ -14,7 +14,7 @@ use super::{MOST_CORNERS, Rectangle, Shape, ShapeKind, in_frame};
 use crate::model::Vector;
 use crate::model::board::Board;
 
-/// Depth within a hexagon, as a share of the board and the translation, up to which a point counts as outside.
+/// The depth within a hexagon, as a share of the board and the translation, up to which a point counts as outside.
 const ROUNDING: f64 = 1e-12;
 
 /// The greatest number of segments of an outline: of a line, two along each side and, where rounding joins corners,
@@ -234,8 +234,8 @@ impl Avoided<'_> {
 }
 
 impl Shape {
-    /// Returns the length of the least translation that frees a board, metres; infinite if there is none. The board and
-    /// the shape overlap. Returns a length of at most `limit` if the least one is.
+    /// Returns the length of the least translation that frees a board, in metres, or infinity if there is none. The
+    /// board and the shape overlap. If the least length is at most `limit`, the result is at most `limit`.
     pub(super) fn least_escape(&self, board: &Board, limit: f64) -> f64 {
         match self.convex {
             Some(sense) => self.convex_escape(board, sense),

@@ -60,9 +60,9 @@ impl Spiral {
     /// - k = 2: both links lean by psi <= tau against the link between them. Along this link the gap is body_link - 2
     ///   (inset cos psi + width / 2 sin psi) or more. The bracket is greatest at psi = tau or atan(width / 2 inset).
     /// - k > 2, phi <= 2 pi / 3: against the tangent half way, each link leans by at most phi / 2. So the gap along
-    ///   this tangent is at least (k - 1) body_link cos(phi / 2) - 2 inset - width sin(phi / 2). Here width <=
-    ///   body_link and phi <= (k + 1) tau. So this bound is more than body_link - 2 inset at k = 3, and grows with k up
-    ///   to phi = 1.6. Where phi is more, k >= 7, and the bound is more than 2 body_link - 2 inset.
+    ///   this tangent is at least (k - 1) body_link cos(phi / 2) - 2 inset - width sin(phi / 2). Because width <=
+    ///   body_link and phi <= (k + 1) tau, this bound is more than body_link - 2 inset at k = 3, and grows with k up to
+    ///   phi = 1.6. Where phi is more, k >= 7, and the bound is more than 2 body_link - 2 inset.
     /// - phi more than that: every point of a board is near the path between or just beyond its handles. Its distance
     ///   from the path is at most width / 2 + 1.05 max(link^2 / 8, inset (link + inset) / 2) / r. Let two places of the
     ///   path be p apart in polar angle, less whole turns. Where |p| > 1/2, their distance is more than 0.49 r.

@@ -1,6 +1,6 @@
 //! The curves of the reference, with 38 digits in plain Cartesian coordinates, and in doubles for its first guess.
 //!
-//! In: a [`RouteStep`] with the end of the path before it. Out: its curve. Only the reference calls it.
+//! In: a [`RouteStep`] with the end of the path before it. Out: its curve.
 
 use super::Piece;
 use super::real::{Functions, Real, RealVector};
@@ -10,7 +10,7 @@ use crate::model::description::RouteStep;
 use crate::model::double_double::DoubleDouble;
 use crate::model::spiral::Direction;
 
-/// The longest step on a spiral, radians: short against the half turns over which the growth of a chord changes its
+/// The longest step on a spiral, in radians: short against the half turns over which the growth of a chord changes its
 /// sign.
 const LONGEST: f64 = 0.05;
 
@@ -201,9 +201,9 @@ pub(super) struct RealPiece {
     pub curve: Curve,
     /// Its first coordinate.
     pub first: Real,
-    /// Metres along it.
+    /// The length along it, in metres.
     pub length: Real,
-    /// Direction of travel at its end, radians from x.
+    /// The direction of travel at its end, radians from x.
     pub heading: Real,
 }
 

@@ -1,7 +1,6 @@
 //! The path of a description with 38 digits: curves in plain Cartesian coordinates, one after the other.
 //!
-//! In: a [`PathDescription`]. Out: a path that gives places by metres of travel and by a curve's own coordinate. Only
-//! the reference calls it.
+//! In: a [`PathDescription`]. Out: a path that gives places by metres of travel and by a curve's own coordinate.
 
 use super::curve::{Curve, RealParam, RealPiece, origin, spiral_length};
 use super::real::{Functions, Real, RealVector};
@@ -15,18 +14,18 @@ pub(super) struct Segment {
     pub curve: Curve,
     /// Its first place; on the first segment, which has no beginning, the place from which it is measured.
     pub first: RealParam,
-    /// Metres of travel at `first`.
+    /// The travel at `first`, in metres.
     pub begin: Real,
     /// Its last place.
     pub last: RealParam,
-    /// Metres of travel at `last`.
+    /// The travel at `last`, in metres.
     pub end: Real,
 }
 
 /// A path that grows at its end.
 pub(super) struct RealPath {
     segments: Vec<Segment>,
-    /// Direction of travel at its end, radians from x.
+    /// The direction of travel at its end, radians from x.
     heading: Real,
     pub functions: Functions,
 }

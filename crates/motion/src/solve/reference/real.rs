@@ -1,5 +1,5 @@
 //! Real numbers of 38 digits and vectors of two of them, on astro-float, with arithmetic operators that make the
-//! reference's formulas readable. Only the reference calls it.
+//! reference's formulas readable.
 
 use std::borrow::Borrow;
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -3,7 +3,7 @@
 //! The straight-line distance from the handle grows by at most a metre per metre of path. So from a place whose
 //! distance is m metres short of the link, a step of m metres back cannot pass the place sought. This method is sphere
 //! tracing (Hart, The Visual Computer 12, 1996, for rays). The points are displacements from places that the reference
-//! knows exactly, so that they keep their digits far from the origin. Only the reference calls it.
+//! knows exactly, so that they keep their digits far from the origin.
 
 use super::curve::{RealParam, RoughPlace};
 use super::path::Segment;
@@ -13,10 +13,10 @@ use crate::model::Vector;
 /// The finest step, in links: a shorter stretch outside the link's reach may be overlooked.
 const FINEST: f64 = 1e-9;
 
-/// Least decrease of a distance, in links, that counts as more than rounding.
+/// The least decrease of a distance, in links, that counts as more than rounding.
 const NOISE: f64 = 1e-14;
 
-/// Steps after which the search on one segment gives up.
+/// The steps after which the search on one segment gives up.
 const MOST_STEPS: usize = 10_000_000;
 
 /// The way back along a curve from one of its places, seen from the front handle of a link.

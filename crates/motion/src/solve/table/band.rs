@@ -2,8 +2,7 @@
 //!
 //! A [`NodeChain`] holds the places of one phase in all rows of a band, each found from the place behind it. Five node
 //! chains make a piece: their slopes give its polynomials, and their places prove the polynomials. If the proof fails,
-//! the piece is halved. The next band starts from the frontmost row of the band before. Only
-//! [`super::FollowerTable::new`] calls it.
+//! the piece is halved. The next band starts from the frontmost row of the band before.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
@@ -21,16 +20,16 @@ use crate::model::elementary::hypot;
 use crate::model::path::Param;
 use crate::model::team::Team;
 
-/// Greatest number of halvings between two kinks.
+/// The greatest number of halvings between two kinks.
 const MOST_HALVINGS: usize = 9;
 
-/// Greatest size of a table, bytes.
+/// The greatest size of a table, in bytes.
 const MOST_BYTES: usize = 150 << 20;
 
 /// The part of these bytes that any range of phases may take.
 const LEAST_SHARE: f64 = 0.125;
 
-/// Number of rows from which two threads make a band.
+/// The number of rows from which two threads make a band.
 const PARALLEL_ROWS: usize = 128;
 
 /// Halving continues if the halved piece uses less than this part of its parent's error: a smaller gain is rounding,
@@ -63,7 +62,7 @@ struct BandBuilder<'a> {
     needed: usize,
     /// True if the second handle can come here.
     with_centres: bool,
-    /// Bytes that the band may take.
+    /// The number of bytes that the band may take.
     budget: usize,
 }
 

@@ -1,7 +1,7 @@
-//! The beginning of the table: one link's length of path so far behind the team that it is nearly or exactly straight.
+//! The beginning of the table: one link's length of path, so far behind the team that it is straight or nearly so.
 //!
-//! Used only to make the table. Here alpha is known for every place. On a straight line T is linear. On a spiral a
-//! polynomial A with A(follower of p) = A(p) + 1 is fitted over a few links.
+//! Here alpha is known for every place. On a straight line T is linear. On a spiral a polynomial A with A(follower of
+//! p) = A(p) + 1 is fitted over a few links.
 
 use nalgebra::{DMatrix, DVector};
 

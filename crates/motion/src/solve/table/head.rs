@@ -1,7 +1,7 @@
 //! Places of the head and the handle behind it, by the metres that the head has travelled.
 //!
-//! The head's link differs from the others, so its map is not the table's. Both places are tabulated over the head's
-//! travel instead. Only the follower table makes and reads it.
+//! The head's link differs from the others, so its map is not the table's, and both places are tabulated over the
+//! head's travel instead.
 
 use super::polynomial::SlopeFit;
 use super::rows::{Alpha, Rows};
@@ -25,16 +25,16 @@ const LARGEST_NODAL: f64 = 0.04;
 /// x, y, heading and alpha.
 const QUANTITIES: usize = 4;
 
-/// Greatest number of pieces, 20 MB. For a longer path the table covers its beginning.
+/// The greatest number of pieces, 20 MB. For a longer path the table covers its beginning.
 const MOST_PIECES: usize = 1 << 16;
 
-/// Greatest length of a piece, in links of travel.
+/// The greatest length of a piece, in links of travel.
 const LONGEST: f64 = 1.0;
 
-/// Greatest length of a piece at the start, metres of travel: places have the rounding of the piece's extent.
+/// The greatest length of a piece at the start, metres of travel: places have the rounding of the piece's extent.
 const LONGEST_METRES: f64 = 100.0;
 
-/// Least length of a piece, in links of travel: at shorter ones the table ends.
+/// The least length of a piece, in links of travel: at shorter ones the table ends.
 const SHORTEST: f64 = 1e-7;
 
 /// Promised error in metres for a short travel, and promised relative error of speeds.
@@ -47,7 +47,7 @@ const AT_END: f64 = 1e-11;
 /// A stretch of travel, metres, on which all quantities are polynomials.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
-    /// Metres of travel where beta is 0, and beta per metre.
+    /// The travel where beta is 0, in metres, and beta per metre.
     middle: f64,
     scale: f64,
     /// Alpha is `row` plus the polynomial's value.
@@ -60,7 +60,7 @@ struct Piece {
 #[derive(Debug, Clone, Default)]
 pub(super) struct HeadTable {
     pieces: Vec<Piece>,
-    /// Metres of travel at which each piece begins, and at which the last ends.
+    /// The travel at which each piece begins, and at which the last ends, in metres.
     begins: Vec<f64>,
     /// The piece in which each of equal shares of the travel begins.
     piece_of_share: Vec<u32>,
@@ -70,13 +70,13 @@ pub(super) struct HeadTable {
 /// The table's values for one travel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HeadSample {
-    /// Metres, and radians, the heading not yet within half a turn.
+    /// The place, in metres, and the heading, in radians, not yet within half a turn.
     pub x: f64,
     pub y: f64,
     pub heading: f64,
     /// The head's unit tangent.
     pub tangent: [f64; 2],
-    /// Place of the second handle, and its change per metre of travel; negative while it goes forward.
+    /// The place of the second handle, and its change per metre of travel; negative while it goes forward.
     pub alpha: Alpha,
     pub alpha_per_metre: f64,
 }

@@ -1,7 +1,6 @@
 //! A frame from the table: every handle behind the head independently, eight at a time.
 //!
-//! Called by the follower table, and for other formats by [`super::single_kernel`]. The loops over [`LANES`] have a
-//! fixed length, so that the compiler vectorises them.
+//! The loops over [`LANES`] have a fixed length, so that the compiler vectorises them.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,7 +10,7 @@ use crate::solve::ChainMut;
 /// The input of a frame besides the table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrameInput {
-    /// Place of the second handle in the table.
+    /// The place of the second handle in the table.
     pub alpha: Alpha,
     /// Its derivative by time, 1/s; negative while the handle goes forward.
     pub alpha_per_second: f64,

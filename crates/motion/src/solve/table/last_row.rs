@@ -1,6 +1,6 @@
 //! The last row behind a band of the table, from which the band's node chains start.
 //!
-//! In: that row's pieces. Out: a node at any phase. Used only to make the table.
+//! In: that row's pieces. Out: a node at any phase.
 
 use super::polynomial::{from_slopes, horner};
 use super::rows::Piece;
@@ -21,8 +21,8 @@ struct RowPiece {
 }
 
 impl<'a> Row<'a> {
-    /// Each piece has the rounding of its own centre, and so a jump at its ends. With these jumps the pieces of the
-    /// next band would be cut in vain. So every piece continues the one before, and the accumulated rounding is spread
+    /// Each piece has the rounding of its own centre, and therefore a jump at its ends, which would make the next band
+    /// cut its pieces without need. So every piece continues the one before, and the accumulated rounding is spread
     /// over all phases.
     pub(super) fn new(track: &'a Track<'a>, nodes: &[(Piece, [Node; 5])]) -> Self {
         let mut pieces: Vec<RowPiece> = Vec::with_capacity(nodes.len());

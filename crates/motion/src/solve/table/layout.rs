@@ -1,7 +1,5 @@
 //! Layout of the table before it is made: its reach forward, its bands of rows, and the phases at which the path's
 //! junctions cut it.
-//!
-//! Called by [`super::band`] only.
 
 use super::beginning::Beginning;
 use super::rows::Piece;
@@ -14,7 +12,7 @@ use crate::model::team::Team;
 /// Kinks nearer together than this, in links, count as one.
 const SAME_KINK: f64 = 1e-11;
 
-/// Greatest number of rows ahead of the team: for a longer path the table covers its beginning.
+/// The greatest number of rows ahead of the team: for a longer path the table covers its beginning.
 const MOST_ROWS_AHEAD: usize = 1 << 15;
 
 /// Rows of the frontmost band; each further band reaches twice as far back.
@@ -95,9 +93,9 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize)
     kinks
 }
 
-/// Returns the metres that the head has travelled when a handle behind it crosses a junction. The list covers every
-/// junction and these handles, as far as handles have one place each. At these places frames have kinks. The list does
-/// not depend on a table.
+/// Returns the places of the head, in metres of travel, at which a handle behind it crosses a junction, because frames
+/// have kinks there. The list covers every junction and all handles that have only one place each. It does not depend
+/// on a table.
 pub(super) fn crossings(track: &Track, team: &Team) -> Vec<f64> {
     let path = track.path;
     let of_segment = |segment: usize| {

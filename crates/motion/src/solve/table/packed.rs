@@ -3,8 +3,8 @@
 //! In: the rows of T and the allowed loss. Out: the same bands with other pieces, and a proven bound of the loss over
 //! all phases and all rows that a frame can read. Only frames read it; the clearance reads the rows.
 //!
-//! Every polynomial of a piece is rewritten exactly for a part of it and shortened by Chebyshev polynomials, which
-//! bounds the change. The rounding of single precision is added. If the sum is too large, the part is halved.
+//! Every polynomial of a piece is rewritten exactly for a part of it, and then shortened by Chebyshev polynomials,
+//! which bounds the change. The rounding of single precision is added. If the sum is too large, the part is halved.
 
 use super::polynomial::{economise, on_part};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, piece_at, piece_of_share};
@@ -55,9 +55,9 @@ impl std::fmt::Display for Format {
 /// Allowed changes by the packing, besides the errors of the rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Allowed {
-    /// Metres.
+    /// The change of the places, in metres.
     pub place: f64,
-    /// Radians.
+    /// The change of the headings, in radians.
     pub heading: f64,
     /// Relative to a handle's own speed; infinite if velocities are omitted.
     pub speed: f64,
@@ -84,11 +84,11 @@ pub(super) struct PackedRows {
     pub bands: Vec<PackedBand>,
 }
 
-/// Greatest number of halvings of a piece of the rows.
+/// The greatest number of halvings of a piece of the rows.
 const MOST_HALVINGS: usize = 7;
 
-/// Greatest size of a packed table: a multiple of the rows' bytes, plus a number of bytes that stay in the processor's
-/// cache.
+/// The greatest size of a packed table: a multiple of the rows' bytes, plus a number of bytes that stay in the
+/// processor's cache.
 const MOST_GROWTH: usize = 2;
 const SMALL: usize = 1 << 18;
 
@@ -177,7 +177,7 @@ struct Builder<'a> {
     valid_from: f64,
     format: Format,
     allowed: Allowed,
-    /// Bytes left.
+    /// The number of bytes left.
     budget: usize,
     packed: PackedBand,
 }

@@ -1,12 +1,12 @@
-//! Polynomials on -1..1 with given slopes, and how to shorten them. Used only to make the table.
+//! Polynomials on -1..1 with given slopes, and how to shorten them.
 
 use nalgebra::SMatrix;
 
 /// Returns the polynomial of degree `N` with given slopes at `N` nodes; its constant is zero.
 ///
-/// Values are not used: half of their rounding would return in the slopes between them, more in shorter pieces. The
-/// proof uses values. Let the slope's error come from the first neglected power, so that it is zero at the nodes. Then
-/// the value's error is greatest at nodes.
+/// The fit uses no values, because half of their rounding would return in the slopes between them, and more in shorter
+/// pieces. The proof uses values. If the slope's error comes from the first neglected power, so that it is zero at the
+/// nodes, then the value's error is greatest at nodes.
 #[derive(Debug, Clone)]
 pub(super) struct SlopeFit<const N: usize> {
     from_slopes: SMatrix<f64, N, N>,

@@ -1,18 +1,18 @@
 //! T: the places of all handles of a chain of equal links, as polynomials.
 //!
-//! All links but the head's are equal, so that one map F takes every handle's place to its follower's. T satisfies
-//! T(alpha + 1) = F(T(alpha)). If the second handle stands at T(alpha), the handles behind it stand at T(alpha + 1),
-//! T(alpha + 2) and so on. Each place is found independently. (T is the inverse of an Abel function of F; Kuczma,
-//! Choczewski and Ger, Iterative Functional Equations, 1990.)
+//! All links but the head's are equal, so one map F takes every handle's place to its follower's. T satisfies
+//! T(alpha + 1) = F(T(alpha)). If the second handle stands at T(alpha), the handles behind it therefore stand at
+//! T(alpha + 1), T(alpha + 2) and so on, and each place is found independently of the others. (T is the inverse of an
+//! Abel function of F; Kuczma, Choczewski and Ger, Iterative Functional Equations, 1990.)
 //!
 //! The whole part of alpha is a *row*, counted from the front of the table backward; its fraction is a *phase*. The
-//! rows are grouped into bands, and the phases of each band are cut into pieces. Every piece holds polynomials of beta,
-//! -1 to 1 over the piece, for every row of the band. The polynomials give the handle's coordinates and the direction
-//! of the link that the handle leads. Where a handle or its follower crosses a junction of the path, T has a kink in
-//! its second derivative. Since T takes whole links to followers, all kinks of one junction have one phase, and pieces
-//! end there.
+//! rows are grouped into bands, and the phases of each band are cut into pieces. Every piece holds polynomials of
+//! beta, -1 to 1 over the piece, for every row of the band. The polynomials give the handle's coordinates and the
+//! direction of the link that the handle leads. Where a handle or its follower crosses a junction of the path, T has a
+//! kink in its second derivative. Because T takes whole links to followers, all kinks of one junction have one phase,
+//! and pieces end there.
 //!
-//! Made by [`super::band`]. Read by the frame and by the clearance.
+//! [`super::band`] makes the rows; the frame and the clearance read them.
 
 use super::polynomial::horner;
 use super::track::Track;
@@ -30,11 +30,11 @@ pub(crate) struct Lanes(pub [f64; LANES]);
 /// Tolerance of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// Greatest error of a polynomial, metres, besides rounding.
+    /// The greatest error of a polynomial, metres, besides rounding.
     pub place: f64,
     /// The same error as a part of a link.
     pub relative: f64,
-    /// Greatest relative error of a speed.
+    /// The greatest relative error of a speed.
     pub speed: f64,
 }
 
@@ -118,7 +118,7 @@ pub(crate) struct Band {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Local {
     pub offset: Vector,
-    /// Derivative of the place by alpha, metres.
+    /// Derivative of the place by alpha, in metres.
     pub rate: Vector,
 }
 
@@ -142,13 +142,13 @@ impl Band {
         &self.coefficients[(piece * blocks + block) * per_row..][..per_row]
     }
 
-    /// Returns the coefficients of x and y of one row, by power, metres; beyond the band's lengths they are zero.
+    /// Returns the coefficients of x and y of one row, by power, in metres; beyond the band's lengths they are zero.
     pub(crate) fn coordinates(&self, piece: usize, row: usize) -> [[f64; 6]; 2] {
         let length = self.lengths.coordinate;
         [0, length].map(|begin| self.polynomial(piece, row, begin, length))
     }
 
-    /// Returns the coefficients of the heading of one row, by power, radians.
+    /// Returns the coefficients of the heading of one row, by power, in radians.
     pub(super) fn heading(&self, piece: usize, row: usize) -> [f64; 6] {
         self.polynomial(piece, row, 2 * self.lengths.coordinate, self.lengths.heading)
     }

@@ -1,6 +1,4 @@
 //! A frame from a packed table: polynomials in single precision, eight handles at a time.
-//!
-//! Called by the follower table only, through [`write()`].
 
 use std::f64::consts::TAU;
 

@@ -1,8 +1,8 @@
-//! Places along a path relative to each other, to the last digit at any distance from the origin. And the step from a
+//! Places along a path relative to each other, to the last digit at any distance from the origin, and the step from a
 //! handle to the handle ahead.
 //!
-//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Used only to make the
-//! table, not by frames.
+//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Frames do not use it, only
+//! the making of the table.
 
 use crate::linkage;
 use crate::model::Vector;
@@ -18,15 +18,15 @@ pub(super) struct Track<'a> {
     last: Vec<Coordinate>,
 }
 
-/// Place of one handle of a chain of equal links, and its change with alpha. Alpha is the number of links, with
+/// The place of one handle of a chain of equal links, and its change with alpha. Alpha is the number of links, with
 /// fraction, behind a fixed place of the chain.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
     pub at: Param,
     pub tangent: Vector,
-    /// Metres along the path, against the travel, per unit of alpha.
+    /// The length along the path, against the travel, per unit of alpha, in metres.
     pub spacing: f64,
-    /// Direction of the link that the handle leads, radians, and its derivative by alpha.
+    /// The direction of the link that the handle leads, radians, and its derivative by alpha.
     pub heading: f64,
     pub heading_rate: f64,
 }
@@ -37,7 +37,7 @@ pub(super) struct Pose {
     pub heading: f64,
     /// The speed of the rear handle over that of the front one.
     pub speed_ratio: f64,
-    /// Radians per metre of the front handle's travel.
+    /// The change of heading per metre of the front handle's travel, in radians.
     pub heading_per_metre: f64,
 }
 

@@ -1,6 +1,6 @@
 //! The arithmetic of the statistics: samples and times in, a [`LoopStatus`] a second and a [`Summary`] out.
 //!
-//! Pure: the statistics thread calls it and adds the figures of the process.
+//! Pure: the statistics thread adds the figures of the process.
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
@@ -29,9 +29,9 @@ pub struct Sample {
     pub unsolved_frames: u64,
     /// The loop's counts, this frame included.
     pub counts: LoopCounts,
-    /// Nanoseconds from the intended deadline to the wake-up.
+    /// The time from the intended deadline to the wake-up, in nanoseconds.
     pub lateness_ns: u64,
-    /// Nanoseconds from the wake-up until all publishers had the frame.
+    /// The time from the wake-up until all publishers had the frame, in nanoseconds.
     pub step_ns: u64,
     /// Connected subscribers.
     pub subscribers: u32,
@@ -52,7 +52,7 @@ impl Sample {
     };
 }
 
-/// Percentiles of a duration, nanoseconds.
+/// Percentiles of a duration, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Percentiles {
     /// The median.
@@ -78,17 +78,17 @@ impl Percentiles {
 pub struct Summary {
     /// Wake-up lateness against the intended deadlines; skipped periods count with the lateness they would have had.
     pub wakeup_ns: Percentiles,
-    /// Cost of a step: frame, publishing and waking subscribers.
+    /// The cost of a step: frame, publishing and waking subscribers.
     pub step_ns: Percentiles,
-    /// Samples received. The percentiles miss the other frames.
+    /// The number of samples received. The percentiles leave out the frames whose samples were not received.
     pub samples: u64,
 }
 
-/// The distributions of lateness and step cost, nanoseconds.
+/// The distributions of lateness and step cost, in nanoseconds.
 pub struct Durations {
     /// Wake-up lateness; skipped periods count with the lateness they would have had.
     pub lateness: Histogram<u64>,
-    /// Cost of a step.
+    /// The cost of a step.
     pub step: Histogram<u64>,
 }
 
@@ -106,9 +106,9 @@ impl Durations {
         Self { lateness: histogram(), step: histogram() }
     }
 
-    /// Records a sample. A late wake-up counts for each period that it covers, with the lateness that remains there:
-    /// HdrHistogram's correction for coordinated omission. In a very late wake-up, neighbouring periods share an
-    /// entry, so that a stop of an hour costs little time here.
+    /// Records a sample. A late wake-up counts for each period that it covers, with the lateness that remains there,
+    /// which is HdrHistogram's correction for coordinated omission. In a very late wake-up neighbouring periods share
+    /// an entry, so that a stop of an hour costs little time here.
     pub fn record(&mut self, sample: &Sample, period_ns: u64) {
         let values = (sample.lateness_ns / period_ns).max(1);
         let stride = values.div_ceil(MOST_ENTRIES);

@@ -1,7 +1,6 @@
 //! A second solver that judges handles computed elsewhere: by a machine with other bits, or before they were recorded.
 //!
-//! In: a time and handles. Out: a sentence for the first handle outside of the tolerance. Called by the verification of
-//! logs and of recordings.
+//! In: a time and handles. Out: a sentence for the first handle outside of the tolerance.
 
 use std::f64::consts::PI;
 
@@ -14,13 +13,13 @@ use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::scene::Scene;
 use bench_dragon_show::solve_at_or_just_before;
 
-/// Seconds by which two arithmetics may differ in the times of events, at which a show ends or pauses.
+/// The time, in seconds, by which two arithmetics may differ in the times of events, at which a show ends or pauses.
 const EVENT_TIME: f64 = 1e-9;
 /// The greatest growth of a position error along the chain. The error grows with the speed of the handles, without
 /// bound at a lock. Near a lock the error itself is about sqrt(eps).
 const MOST_GROWTH: f64 = 1e6;
 
-/// The error of an angle in (-pi, pi] from arctangents and sums, radians.
+/// The error of an angle in (-pi, pi] from arctangents and sums, in radians.
 const ROUNDING_OF_ANGLES: f64 = 1e-14;
 
 /// The second solver of a scene: one for each dragon.
@@ -36,10 +35,10 @@ struct OneReference {
     solver: Box<dyn Solver>,
     chain: Chain,
     head_speed: f64,
-    /// Metres from the stage's origin to the origin of the path's own coordinates.
+    /// The distance from the stage's origin to the origin of the path's own coordinates, in metres.
     placed: f64,
     accuracy: f64,
-    /// Metres: the greatest distance so far, and its tolerance.
+    /// The greatest distance so far, and its tolerance, in metres.
     worst: Option<(f64, f64)>,
 }
 
@@ -91,7 +90,7 @@ impl Reference {
         Ok(())
     }
 
-    /// Returns the greatest distance so far and its tolerance, metres; `None` before the first comparison.
+    /// Returns the greatest distance so far and its tolerance, in metres; `None` before the first comparison.
     pub fn worst(&self) -> Option<(f64, f64)> {
         let worst = self.parts.iter().filter_map(|(_, part)| part.worst);
         worst.max_by(|one, other| one.0.total_cmp(&other.0))

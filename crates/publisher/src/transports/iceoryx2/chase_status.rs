@@ -1,7 +1,8 @@
-//! `<name>/chase`: the status of a chase, and the right to be the only chase of a show. Called by the crate `chase`.
+//! `<name>/chase`: the status of a chase, and the right to be the only chase of a show.
 //!
-//! The status is a service of messages, which a tunnel to other machines may join with a publisher of its own. So the
-//! right is a second service of the same name: one that serves requests, admits one server, and never gets a request.
+//! The status is a service of messages, which a tunnel to other machines may join with a publisher of its own. So it
+//! cannot show that there is only one chase. The right is therefore a second service of the same name, which serves
+//! requests, admits one server, and never gets a request.
 
 use ::iceoryx2::port::server::Server;
 use ::iceoryx2::prelude::*;

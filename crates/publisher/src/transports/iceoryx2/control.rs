@@ -1,7 +1,7 @@
 //! Commands over shared memory: the request-response service `<name>/control`, on its own thread.
 //!
-//! A dead client, or one that floods the service, costs the loop nothing. This thread takes the requests, and the loop
-//! executes one command in each period from a queue of bounded length.
+//! A client that is dead, or that floods the service, does not delay the loop: this thread reads the requests, and the
+//! loop executes one command in each period from a queue of bounded length.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

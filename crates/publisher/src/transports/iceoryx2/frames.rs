@@ -1,7 +1,6 @@
 //! A service of frames, and the publisher's port to it: a header, and a slice of poses of one kind.
 //!
-//! In: a header and poses. Out: a sample, written where subscribers read it. Called by
-//! [`SharedMemoryPublisher`](super::SharedMemoryPublisher), on the loop's thread.
+//! In: a header and poses. Out: a sample, written where subscribers read it, on the loop's thread.
 
 use std::fmt::Debug;
 
@@ -27,7 +26,7 @@ pub(super) struct FrameService {
     pub(super) service: &'static str,
     /// Poses in a frame.
     pub(super) poses: usize,
-    /// The decimation of the handles, which becomes the service's attribute [`EVERY`]. `None` for all handles. A
+    /// The decimation of the handles, which becomes the service's attribute [`EVERY`], or `None` for all handles. A
     /// service that others keep open must have the same attribute.
     pub(super) every: Option<usize>,
 }

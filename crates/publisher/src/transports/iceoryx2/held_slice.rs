@@ -1,8 +1,7 @@
 //! A service of one message with a list: `<name>/stage` and `<name>/scene`. The message is sent at the beginning and
-//! kept for late subscribers. While there is a tunnel, the message is sent again once a second.
+//! kept for late subscribers. While there is a tunnel, it is sent again once a second.
 //!
-//! In: a header and the elements. Out: one sample. Called by [`SharedMemoryPublisher`](super::SharedMemoryPublisher),
-//! on the loop's thread.
+//! In: a header and the elements. Out: one sample.
 
 use std::fmt::Debug;
 use std::time::Instant;

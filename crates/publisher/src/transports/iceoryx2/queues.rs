@@ -1,4 +1,4 @@
-//! The memory of the queues of frames, and the check for it. Called by the publisher before it opens a service.
+//! The memory of the queues of frames, and the check for it.
 
 use bench_dragon_client::shared_memory::{OpenError, free_bytes};
 use bench_dragon_messages::{FrameHeader, HandlePose, HandlePose32, QUEUE_BYTES, Stage};

@@ -6,7 +6,8 @@ use super::super::*;
 use crate::scene::OnContact;
 use bench_dragon_testing::model::{Model, ModelCue, ModelShow, Sum};
 
-/// Frames per second. Every time, rate and scale below is a whole number of [`Sum::UNITS`], and exact as a double.
+/// The rate, in frames per second. Every time, rate and scale below is a whole number of [`Sum::UNITS`], and exact as a
+/// double.
 const RATE: i64 = 64;
 
 fn commands() -> impl Strategy<Value = Command> {
