@@ -198,7 +198,6 @@ fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosur
 /// Boards that come nearest at the very lock that ends the show. The certificate ends a nanometre before the lock. It
 /// still has an upper bound, unless its steps end before the place of that bound.
 #[test]
-#[ignore = "tests/run --all"]
 fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound() {
     let (mut bounded, mut at_lock, mut index) = (0, 0, 0);
     while at_lock < 8 {
@@ -251,6 +250,7 @@ fn speed_certified(text: &str) -> bool {
 
 /// Certificates of the least pitch: of a team like the paper's, and of one whose head locks.
 #[test]
+#[ignore = "tests/run --all"]
 fn certificates_of_the_least_pitch_are_accepted() {
     for (head, body, width, inset, radius) in
         [(3.41, 2.2, 0.3, 0.275, 4.5), (2.0, 2.0, 0.2, 0.1, 3.0), (3.0, 1.2, 0.4, 0.1, 1.6), (5.0, 1.0, 0.1, 0.1, 1.5)]
@@ -291,7 +291,6 @@ fn tried(index: usize, all: bool) -> (Vec<Status>, Option<Until>, bool) {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
 fn every_certificate_of_a_tight_route_is_accepted() {
     let numbers = numbers().unwrap_or(0..harness::cases(40, 200, 100_000));
     let count = numbers.len();
@@ -403,7 +402,6 @@ fn certificates_of_pieces_with_a_length_are_accepted() {
 /// A certificate of the least clearance, the greatest speed or the least pitch is refused without any one of its lines.
 /// It is also refused with a result that claims a little more.
 #[test]
-#[ignore = "tests/run --all"]
 fn changed_certificates_of_other_questions_are_refused() {
     let team = "[team]\nbenches = 5\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\
                 [motion]\nhead_speed = 1.0\n";

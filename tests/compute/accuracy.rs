@@ -126,7 +126,6 @@ fn every_accuracy_is_kept_on_every_scene_and_a_coarser_one_costs_no_more() {
 /// Both instruction sets and the portable path, with and without velocities, from every format of a table. Each has its
 /// own machine code, so each is tested.
 #[test]
-#[ignore = "tests/run --all"]
 fn every_instruction_set_keeps_every_accuracy_against_the_reference() {
     let mut run = BTreeSet::new();
     for name in ["paper", "turnaround", "procession"] {
