@@ -121,11 +121,6 @@ impl Process {
         self.0.stderr = Some(stderr);
     }
 
-    /// Returns true if the process has ended.
-    pub fn has_ended(&mut self) -> bool {
-        self.0.try_wait().unwrap().is_some()
-    }
-
     /// Returns the first line that the process prints.
     pub fn first_line(&mut self) -> String {
         let mut output = BufReader::new(self.0.stdout.take().unwrap());

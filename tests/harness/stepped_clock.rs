@@ -1,6 +1,6 @@
 //! A stepped wall clock for one process: preloaded into the process (`LD_PRELOAD`), this library replaces the C
-//! library's `clock_gettime`. CLOCK_REALTIME is right for two seconds, an hour ahead for two seconds, an hour behind for
-//! two seconds, and so on. Every other clock is the true one. The machine's own clock stays untouched.
+//! library's `clock_gettime`. CLOCK_REALTIME is right for two seconds, an hour ahead for two seconds, an hour behind
+//! for two seconds, and so on. Every other clock is the true one. The machine's own clock stays untouched.
 
 use std::sync::OnceLock;
 

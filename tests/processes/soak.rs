@@ -85,22 +85,19 @@ fn twenty_seconds_pass_with_nothing_missed() {
     place.assert_clean();
 }
 
-/// A read every 1.5 s, and a queue that lasts half a second: two thirds of all frames are missed, and that is no failure.
+/// A read every 1.5 s, and a queue that lasts half a second: two thirds of all frames are missed. Those that a steady
+/// subscriber misses, where the machine does not run it for half a second, are counted alone.
 #[test]
 fn a_slow_subscriber_may_miss_frames() {
     let place = Place::new("soak_slow");
     let mut soak = place.program();
-    soak.arg("--scene").arg(place.scene_publishing("queue = 125"));
-    soak.args(["soak", "--json", "--duration", "8s", "--rate", "250", "--subscribers", "1", "--slow", "1"]);
-    let report = json_lines(&Process::start(soak.args(ANY_SPEED)).output()).pop().unwrap();
+    soak.arg("--scene").arg(place.scene_publishing("queue = 125")).args(["soak", "--json", "--duration", "8s"]);
+    soak.args(["--rate", "250", "--subscribers", "1", "--slow", "1"]).args(ANY_SPEED);
+    let report = json_lines(&Process::start(&mut soak).output()).pop().unwrap();
     let [steady, slow] = [0, 1].map(|at| &report["subscribers"][at]);
-    assert_eq!((&steady["role"], &slow["role"]), (&"steady".into(), &"slow".into()));
-    let frames = number(&report["publisher"], "frames");
-    assert!(number(&slow["seen"], "missed") > 0 && number(&slow["seen"], "received") < frames, "{report}");
-    // Where the machine does not run a steady subscriber for half a second, its frames alone are counted.
-    let missed = number(&steady["seen"], "missed") as f64;
-    let (passed, counted) = checks(&report)["frames missed by steady subscribers"];
-    assert!(counted >= missed && passed == (counted == 0.0), "{report}");
+    assert!(slow["role"] == "slow" && number(&slow["seen"], "missed") > 0, "{report}");
+    let (passed, missed) = checks(&report)["frames missed by steady subscribers"];
+    assert!(missed >= number(&steady["seen"], "missed") as f64 && passed == (missed == 0.0), "{report}");
 }
 
 /// Asserts that the files beside a report agree with it, by independent readers. The JSON fits its schema, the
@@ -411,11 +408,7 @@ fn nobody_outlives_a_killed_soak_test() {
     let children = children(&soak);
     soak.signal(SIGKILL);
     drop(soak);
-    let deadline = Instant::now() + Duration::from_secs(20);
-    while children.iter().any(|(child, _)| exists(*child)) {
-        assert!(Instant::now() < deadline, "{children:?} still run");
-        wait(0.05);
-    }
+    wait_until("all of them have ended", || !children.iter().any(|(child, _)| exists(*child)));
     place.assert_clean();
 }
 
