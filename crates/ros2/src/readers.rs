@@ -162,7 +162,7 @@ mod tests {
     fn a_best_effort_reader_has_every_message_and_a_slow_one_those_of_two_seconds_ago() {
         let (mut readers, start) = (Readers::new(Kind::Volatile(10)), Instant::now());
         let both = matched(&[(1, RELIABLE), (2, BEST_EFFORT)]);
-        let mut at =
+        let at =
             |readers: &mut Readers, ms: u64| readers.update(&both, start + Duration::from_millis(ms)).acknowledgements;
         write(&mut readers, 100);
         assert_eq!(at(&mut readers, 0), [(guid(2), 100)], "new");
