@@ -10,7 +10,7 @@
 //! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants that have
 //! died: on this machine those whose sockets are gone, elsewhere those whose address belongs to a newer participant.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
@@ -22,6 +22,9 @@ const INTERVAL: Duration = Duration::from_millis(20);
 /// The UDP sockets of this network namespace. A system without this file only has the rule of the newer participant.
 const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
 
+/// The most participants that are remembered as dead. Datagrams of a dead participant can come for some seconds.
+const REMEMBERED: usize = 1000;
+
 /// The sockets of each port, by their inodes. No two sockets that exist at one time share an inode.
 type Sockets = BTreeMap<u16, BTreeSet<u64>>;
 
@@ -29,6 +32,10 @@ type Sockets = BTreeMap<u16, BTreeSet<u64>>;
 #[derive(Default)]
 pub(super) struct Departures {
     participants: BTreeMap<Prefix, Addresses>,
+    /// The participants by the order of their discovery, from 1.
+    order: BTreeMap<Prefix, u64>,
+    discovered: u64,
+    died: VecDeque<Prefix>,
     checked: Option<Instant>,
 }
 
@@ -36,11 +43,21 @@ pub(super) struct Departures {
 type Addresses = BTreeMap<SocketAddr, Option<BTreeSet<u64>>>;
 
 impl Departures {
-    /// Notes the addresses of remote endpoints. Returns the participants that had one of these addresses before, and
-    /// those that have died before RustDDS reported them.
+    /// Notes that a participant has been discovered.
+    pub(super) fn discovered(&mut self, participant: Prefix) {
+        self.discovered += 1;
+        self.order.entry(participant).or_insert(self.discovered);
+    }
+
+    /// Notes the addresses of remote endpoints. Returns the dead participants among them, and those that had one of
+    /// these addresses before: of two participants the later one has it.
     pub(super) fn note(&mut self, endpoints: impl IntoIterator<Item = (Prefix, Vec<SocketAddr>)>) -> Vec<Prefix> {
-        let (mut sockets, mut died) = (None, Vec::new());
+        let (mut sockets, mut dead) = (None, Vec::new());
         for (prefix, addresses) in endpoints {
+            if self.died.contains(&prefix) {
+                dead.push(prefix);
+                continue;
+            }
             for address in addresses {
                 let known = self.participants.entry(prefix).or_default();
                 if known.contains_key(&address) {
@@ -48,14 +65,30 @@ impl Departures {
                 }
                 let sockets = sockets.get_or_insert_with(read_sockets);
                 let of_port = is_local(address).then(|| sockets.get(&address.port()).cloned().unwrap_or_default());
-                died.extend(of_port.as_ref().filter(|sockets| sockets.is_empty()).map(|_| prefix));
+                dead.extend(of_port.as_ref().filter(|sockets| sockets.is_empty()).map(|_| prefix));
                 known.insert(address, of_port);
-                let others = self.participants.iter().filter(|(other, _)| **other != prefix);
-                died.extend(others.filter(|(_, known)| known.contains_key(&address)).map(|(other, _)| *other));
+                dead.extend(self.earlier_at(address));
             }
         }
-        self.forget(&died);
-        died
+        self.remember(&dead);
+        dead
+    }
+
+    /// Returns all participants with this address but the one that was discovered last.
+    fn earlier_at(&self, address: SocketAddr) -> Vec<Prefix> {
+        let with = self.participants.iter().filter(|(_, known)| known.contains_key(&address));
+        let mut with: Vec<Prefix> = with.map(|(prefix, _)| *prefix).collect();
+        with.sort_by_key(|prefix| self.order.get(prefix));
+        with.pop();
+        with
+    }
+
+    fn remember(&mut self, dead: &[Prefix]) {
+        self.forget(dead);
+        for prefix in dead.iter().filter(|prefix| !self.died.contains(prefix)).copied().collect::<BTreeSet<_>>() {
+            self.died.push_back(prefix);
+        }
+        self.died.drain(..self.died.len().saturating_sub(REMEMBERED));
     }
 
     /// Returns the participants of this machine whose sockets are gone. Looks at them if a participant has come or some
@@ -86,7 +119,10 @@ impl Departures {
 
     /// Forgets participants that have left.
     pub(super) fn forget(&mut self, participants: &[Prefix]) {
-        participants.iter().for_each(|prefix| drop(self.participants.remove(prefix)));
+        for prefix in participants {
+            self.participants.remove(prefix);
+            self.order.remove(prefix);
+        }
     }
 }
 
@@ -134,7 +170,7 @@ mod tests {
         let now = Instant::now();
         assert_eq!(note(&mut departures, OLD, address), [[0; 12]; 0]);
         assert_eq!(departures.gone(true, now), [[0; 12]; 0]);
-        assert_eq!(note(&mut departures, NEW, "127.0.0.1:9".parse().unwrap()), [NEW], "no socket has this port");
+        assert_eq!(note(&mut departures, NEW, free_address()), [NEW], "no socket has this port");
         drop(socket);
         assert_eq!(departures.gone(false, now), [[0; 12]; 0], "looked at a moment ago");
         // The port may have been taken again.
@@ -143,9 +179,32 @@ mod tests {
         assert_eq!(departures.gone(true, now), [[0; 12]; 0], "once");
     }
 
+    /// Returns an address of this machine that no socket has.
+    fn free_address() -> SocketAddr {
+        UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
+    }
+
+    #[test]
+    fn a_dead_participant_that_is_reported_late_ends_no_living_one() {
+        let mut departures = Departures::default();
+        departures.discovered(OLD);
+        departures.discovered(NEW);
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = socket.local_addr().unwrap();
+        // The port is that of the new one already when the endpoints of the old one are detected.
+        assert_eq!(note(&mut departures, NEW, address), [[0; 12]; 0]);
+        assert_eq!(note(&mut departures, OLD, address), [OLD]);
+        // A datagram of the old one that comes still later.
+        departures.discovered(OLD);
+        assert_eq!(note(&mut departures, OLD, address), [OLD]);
+        assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
+    }
+
     #[test]
     fn a_participant_elsewhere_is_gone_when_a_newer_one_has_its_address() {
         let mut departures = Departures::default();
+        departures.discovered(OLD);
+        departures.discovered(NEW);
         // Documentation addresses (RFC 5737).
         let [one, other] = ["198.51.100.1:7411", "198.51.100.2:7411"].map(|address| address.parse().unwrap());
         assert_eq!(note(&mut departures, OLD, one), [[0; 12]; 0]);

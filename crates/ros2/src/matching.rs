@@ -47,6 +47,8 @@ struct Ends {
     /// Datagrams for new endpoints.
     repeated: Vec<Repeated>,
     departures: Departures,
+    /// Farewells that have been said.
+    farewells: u16,
     /// Acknowledgements that have been sent.
     acknowledged: u32,
 }
@@ -75,6 +77,7 @@ impl Matches {
             neighbours: BTreeMap::new(),
             repeated: Vec::new(),
             departures: Departures::default(),
+            farewells: 0,
             acknowledged: 0,
         };
         Self { ends: Arc::new(Mutex::new(ends)) }
@@ -188,7 +191,10 @@ impl Ends {
         let (mut has_come, mut detected) = (false, BTreeSet::new());
         while let Some(event) = self.events.try_recv_status() {
             match event {
-                Event::ParticipantDiscovered { .. } => has_come = true,
+                Event::ParticipantDiscovered { dpd } => {
+                    has_come = true;
+                    self.departures.discovered(prefix(dpd.guid));
+                }
                 Event::RemoteReaderMatched { local_writer, remote_reader } => {
                     self.readers.insert((local_writer, remote_reader));
                 }
@@ -224,7 +230,8 @@ impl Ends {
         for participant in dead {
             log::debug!("ROS 2: participant {participant:02x?} has died: it leaves the network");
             // Its loss is then an event of RustDDS.
-            wire::send_to_own(&self.participant, &wire::farewell(participant));
+            self.farewells = self.farewells.wrapping_add(1);
+            wire::send_to_own(&self.participant, &wire::farewell(participant, self.farewells));
         }
         self.serve_repeated();
     }

@@ -33,7 +33,7 @@ const KEY: u8 = 8;
 const PARTICIPANT_READER: [u8; 4] = [0, 1, 0, 0xc7];
 const PARTICIPANT_WRITER: [u8; 4] = [0, 1, 0, 0xc2];
 /// The number of a participant's last message: more than any participant sends.
-const LAST_MESSAGE: [u8; 4] = [0, 0, 0, 0x40];
+const LAST_MESSAGE: u32 = 1 << 30;
 /// The bytes of a fragment: RustDDS's `FRAGMENT_SIZE`. A reader takes fragments of one size.
 pub(super) const FRAGMENT_BYTES: usize = 256;
 /// The bytes before a payload: its encoding, little-endian CDR, and no options.
@@ -122,12 +122,13 @@ pub(super) fn fragments(writer: GUID, reader: GUID, sequence: u64, body: &[u8], 
     })
 }
 
-/// Returns the message of a participant to all that it has left the network.
-pub(super) fn farewell(participant: Prefix) -> Vec<u8> {
+/// Returns the message of a participant to all that it has left the network. `round` counts farewells.
+pub(super) fn farewell(participant: Prefix, round: u16) -> Vec<u8> {
     let mut bytes = header(participant);
     // No flags beyond the header's, the distance to the parameters, and the message's number. RustDDS ignores a number
     // that it has received (`TopicCache::add_change`).
-    let mut body = [[0, 0, 16, 0], PARTICIPANT_READER, PARTICIPANT_WRITER, [0; 4], LAST_MESSAGE].concat();
+    let number = (LAST_MESSAGE + u32::from(round)).to_le_bytes();
+    let mut body = [[0, 0, 16, 0], PARTICIPANT_READER, PARTICIPANT_WRITER, [0; 4], number].concat();
     // PID_STATUS_INFO: disposed and unregistered; the end of the parameters.
     body.extend([0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0]);
     // The key, as a list of parameters in little endian: PID_PARTICIPANT_GUID, and the end.
@@ -269,11 +270,11 @@ mod tests {
     fn a_farewell_names_the_participant() {
         #[rustfmt::skip]
         let expected = [
-            0x15, 11, 60, 0, 0, 0, 16, 0, 0, 1, 0, 0xc7, 0, 1, 0, 0xc2, 0, 0, 0, 0, 0, 0, 0, 64,
+            0x15, 11, 60, 0, 0, 0, 16, 0, 0, 1, 0, 0xc7, 0, 1, 0, 0xc2, 0, 0, 0, 0, 5, 0, 0, 64,
             0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0,
             0, 3, 0, 0, 0x50, 0, 16, 0, 1, 15, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 0, 0, 1, 0xc1, 1, 0, 0, 0,
         ];
         let expected = [b"RTPS", &[2, 4, 1, 18][..], &READER[..12], &expected].concat();
-        assert_eq!(farewell(prefix(GUID::from_bytes(READER))), expected);
+        assert_eq!(farewell(prefix(GUID::from_bytes(READER)), 5), expected);
     }
 }
