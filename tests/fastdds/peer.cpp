@@ -1,7 +1,7 @@
 // A Fast DDS process that subscribes to topics and calls services as rmw_fastrtps does, with payloads as bytes.
 //
 //     peer subscribe TOPIC TYPE [--best-effort] [--transient-local] [--depth N] [--seconds S] [--samples N]
-//         [--linger S] [--joins N] [--lease S] [--shared-memory]
+//         [--linger S] [--joins N] [--lease S] [--shared-memory] [--beside]
 //     peer call SERVICE REQUEST_TYPE RESPONSE_TYPE HEX [--timeout S] [--clients N] [--heartbeat S]
 //
 // Both take --domain D. TOPIC and SERVICE are names on the wire without their prefixes: "rt/", or "rq/" and "rr/".
@@ -12,7 +12,8 @@
 //
 // `subscribe` prints a JSON line for each sample, one when the subscriber exists, and one when it is matched with a
 // publisher. `subscribe` prints another when the subscriber has ended, with the quality of service that the publisher
-// offers. The subscriber ends after S seconds, or some time after N samples. With --joins that happens N times, each
+// offers. With --beside a volatile subscriber of the same topic stands beside in the process, and the last line has the
+// number of its samples. The subscriber ends after S seconds, or some time after N samples. With --joins that happens N times, each
 // with a participant of its own. `call` makes the first call of N new clients, each with a participant that knows the
 // server before, and prints a JSON line for each.
 
@@ -107,6 +108,7 @@ struct Options {
   bool reliable = true;
   bool transient_local = false;
   bool shared_memory = false;
+  bool beside = false;
   int depth = 10;
   int joins = 1;
   int clients = 1;
@@ -127,6 +129,8 @@ struct Options {
         transient_local = true;
       } else if (option == "--shared-memory") {
         shared_memory = true;
+      } else if (option == "--beside") {
+        beside = true;
       } else if (i + 1 == count) {
         fail("unexpected argument " + option);
       } else {
@@ -250,6 +254,15 @@ public:
     return reader;
   }
 
+  // Another reader of the same topic, volatile.
+  DataReader* beside(DataReader* reader) {
+    DataReaderQos qos = reader->get_qos();
+    qos.durability().kind = VOLATILE_DURABILITY_QOS;
+    auto* other = subscriber->create_datareader(const_cast<TopicDescription*>(reader->get_topicdescription()), qos);
+    if (!other) fail("no second reader");
+    return other;
+  }
+
   DataWriter* writer(const std::string& name, const std::string& type) {
     DataWriterQos qos = DATAWRITER_QOS_DEFAULT;
     settle(qos);
@@ -312,6 +325,7 @@ void subscribe(const std::string& name, const std::string& type, const Options& 
     const long long made = wall_ns();
     Peer peer(options, events);
     auto* reader = peer.reader("rt/" + name, type);
+    auto* other = options.beside ? peer.beside(reader) : nullptr;
     std::printf("{\"type\":\"made\",\"made_ns\":%lld}\n", made);
     std::fflush(stdout);
     uint64_t samples = 0;
@@ -340,8 +354,13 @@ void subscribe(const std::string& name, const std::string& type, const Options& 
         if (samples == options.samples) end = std::min(end, in(options.linger));
       }
     }
-    std::printf("{\"type\":\"end\",\"made_ns\":%lld,\"samples\":%llu,\"writers\":%d,\"offered\":\"%s\"}\n", made,
-                static_cast<unsigned long long>(samples), events.writers, events.offered("rt/" + name).c_str());
+    unsigned beside = 0;
+    Bytes bytes;
+    SampleInfo info;
+    while (other && other->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) beside += info.valid_data;
+    std::printf("{\"type\":\"end\",\"made_ns\":%lld,\"samples\":%llu,\"writers\":%d,\"offered\":\"%s\",\"beside\":%u}\n",
+                made, static_cast<unsigned long long>(samples), events.writers, events.offered("rt/" + name).c_str(),
+                beside);
     std::fflush(stdout);
   }
 }

@@ -4,7 +4,7 @@
 //! room for 212,992 bytes, the default of Linux, so for three of them. What does not fit is lost, and RustDDS repairs
 //! eight fragments of 256 bytes each 10 ms (`handle_repair_frags_send_worker`): of 5,000 benches a reader got a third of
 //! all messages. So the fragments of such a message come again here, in datagrams at intervals, within the period of the
-//! messages. A reader takes only what is missing.
+//! messages. A reader takes only what is missing. Held by `a_reliable_subscriber_gets_the_messages_of_a_large_team`.
 //!
 //! In: a message as RustDDS has numbered it. Out: datagrams, sent by a thread. A message that comes before the datagrams
 //! of the one before are sent replaces them.

@@ -2,13 +2,14 @@
 //!
 //! In: the matched readers, and each message that is written. Out: [`Owed`], which the writer's topic sends.
 //!
-//! | reader | is owed | because RustDDS |
-//! |---|---|---|
-//! | new, of a transient-local writer | no message but the latest, or those of the lifespan; a volatile one none | offers all that it keeps, whatever the reader's durability and depth (`Writer::update_reader_proxy`) |
-//! | best-effort | an acknowledgement of every message, in its name | waits for it without end (`Writer::remove_all_acked_changes_but_keep_depth`) |
-//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones |
+//! | reader | is owed | because RustDDS | held by the test |
+//! |---|---|---|---|
+//! | new, of a transient-local writer | no message but the latest, or those of the lifespan; a volatile one none | offers all that it keeps, whatever the reader's durability and depth (`Writer::update_reader_proxy`) | `a_late_subscriber_gets_the_current_alert`, `a_late_volatile_subscriber`, `a_late_subscriber_of_rosout` |
+//! | best-effort | an acknowledgement of every message, in its name | waits for it without end (`Writer::remove_all_acked_changes_but_keep_depth`) | `subscribers_that_come_and_go` |
+//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones | `a_killed_subscriber_stops_no_other` |
 //!
-//! A dead reader leaves with its participant ([`departures`](super::departures)).
+//! A dead reader leaves with its participant ([`departures`](super::departures)), held by
+//! `the_ports_of_a_killed_subscriber`. The tests are those of `tests/ros2/fast_dds`.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};

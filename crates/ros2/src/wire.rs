@@ -73,8 +73,9 @@ pub(super) fn acknowledgement(reader: GUID, writer: GUID, last: u64, round: u32)
 /// to it (`StatefulReader::processGapMsg` calls `History::remove_change_nts`), and the next `take` never returns.
 pub(super) fn gap(writer: GUID, reader: GUID, numbers: RangeInclusive<u32>) -> Vec<u8> {
     let (first, last) = numbers.into_inner();
-    // The start (high, low), the end, and a set of one number: the end.
-    let words = [0, first, 0, last, 1, 1 << 31];
+    // The start (high, low), the first number after the end, and an empty set from there on. Fast DDS 2.14 ignores a GAP
+    // whose set begins at the start.
+    let words = [0, first, 0, last + 1, 0];
     between(writer, reader, |writer, reader| submessage(GAP, 0, [reader, writer], &words))
 }
 
@@ -215,8 +216,8 @@ mod tests {
     fn a_gap_names_a_range() {
         #[rustfmt::skip]
         let expected = [
-            0x08, 1, 32, 0, 0, 0, 22, 4, 0, 0, 21, 3, 0, 0, 0, 0, 1, 0, 0, 0,
-            0, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 128,
+            0x08, 1, 28, 0, 0, 0, 22, 4, 0, 0, 21, 3, 0, 0, 0, 0, 1, 0, 0, 0,
+            0, 0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0,
         ];
         let (reader, writer) = ends();
         assert_eq!(gap(writer, reader, 1..=7), message(WRITER, READER, &expected));

@@ -116,6 +116,22 @@ fn json_numbers(printed: &[String]) -> Vec<u64> {
     samples.filter(|line| line["type"] == "sample").map(|line| line["sequence"].as_u64().unwrap()).collect()
 }
 
+/// A volatile subscription gets no message of before it, also where another one of its process requests the history.
+#[test]
+fn a_late_volatile_subscriber_gets_nothing_old_beside_a_transient_local_one() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "beside";
+    let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "50", "--duration", "6000"]);
+    for topic in ["path", "stage"] {
+        let both = ["--transient-local", "--beside", "--samples", "1", "--linger", "2", "--seconds", "60"];
+        let end = end(&Process::start(&mut subscriber(name, topic, &both)).lines().rest());
+        assert_eq!((&end["samples"], &end["beside"]), (&Value::from(1), &Value::from(0)), "{topic}: {end}");
+    }
+    stopped(publisher);
+}
+
 /// rcl keeps a line for ten seconds, as the writer's lifespan.
 #[test]
 fn a_late_subscriber_of_rosout_gets_the_lines_of_ten_seconds() {
