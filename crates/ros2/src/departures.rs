@@ -8,7 +8,10 @@
 //! (`DiscoveryDB::remove_participant`). So this file finds out who has died, and the matches say farewell in its name.
 //!
 //! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants that have
-//! died: on this machine those whose sockets are gone, elsewhere those whose address belongs to a newer participant.
+//! died: on this machine those whose sockets are gone, elsewhere those whose addresses belong to a newer participant.
+//! A participant lists all addresses of its machine. It is on this machine if all of them are, and it is succeeded by
+//! one that lists the same: machines share single addresses, such as those of the loopback interface or of containers'
+//! bridges, but not all.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{SocketAddr, UdpSocket};
@@ -31,7 +34,7 @@ type Sockets = BTreeMap<u16, BTreeSet<u64>>;
 /// The remote participants of a network.
 #[derive(Default)]
 pub(super) struct Departures {
-    participants: BTreeMap<Prefix, Addresses>,
+    participants: BTreeMap<Prefix, Participant>,
     /// The participants by the order of their discovery, from 1.
     order: BTreeMap<Prefix, u64>,
     discovered: u64,
@@ -39,8 +42,12 @@ pub(super) struct Departures {
     checked: Option<Instant>,
 }
 
-/// The addresses of a participant. One of this machine has the sockets that its port had when it was discovered.
-type Addresses = BTreeMap<SocketAddr, Option<BTreeSet<u64>>>;
+#[derive(Default)]
+struct Participant {
+    addresses: BTreeSet<SocketAddr>,
+    /// The sockets that its ports had when they were noted, if it is on this machine.
+    sockets: Option<BTreeSet<u64>>,
+}
 
 impl Departures {
     /// Notes that a participant has been discovered.
@@ -49,34 +56,40 @@ impl Departures {
         self.order.entry(participant).or_insert(self.discovered);
     }
 
-    /// Notes the addresses of remote endpoints. Returns the dead participants among them, and those that had one of
-    /// these addresses before: of two participants the later one has it.
+    /// Notes the addresses of remote endpoints. Returns the dead participants among them, and those that had the same
+    /// addresses before: of such participants the latest lives.
     pub(super) fn note(&mut self, endpoints: impl IntoIterator<Item = (Prefix, Vec<SocketAddr>)>) -> Vec<Prefix> {
-        let (mut sockets, mut dead) = (None, Vec::new());
-        for (prefix, addresses) in endpoints {
+        let (mut table, mut dead) = (None, Vec::new());
+        for (prefix, mut addresses) in endpoints {
             if self.died.contains(&prefix) {
                 dead.push(prefix);
                 continue;
             }
-            for address in addresses {
-                let known = self.participants.entry(prefix).or_default();
-                if known.contains_key(&address) {
-                    continue;
-                }
-                let sockets = sockets.get_or_insert_with(read_sockets);
-                let of_port = is_local(address).then(|| sockets.get(&address.port()).cloned().unwrap_or_default());
-                dead.extend(of_port.as_ref().filter(|sockets| sockets.is_empty()).map(|_| prefix));
-                known.insert(address, of_port);
-                dead.extend(self.earlier_at(address));
+            if addresses.iter().any(|address| !address.ip().is_loopback()) {
+                addresses.retain(|address| !address.ip().is_loopback());
             }
+            let participant = self.participants.entry(prefix).or_default();
+            let known = participant.addresses.len();
+            participant.addresses.extend(addresses);
+            if participant.addresses.len() == known {
+                continue;
+            }
+            let table = table.get_or_insert_with(read_sockets).as_ref();
+            let is_here = participant.addresses.iter().all(|address| is_local(*address));
+            participant.sockets = table.filter(|_| is_here).map(|table| participant.sockets_in(table));
+            if participant.sockets.as_ref().is_some_and(BTreeSet::is_empty) {
+                dead.push(prefix);
+            }
+            dead.extend(self.earlier_than_the_latest_at(prefix));
         }
         self.remember(&dead);
         dead
     }
 
-    /// Returns all participants with this address but the one that was discovered last.
-    fn earlier_at(&self, address: SocketAddr) -> Vec<Prefix> {
-        let with = self.participants.iter().filter(|(_, known)| known.contains_key(&address));
+    /// Returns all participants with the addresses of this one but the one that was discovered last.
+    fn earlier_than_the_latest_at(&self, prefix: Prefix) -> Vec<Prefix> {
+        let addresses = &self.participants[&prefix].addresses;
+        let with = self.participants.iter().filter(|(_, other)| other.addresses == *addresses);
         let mut with: Vec<Prefix> = with.map(|(prefix, _)| *prefix).collect();
         with.sort_by_key(|prefix| self.order.get(prefix));
         with.pop();
@@ -99,21 +112,17 @@ impl Departures {
             return Vec::new();
         }
         self.checked = Some(now);
-        self.gone_from(&read_sockets())
+        read_sockets().map_or_else(Vec::new, |sockets| self.gone_from(&sockets))
     }
 
-    fn gone_from(&mut self, sockets: &Sockets) -> Vec<Prefix> {
-        let is_gone = |(address, before): (&SocketAddr, &Option<BTreeSet<u64>>)| {
-            let now = sockets.get(&address.port());
-            before.as_ref().is_some_and(|before| now.is_none_or(|now| now.is_disjoint(before)))
+    fn gone_from(&mut self, table: &Sockets) -> Vec<Prefix> {
+        let is_gone = |participant: &Participant| {
+            let before = participant.sockets.as_ref();
+            before.is_some_and(|before| before.is_disjoint(&participant.sockets_in(table)))
         };
-        let gone: Vec<Prefix> = self
-            .participants
-            .iter()
-            .filter(|(_, known)| known.iter().any(is_gone))
-            .map(|(prefix, _)| *prefix)
-            .collect();
-        self.forget(&gone);
+        let gone: Vec<Prefix> =
+            self.participants.iter().filter(|(_, known)| is_gone(known)).map(|(prefix, _)| *prefix).collect();
+        self.remember(&gone);
         gone
     }
 
@@ -126,14 +135,22 @@ impl Departures {
     }
 }
 
+impl Participant {
+    /// Returns the sockets of its ports.
+    fn sockets_in(&self, table: &Sockets) -> BTreeSet<u64> {
+        self.addresses.iter().filter_map(|address| table.get(&address.port())).flatten().copied().collect()
+    }
+}
+
 /// Returns true for an address of this machine: sockets can be bound to it.
 pub(super) fn is_local(address: SocketAddr) -> bool {
     UdpSocket::bind((address.ip(), 0)).is_ok()
 }
 
-fn read_sockets() -> Sockets {
+/// Returns the sockets of this network namespace. `None` if the system does not list them: this process has some.
+fn read_sockets() -> Option<Sockets> {
     let tables = TABLES.map(|table| std::fs::read_to_string(table).unwrap_or_default());
-    sockets(&tables.concat())
+    Some(sockets(&tables.concat())).filter(|sockets| !sockets.is_empty())
 }
 
 /// Reads a table of sockets: a line for each, with the local address as `ADDRESS:PORT`, in hexadecimal digits, in the
@@ -160,6 +177,21 @@ mod tests {
 
     fn note(departures: &mut Departures, prefix: Prefix, address: SocketAddr) -> Vec<Prefix> {
         departures.note([(prefix, vec![address])])
+    }
+
+    /// A machine with containers: its bridge's address is also that of other machines' bridges.
+    #[test]
+    fn machines_that_share_some_addresses_end_no_participant_of_each_other() {
+        let mut departures = Departures::default();
+        let shared: SocketAddr = "172.17.0.1:7411".parse().unwrap();
+        let here = free_address();
+        for (number, own) in [(1, "198.51.100.1:7411"), (2, "198.51.100.2:7411")] {
+            departures.discovered([number; 12]);
+            // No socket of this machine has the port of the loopback address.
+            let addresses = vec![here, shared, own.parse().unwrap()];
+            assert_eq!(departures.note([([number; 12], addresses)]), [[0; 12]; 0]);
+        }
+        assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
     }
 
     #[test]
@@ -211,7 +243,8 @@ mod tests {
         assert_eq!(note(&mut departures, OLD, one), [[0; 12]; 0]);
         assert_eq!(note(&mut departures, NEW, other), [[0; 12]; 0], "another machine");
         assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
-        assert_eq!(note(&mut departures, NEW, one), [OLD]);
+        departures.discovered([3; 12]);
+        assert_eq!(note(&mut departures, [3; 12], one), [OLD]);
     }
 
     /// Lines of Linux 6.1.
