@@ -126,6 +126,11 @@ impl Departures {
         gone
     }
 
+    /// Returns true if a participant is on this machine.
+    pub(super) fn is_here(&self, participant: Prefix) -> bool {
+        self.participants.get(&participant).is_some_and(|participant| participant.sockets.is_some())
+    }
+
     /// Forgets participants that have left.
     pub(super) fn forget(&mut self, participants: &[Prefix]) {
         for prefix in participants {
@@ -143,7 +148,7 @@ impl Participant {
 }
 
 /// Returns true for an address of this machine: sockets can be bound to it.
-pub(super) fn is_local(address: SocketAddr) -> bool {
+fn is_local(address: SocketAddr) -> bool {
     UdpSocket::bind((address.ip(), 0)).is_ok()
 }
 

@@ -15,7 +15,7 @@ use rustdds::{
     DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, RTPSEntity, StatusEvented,
 };
 
-use super::departures::{Departures, is_local};
+use super::departures::Departures;
 use super::readers::Owed;
 use super::repeated::Repeated;
 use super::wire::{self, Prefix, prefix};
@@ -265,9 +265,8 @@ impl Ends {
             .collect();
         let dead = self.departures.note(found.iter().map(|(guid, addresses)| (prefix(*guid), addresses.clone())));
         let of_fast_dds = found.iter().filter(|(guid, _)| wire::is_fast_dds(*guid));
-        self.neighbours.extend(of_fast_dds.filter_map(|(guid, addresses)| {
-            Some((*guid, addresses.iter().copied().find(|address| is_local(*address))?))
-        }));
+        let here = of_fast_dds.filter(|(guid, _)| self.departures.is_here(prefix(*guid)));
+        self.neighbours.extend(here.filter_map(|(guid, addresses)| Some((*guid, *addresses.first()?))));
         self.addresses.extend(found);
         dead
     }
