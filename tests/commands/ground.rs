@@ -196,11 +196,8 @@ fn a_team_that_starts_within_a_keep_out_meets_it_at_once_with_a_warning() {
     let scene =
         scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [8.0, 2.0], radius = 0.5 }\nkeep_out = 1.0");
     let output = run(&scene, &["check"]);
-    assert!(
-        text(&output.stderr).contains("within the keep-out of an obstacle at the start"),
-        "{}",
-        text(&output.stderr)
-    );
+    let printed = text(&output.stdout);
+    assert!(printed.contains("within the keep-out of an obstacle at the start"), "{printed}");
     let events = text(&run(&scene, &["events"]).stdout);
     assert!(events.starts_with(" obstacle  t = 0 s: bench "), "{events}");
     assert!(events.contains("is at the lamp from the start"), "{events}");
@@ -224,7 +221,7 @@ fn a_team_that_starts_on_an_obstacle_or_outside_the_boundary_meets_it_at_once_wi
         let line: serde_json::Value = serde_json::from_str(text(&line).lines().next().unwrap()).unwrap();
         assert!(line["event"] == "obstacle" && line["time"] == 0.0 && line["bench_b"] == 224, "{stage}: {line}");
         let checked = run(&scene, &["check"]);
-        let warned = text(&checked.stderr);
+        let warned = text(&checked.stdout);
         assert!(checked.status.success(), "{stage}: {warned}");
         assert!(warned.contains("within the keep-out of an obstacle at the start"), "{stage}: {warned}");
     }
