@@ -2,8 +2,8 @@
 
     ros2_wire.py --ports 7411,7413 --messages 20
 
-Prints {"data": N, "data_frag": M} when that many submessages of either kind, from writers that are not of discovery,
-have come: a message that is sent whole, and a part of a message (RTPS 2.5, sections 9.4.5.4 and 9.4.5.5).
+Prints {"data": N, "data_frag": M} when that many submessages of either kind have come. DATA is a whole message, DATA_FRAG
+a part of one (RTPS 2.5, sections 9.4.5.4 and 9.4.5.5). Writers of discovery do not count.
 """
 
 import argparse

@@ -66,14 +66,16 @@ fn every_crate_comes_from_the_registry_with_its_checksum() {
     let packages = lock["package"].as_array().unwrap();
     let text = |package: &toml::Value, field: &str| package.get(field)?.as_str().map(str::to_owned);
     let mut checked = 0;
-    let is_own = |package: &toml::Value| text(package, "name").is_some_and(|name| name.starts_with("bench-dragon"));
+    // The last of these replaces a crate of the registry (`[patch.crates-io]`).
+    let own = |name: &str| name.starts_with("bench-dragon") || name == "netdev";
+    let is_own = |package: &toml::Value| text(package, "name").is_some_and(|name| own(&name));
     for package in packages.iter().filter(|package| !is_own(package)) {
         let source = text(package, "source").unwrap_or_default();
         assert!(registries.contains(source.trim_start_matches("registry+")), "{package}");
         assert!(text(package, "checksum").is_some_and(|checksum| checksum.len() == 64), "{package}");
         checked += 1;
     }
-    assert!(checked > 300, "{checked} crates");
+    assert!(checked > 280, "{checked} crates");
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub(super) struct Copies {
 }
 
 impl Copies {
-    /// Begins the copies of a topic, if its messages of so many `bytes` need any. Without a thread there are none.
+    /// Begins the copies of a topic, if its messages of this many `bytes` need any. Without a thread there are none.
     pub(super) fn of(bytes: usize) -> Option<Self> {
         if bytes <= BURST_BYTES {
             return None;

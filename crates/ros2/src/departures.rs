@@ -1,16 +1,17 @@
 //! Participants that have died without a farewell.
 //!
 //! RustDDS 0.15.1 sends to a killed participant until its lease ends (Fast DDS: 20 s). Meanwhile another participant may
-//! have taken its UDP port. That one gets messages which are not meant for it (`Writer::send_message_to_readers`, and
-//! `Writer::handle_repair_frags_send_worker`, which names no participant), and parts of a message that a GAP then
-//! withdraws make a reader of Fast DDS 2.14 hang ([`gap`](super::wire::gap)). Its readers also hold up the others until
-//! the lease ends, and RustDDS never forgets the endpoints of a participant whose lease has ended
-//! (`DiscoveryDB::remove_participant`). So this file finds out who has died, and the matches say farewell in its name.
+//! have taken its UDP port, and gets messages that are not meant for it: pushes (`Writer::send_message_to_readers`), and
+//! repairs that name no participant (`Writer::handle_repair_frags_send_worker`). Parts of a message that a GAP then
+//! withdraws make a reader of Fast DDS 2.14 hang ([`gap`](super::wire::gap)). The readers of the dead participant also
+//! hold up the others until the lease ends, and RustDDS never forgets the endpoints of a participant whose lease has
+//! ended (`DiscoveryDB::remove_participant`). So this file finds out who has died, and the matches say farewell in its
+//! name.
 //!
 //! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants that have
 //! died: on this machine those whose sockets are gone, elsewhere those whose addresses belong to a newer participant.
 //! A participant lists all addresses of its machine. It is on this machine if all of them are, and it is succeeded by
-//! one that lists the same: machines share single addresses, such as those of the loopback interface or of containers'
+//! one that lists the same. Machines share single addresses, such as those of the loopback interface or of containers'
 //! bridges, but not all.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

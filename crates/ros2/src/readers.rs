@@ -51,7 +51,7 @@ struct Reader {
     since: Instant,
 }
 
-/// What a writer owes at one time.
+/// The debts of a writer at one time.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Owed {
     /// Readers in whose names the first messages of these numbers are acknowledged.
@@ -212,7 +212,7 @@ mod tests {
         (0..30).for_each(|second| readers.count(at(second)));
         let mut withheld =
             |number, requests, seconds| readers.update(&matched(&[(number, requests)]), at(seconds)).withheld;
-        // Those of seconds 20 to 29 stay, and that of 19 is ten seconds old.
+        // Messages of seconds 20 to 29 stay, and that of 19 is ten seconds old.
         assert_eq!(withheld(1, LATCHED, 29), [(guid(1), 19)]);
         assert_eq!(withheld(2, LATCHED, 38), [(guid(2), 28)]);
         assert_eq!(withheld(3, LATCHED, 60), [(guid(3), 30)]);

@@ -7,8 +7,8 @@
 //! The first requests of a new Fast DDS client are requested again. RustDDS drops a request that comes before its
 //! discovery thread has matched the client's writer, and then sends an ACKNACK without requests, which Fast DDS answers
 //! after its heartbeat period of 3 s (`Reader::send_preemptive_acknacks`). Without this half of all first calls take
-//! 3 s, and a `hold` must not. A writer retransmits what it has and what is not acknowledged; RustDDS drops a message
-//! that comes twice. NACK_FRAG and the ACKNACKs of RustDDS have separate counters. Held by
+//! 3 s, and a `hold` must not. A writer retransmits the messages that it has and that are not acknowledged; RustDDS
+//! drops a message that comes twice. NACK_FRAG and the ACKNACKs of RustDDS have separate counters. Held by
 //! `a_hundred_new_clients_each_get_the_answer_to_their_first_call`.
 
 use std::net::SocketAddr;

@@ -1,4 +1,4 @@
-//! What a Fast DDS subscriber needs so that it survives: undivided messages, and silence towards dead processes.
+//! Needs of a Fast DDS subscriber without which it hangs or is lost: whole messages, and silence towards dead processes.
 
 use std::collections::BTreeSet;
 use std::net::{Ipv4Addr, UdpSocket};
@@ -59,7 +59,7 @@ fn the_ports_of_a_killed_subscriber_are_silent_within_seconds() {
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    // The show goes on for the other one.
+    // The show continues for the other one.
     others.until(SAMPLE);
     stopped(publisher);
 }
