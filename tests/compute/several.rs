@@ -373,7 +373,10 @@ fn what_cannot_be_is_refused_in_one_sentence() {
         ("dragons = []\n".to_owned(), "dragons is empty, expected 1 to 16 dragons"),
         (format!("{cue}{gold}{jade}"), "x.toml, line 3: cues.travelled names no dragon"),
         (gold.replace("[dragons.motion]\nhead_speed = 1.0\n", ""), "missing field `motion`"),
-        (format!("[motion]\nhead_speed = 1.0\n{gold}"), "unknown field `head_speed`"),
+        (
+            format!("[motion]\nhead_speed = 1.0\n{gold}"),
+            "motion.head_speed: unknown field here, head_speed stands in [dragons.motion]",
+        ),
     ] {
         let error = Scene::parse_any(&text, "x.toml", "x").unwrap_err().to_string();
         assert!(error.contains(expected), "{error}\ninstead of: {expected}");

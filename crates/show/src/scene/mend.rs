@@ -25,7 +25,10 @@ pub(super) fn sentence(message: &str, field: &str, line: &str) -> Option<String>
     }
     let key = field.rsplit('.').next().filter(|_| message.starts_with("unknown field"))?;
     let table = table_of(key)?;
-    let of_each = field.starts_with("dragons[") && ["team", "path", "motion", "placement"].contains(&table);
+    // The table of that name of a show of several has other fields than that of a dragon.
+    let of_show = field == format!("{table}.{key}");
+    let is_dragons = of_show || field.starts_with("dragons[");
+    let of_each = is_dragons && ["team", "path", "motion", "placement"].contains(&table);
     let table = if of_each { format!("dragons.{table}") } else { table.to_owned() };
     Some(format!("{field}: unknown field here, {key} stands in [{table}], expected a line [{table}] above it"))
 }
