@@ -77,10 +77,11 @@ impl Departures {
             }
             let table = table.get_or_insert_with(read_sockets).as_ref();
             let is_here = participant.addresses.iter().all(|address| is_local(*address));
-            participant.sockets = table.filter(|_| is_here).map(|table| participant.sockets_in(table));
-            if participant.sockets.as_ref().is_some_and(BTreeSet::is_empty) {
+            let sockets = table.filter(|_| is_here).map(|table| participant.sockets_in(table));
+            if sockets.as_ref().is_some_and(BTreeSet::is_empty) && participant.has_no_socket() {
                 dead.push(prefix);
             }
+            participant.sockets = sockets.filter(|sockets| !sockets.is_empty());
             dead.extend(self.earlier_than_the_latest_at(prefix));
         }
         self.remember(&dead);
@@ -118,8 +119,9 @@ impl Departures {
 
     fn gone_from(&mut self, table: &Sockets) -> Vec<Prefix> {
         let is_gone = |participant: &Participant| {
-            let before = participant.sockets.as_ref();
-            before.is_some_and(|before| before.is_disjoint(&participant.sockets_in(table)))
+            let Some(before) = &participant.sockets else { return false };
+            let now = participant.sockets_in(table);
+            before.is_disjoint(&now) && (!now.is_empty() || participant.has_no_socket())
         };
         let gone: Vec<Prefix> =
             self.participants.iter().filter(|(_, known)| is_gone(known)).map(|(prefix, _)| *prefix).collect();
@@ -145,6 +147,12 @@ impl Participant {
     /// Returns the sockets of its ports.
     fn sockets_in(&self, table: &Sockets) -> BTreeSet<u64> {
         self.addresses.iter().filter_map(|address| table.get(&address.port())).flatten().copied().collect()
+    }
+
+    /// Returns true if its addresses are free. The kernel's table can miss a socket: it is read in parts, and a socket
+    /// that is closed meanwhile moves the following ones.
+    fn has_no_socket(&self) -> bool {
+        self.addresses.iter().all(|address| UdpSocket::bind(address).is_ok())
     }
 }
 
@@ -251,6 +259,17 @@ mod tests {
         assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
         departures.discovered([3; 12]);
         assert_eq!(note(&mut departures, [3; 12], one), [OLD]);
+    }
+
+    /// As when the kernel's table misses a line.
+    #[test]
+    fn a_socket_that_a_table_misses_is_still_there() {
+        let mut departures = Departures::default();
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        assert_eq!(note(&mut departures, OLD, socket.local_addr().unwrap()), [[0; 12]; 0]);
+        assert_eq!(departures.gone_from(&BTreeMap::from([(1, BTreeSet::from([1]))])), [[0; 12]; 0]);
+        drop(socket);
+        assert_eq!(departures.gone_from(&BTreeMap::from([(1, BTreeSet::from([1]))])), [OLD]);
     }
 
     /// Lines of Linux 6.1.
