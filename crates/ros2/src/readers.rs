@@ -97,7 +97,7 @@ impl Readers {
         self.written
     }
 
-    /// Returns true if a message has a receiver.
+    /// Returns true if the writer has no readers.
     pub(super) fn is_empty(&self) -> bool {
         self.known.is_empty()
     }

@@ -37,7 +37,7 @@ pub(super) struct Repeated {
 
 enum Subject {
     FirstRequests,
-    /// The first messages of this number, and the addresses of the reader.
+    /// The first messages of this number.
     Withheld(u32),
 }
 
