@@ -1,14 +1,9 @@
-//! Spans of the path and the capsules that hold their points. See "Capsules" in `docs/proofs.md`.
-
-use serde::Serialize;
+//! The capsules that hold the points of spans. See "Capsules" in `docs/proofs.md`.
 
 use super::interval::{Interval, Vector, dot, minus, norm, norm_squared, plus, scaled};
-use super::path::{ExactPath, Place, of_turns};
+use super::path::{ExactPath, of_turns};
+use super::place::{Place, Span};
 use bench_dragon_motion::placement::Placement;
-
-/// All places from the first to the second.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Span(pub Place, pub Place);
 
 /// Points and tangents over a span.
 #[derive(Debug, Clone, Copy)]

@@ -9,14 +9,14 @@ mod certificate;
 use std::io;
 
 use super::CertifyError;
-use super::capsule::Span;
 use super::first_order::When;
 use super::first_order_step::{FirstOrderStep, StepPoints, step_points};
 use super::grid::GridPoint;
 use super::ground;
 use super::interval::Interval;
 use super::lines::{CertificateLine, Links, Step};
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
+use super::place::{Place, Span};
 use super::search::{LEAST, path_end};
 use super::step::{Chain, Obstacle};
 use bench_dragon_messages::state::EventKind;

@@ -4,7 +4,8 @@
 use super::boards::Shape;
 use super::capsule::{Capsule, Frame, Spanned};
 use super::interval::{Interval, Vector, cross, dot, minus, norm, norm_squared, plus, scaled};
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
+use super::place::Place;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::{closest_points_board_board, separation_board_board};

@@ -1,11 +1,10 @@
 //! Handles and boards over a step of the head: spans by Lemma 1, and first-order enclosures by Lemma 6 of
 //! `docs/proofs.md`.
 
-use super::capsule::Span;
 use super::first_order::{FirstOrderBoard, FirstOrderHandle, Pace, When};
 use super::grid::{GridPoint, fine_place, place};
 use super::lines::Links;
-use super::path::Place;
+use super::place::{Place, Span};
 use super::step::{Chain, Claim, Listed, Obstacle};
 
 /// The grid points of a step.

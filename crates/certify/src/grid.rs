@@ -1,8 +1,8 @@
 //! Grid points of the search: the handles for one place of the head, in doubles. They are the starting guess of the
 //! spans, so correctness does not depend on them.
 
-use super::capsule::Span;
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
+use super::place::{Place, Span};
 use bench_dragon_motion::linkage::{NoFollower, follower, link_pose};
 use bench_dragon_motion::model::curve::Coordinate;
 use bench_dragon_motion::model::path::{Param, Path};

@@ -20,6 +20,7 @@ mod link;
 mod lock;
 mod path;
 mod pitch;
+mod place;
 pub mod plan;
 mod search;
 pub mod speed;
@@ -29,7 +30,6 @@ mod turn;
 use std::io;
 
 pub use between::{BetweenEnclosure, SeveralClearances, certify_several, certify_several_clearances};
-pub use capsule::Span;
 pub use clearance::{
     ClearanceEnclosure, ClearanceEnclosures, ClearanceHints, MOST_CLEARANCE_STEPS, ObstacleEnclosure, Write,
     certify_least_clearance, enclose_least_clearance,
@@ -38,7 +38,7 @@ pub use lines::{
     About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedObstacleClearance, CertifiedPitch,
     CertifiedSpeed, FORMAT, Links, Status, Step, Until, WIDE,
 };
-pub use path::Place;
+pub use place::{Place, Span};
 
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::event::Event;

@@ -4,8 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::capsule::Span;
-use super::path::Place;
+use super::place::{Place, Span};
 use bench_dragon_messages::state::EventKind;
 
 /// The version of the file format.

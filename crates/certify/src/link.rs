@@ -2,9 +2,10 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::capsule::{Capsule, Span, Spanned};
+use super::capsule::{Capsule, Spanned};
 use super::interval::{Interval, dot, minus, norm_squared};
 use super::path::ExactPath;
+use super::place::Span;
 
 /// Limit of halvings of a stretch whose places must be nearer than the link.
 const MOST_HALVINGS: u32 = 44;

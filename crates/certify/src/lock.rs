@@ -1,11 +1,11 @@
 //! Proof of a lock: places that the follower of a link cannot pass, with no follower between them in the end. Lemma 5
 //! of `docs/proofs.md`.
 
-use super::capsule::{Span, Spanned};
+use super::capsule::Spanned;
 use super::grid::{GridPoint, place, span};
 use super::interval::Interval;
 use super::link::{all_nearer, one_place_within};
-use super::path::Place;
+use super::place::{Place, Span};
 use super::step::Chain;
 use bench_dragon_motion::model::root::{bisect_predicate, golden_section_min};
 

@@ -6,13 +6,13 @@
 mod far;
 
 use super::boards::Shape;
-use super::capsule::Span;
 use super::clearance::Descent;
 use super::elementary::{pi, sin_cos};
 use super::grid::GridPoint;
 use super::interval::Interval;
 use super::lines::{CertificateLine, Links, Step};
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
+use super::place::{Place, Span};
 use super::step::{Chain, Claim, Listed, links_of};
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;

@@ -3,12 +3,13 @@
 
 use std::io;
 
-use super::capsule::{Span, Spanned};
+use super::capsule::Spanned;
 use super::grid::{GridPoint, place};
 use super::ground::Barrier;
 use super::interval::Interval;
 use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
+use super::place::{Place, Span};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
 use bench_dragon_messages::state::EventKind;

@@ -14,7 +14,8 @@ pub use self::certificate::certify_greatest_ratio;
 use self::step::{Bounds, Speeds};
 use super::grid::{GridPoint, place};
 use super::interval::Interval;
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
+use super::place::Place;
 use super::step::Chain;
 use bench_dragon_motion::Motion;
 

@@ -3,13 +3,14 @@
 use std::cell::OnceCell;
 
 use super::boards::{MovingBoard, Shape};
-use super::capsule::{Span, Spanned, moved_back};
+use super::capsule::{Spanned, moved_back};
 use super::grid::{GridPoint, span};
 use super::ground::Barrier;
 use super::interval::Interval;
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
+use super::place::{Place, Span};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;

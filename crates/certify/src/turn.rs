@@ -5,15 +5,16 @@ use std::cell::Cell;
 
 use super::Given;
 use super::boards::Shape;
-use super::capsule::{Capsule, Span, Spanned};
+use super::capsule::{Capsule, Spanned};
 use super::clearance::Descent;
 use super::elementary::pi;
 use super::first_order::{FirstOrderBoard, FirstOrderHandle, When};
 use super::grid::GridPoint;
 use super::interval::{Interval, Vector, dot, minus, norm, norm_squared, plus, scaled};
 use super::lines::{CertificateLine, CertifiedEvent, Links, Status};
-use super::path::{ExactPath, Place};
+use super::path::ExactPath;
 use super::pitch::clear_beyond;
+use super::place::{Place, Span};
 use super::search::{CertificateSearch, MOST_SPANS, path_end};
 use super::step::{Chain, Claim, Listed, links_of};
 use bench_dragon_messages::state::EventKind;

@@ -4,8 +4,8 @@
 
 use svg::node::element::{Circle, Group, Path};
 
+use super::eye::{Eye, Spot};
 use super::rounded;
-use super::seat::{Eye, Spot};
 use bench_dragon_motion::model::{Point, Vector};
 
 /// The place of a figure on the stage.

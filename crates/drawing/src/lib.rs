@@ -10,6 +10,7 @@ pub mod animation;
 mod benches;
 pub mod camera;
 pub mod dragons;
+mod eye;
 mod figure;
 mod ground;
 mod labels;

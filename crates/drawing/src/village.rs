@@ -1,8 +1,8 @@
 //! The night over a village, and those who sit in front, for the look from a seat.
 
-use svg::node::element::{Circle, Group, Path, Rectangle};
+use svg::node::element::{Circle, Group, Path, Rectangle, Use};
 
-use super::seat::{Eye, used};
+use super::eye::Eye;
 use super::{WIDTH, rounded};
 
 /// Returns a number from 0 to 1 that looks random.
@@ -54,6 +54,11 @@ pub fn night(eye: &Eye) -> Group {
             ));
     }
     group.add(people)
+}
+
+/// Returns a copy of a shape among the definitions of the picture.
+pub(super) fn used(name: &str) -> Use {
+    Use::new().set("href", format!("#{name}"))
 }
 
 /// Returns a house of a width in metres, whose gable rises in steps; `number` varies it.

@@ -2,12 +2,14 @@
 
 use super::boards::Board;
 use super::chain::Chain;
-use super::first_order::{FirstOrder, FirstOrderBoard, When};
+use super::first_order::FirstOrder;
+use super::first_order_board::FirstOrderBoard;
+use super::handle::When;
 use super::interval::Interval;
 use super::lines::Links;
 use super::path::Span;
 use super::scene::Scene;
-use super::steps::{check_ring, straight_run};
+use super::unlisted::{check_ring, straight_run};
 
 /// Checks that no two boards that share no handle are as near as `metres`. A step of the front links concerns only the
 /// pairs with boards 0 and 1. `step` has the first-order enclosures of the chain. Returns the number of pairs.

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::capsule::Capsule;
 use super::interval::{Interval, Vector};
-use super::scene::Team;
+use super::team::Team;
 
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;

@@ -1,9 +1,9 @@
 //! Positions over a span, and the front and rear products of two spans (docs/proofs.md, "Capsules").
 
 use super::curve::At;
-use super::ground::Mapping;
 use super::interval::{Interval, Vector};
 use super::path::{Path, Span};
+use super::placement::Mapping;
 
 /// All places of a span: p(x) = p(m) + tau h t(m) + e, |tau| <= 1, |e| <= sag; |t(x) - t(m)| <= turn.
 #[derive(Debug, Clone)]

@@ -5,7 +5,6 @@ use serde::Deserialize;
 
 use super::elementary;
 use super::interval::{Interval, Vector};
-use super::scene::positive;
 
 /// A curve, as a function of its coordinate.
 pub(super) enum Curve {
@@ -294,34 +293,34 @@ pub(super) fn read_piece(
     let to_left = |side: &Side| Interval::new(if matches!(side, Side::Left) { 1.0 } else { -1.0 });
     match piece {
         PieceText::Line { length } => {
-            let end = positive("path.pieces.length", *length)?;
+            let end = Interval::positive("path.pieces.length", *length)?;
             Ok((Curve::line(origin, heading), zero, end, zero))
         }
         PieceText::Arc { radius, side, turns, length } => {
-            let radius = positive("path.pieces.radius", *radius)?;
+            let radius = Interval::positive("path.pieces.radius", *radius)?;
             let end = match (turns, length) {
                 (Some(turns), None) => {
-                    positive("path.pieces.turns", *turns)?;
+                    Interval::positive("path.pieces.turns", *turns)?;
                     elementary::turns(*turns)
                 }
-                (None, Some(length)) => positive("path.pieces.length", *length)? / radius,
+                (None, Some(length)) => Interval::positive("path.pieces.length", *length)? / radius,
                 _ => return Err("an arc has either turns or a length".to_owned()),
             };
             let curve = Curve::arc(origin, direction(heading), to_left(side), radius);
             Ok((curve, zero, end, to_left(side) * end))
         }
         PieceText::Spiral { pitch, radius, direction, side, turns, length } => {
-            let a = positive("path.pieces.pitch", *pitch)? / elementary::turns(1.0);
-            let first = positive("path.pieces.radius", *radius)? / a;
+            let a = Interval::positive("path.pieces.pitch", *pitch)? / elementary::turns(1.0);
+            let first = Interval::positive("path.pieces.radius", *radius)? / a;
             let is_inward = *direction == Way::In;
             let last = match (turns, length) {
                 (Some(turns), None) => {
-                    positive("path.pieces.turns", *turns)?;
+                    Interval::positive("path.pieces.turns", *turns)?;
                     let around = elementary::turns(*turns);
                     if is_inward { first - around } else { first + around }
                 }
                 (None, Some(length)) => {
-                    let metres = positive("path.pieces.length", *length)?;
+                    let metres = Interval::positive("path.pieces.length", *length)?;
                     last_angle(&a, &first, &if is_inward { -metres } else { metres })?
                 }
                 _ => return Err("a spiral has either turns or a length".to_owned()),

@@ -2,7 +2,7 @@
 
 use super::elementary;
 use super::interval::Interval;
-use super::scene::Team;
+use super::team::Team;
 
 /// Returns true if Lemma 8 holds for a pitch while all handles are `radius` metres from the centre or further out.
 pub(super) fn holds(team: &Team, pitch: f64, radius: &Interval) -> bool {

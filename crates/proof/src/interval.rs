@@ -33,6 +33,18 @@ impl Interval {
         Self { lo: end, hi: end }
     }
 
+    /// Creates the interval of a positive number of a text.
+    ///
+    /// # Errors
+    /// A sentence about the field, for another number.
+    pub fn positive(field: &str, number: f64) -> Result<Self, String> {
+        if number.is_finite() && number > 0.0 {
+            Ok(Self::new(number))
+        } else {
+            Err(format!("{field} is {number:?}, expected a positive number"))
+        }
+    }
+
     /// Creates the interval between two numbers.
     #[cfg(test)]
     pub fn between(lo: Number, hi: Number) -> Self {

@@ -13,20 +13,25 @@ mod elementary;
 mod events;
 mod far;
 mod first_order;
+mod first_order_board;
 mod greatest;
 mod ground;
+mod handle;
 mod interval;
 mod lines;
 mod link;
 mod number;
 mod path;
 mod pitch;
+mod placement;
 mod results;
 mod scene;
 mod several;
 mod sides;
 mod speeds;
 mod steps;
+mod team;
+mod unlisted;
 
 #[cfg(test)]
 mod tests;

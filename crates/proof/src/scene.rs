@@ -6,12 +6,12 @@ use serde::de::IgnoredAny;
 
 use super::curve::{Curve, PieceText, read_piece};
 use super::elementary;
-use super::ground::{Mapping, Obstacle, PlacementText, StageText};
+use super::ground::{Obstacle, StageText};
 use super::interval::{Interval, Vector};
 use super::path::{Path, PathEnd, Segment};
+use super::placement::{Mapping, PlacementText};
+use super::team::{Team, TeamText};
 
-/// Limit of benches.
-const MOST: usize = 1_000_000;
 /// Limit of the pieces of a route, as in a show: the cost of a step grows with them.
 const MOST_PIECES: usize = 4096;
 
@@ -32,27 +32,6 @@ pub(super) struct Scene {
     pub head_speed: Interval,
     /// The obstacles in the path's own coordinates, the boundary last.
     pub obstacles: Vec<Obstacle>,
-}
-
-/// The team of benches.
-pub(super) struct Team {
-    pub benches: usize,
-    pub width: Interval,
-    pub hole_inset: Interval,
-    head_link: Interval,
-    body_link: Interval,
-}
-
-impl Team {
-    /// Returns the metres between the two handles of a bench.
-    pub fn link(&self, bench: usize) -> &Interval {
-        if bench == 0 { &self.head_link } else { &self.body_link }
-    }
-
-    /// Returns the metres of the links from bench `first` to bench `last` in one line.
-    pub fn links(&self, first: usize, last: usize) -> Interval {
-        self.link(first) + self.link(1) * Interval::new((last - first) as f64)
-    }
 }
 
 /// The fields of a scene that a proof needs. The other fields concern the publisher.
@@ -88,16 +67,6 @@ struct DragonText {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TeamText {
-    benches: usize,
-    head_length: f64,
-    body_length: f64,
-    width: f64,
-    hole_inset: f64,
-}
-
-#[derive(Deserialize)]
 struct MotionText {
     head_speed: f64,
     solver: Option<String>,
@@ -130,14 +99,6 @@ enum PathText {
 /// Reads a text.
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     toml::from_str(text).map_err(|error: toml::de::Error| error.message().trim().replace('\n', ", "))
-}
-
-pub(super) fn positive(field: &str, number: f64) -> Result<Interval, String> {
-    if number.is_finite() && number > 0.0 {
-        Ok(Interval::new(number))
-    } else {
-        Err(format!("{field} is {number:?}, expected a positive number"))
-    }
 }
 
 fn finite(field: &str, number: f64) -> Result<Interval, String> {
@@ -184,7 +145,7 @@ impl Scene {
         if text.motion.solver.as_deref() == Some("paper") {
             return Err("the scene names the solver \"paper\", whose motion is not the exact one".to_owned());
         }
-        let head_speed = positive("motion.head_speed", text.motion.head_speed)?;
+        let head_speed = Interval::positive("motion.head_speed", text.motion.head_speed)?;
         let start = if let PathText::Pieces { start, .. } = &text.path { *start } else { [0.0; 2] };
         let frame = Mapping::new(&text.placement, start)?;
         let obstacles = stage.map_or_else(|| Ok(Vec::new()), |stage| stage.read(&frame))?;
@@ -233,22 +194,12 @@ impl Scene {
 
     /// Returns the same team in units of `unit` metres, on the inward spiral r = theta.
     pub fn in_units(&self, unit: &Interval) -> Self {
-        let Team { benches, width, hole_inset, head_link, body_link } = &self.team;
-        let team = Team {
-            benches: *benches,
-            width: width / unit,
-            hole_inset: hole_inset / unit,
-            head_link: head_link / unit,
-            body_link: body_link / unit,
-        };
-        Self { team, ..self.on_spiral(Interval::new(1.0)) }
+        Self { team: self.team.in_units(unit), ..self.on_spiral(Interval::new(1.0)) }
     }
 
     /// Returns the same team on the inward spiral r = a theta. The travel is measured from the centre, negative before
     /// it.
     pub fn on_spiral(&self, a: Interval) -> Self {
-        let Team { benches, width, hole_inset, head_link, body_link } = self.team;
-        let team = Team { benches, width, hole_inset, head_link, body_link };
         let zero = Interval::new(0.0);
         let inward = Segment { curve: Curve::inward(a), begin: None, end: Some(zero) };
         let path = Path::new(vec![inward], zero, PathEnd::Coordinate(zero), zero);
@@ -256,7 +207,7 @@ impl Scene {
             name: String::new(),
             delay: zero,
             frame: Mapping::unmoved(),
-            team,
+            team: self.team.clone(),
             path,
             head_speed: self.head_speed,
             obstacles: Vec::new(),
@@ -264,33 +215,13 @@ impl Scene {
     }
 }
 
-impl TeamText {
-    fn read(&self) -> Result<Team, String> {
-        if self.benches == 0 || self.benches > MOST {
-            return Err(format!("team.benches is {}, expected from 1 to {MOST}", self.benches));
-        }
-        let hole_inset = positive("team.hole_inset", self.hole_inset)?;
-        let link = |field: &str, length: f64| {
-            let link = positive(field, length)? - Interval::new(2.0) * hole_inset;
-            if link.is_positive() { Ok(link) } else { Err(format!("{field} leaves no bench between its holes")) }
-        };
-        Ok(Team {
-            benches: self.benches,
-            width: positive("team.width", self.width)?,
-            head_link: link("team.head_length", self.head_length)?,
-            body_link: link("team.body_length", self.body_length)?,
-            hole_inset,
-        })
-    }
-}
-
 /// Returns the metres of radius per radian.
 fn growth(pitch: f64) -> Result<Interval, String> {
-    Ok(positive("path.pitch", pitch)? / elementary::turns(1.0))
+    Ok(Interval::positive("path.pitch", pitch)? / elementary::turns(1.0))
 }
 
 fn spiral(pitch: f64, start_turn: f64) -> Result<Path, String> {
-    positive("path.start_turn", start_turn)?;
+    Interval::positive("path.start_turn", start_turn)?;
     let curve = Curve::inward(growth(pitch)?);
     let inward = Segment { curve, begin: None, end: Some(Interval::new(0.0)) };
     let start = elementary::turns(start_turn);
@@ -303,17 +234,17 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
         return Err("the path is no turnaround".to_owned());
     };
     let a = growth(*pitch)?;
-    let radius = positive("path.turn_radius", *turn_radius)?;
-    let ratio = positive("path.arc_ratio", *arc_ratio)?;
+    let radius = Interval::positive("path.turn_radius", *turn_radius)?;
+    let ratio = Interval::positive("path.arc_ratio", *arc_ratio)?;
     let turn = radius / a;
     let inward = Curve::inward(a);
     let lead_in = match (lead_in, start_turn) {
         (Some(metres), None) if *metres == 0.0 => Interval::new(0.0),
-        (Some(metres), None) => positive("path.lead_in", *metres)?,
+        (Some(metres), None) => Interval::positive("path.lead_in", *metres)?,
         (None, Some(turns)) => {
             // 2 pi start_turn is not less than turn_radius / a: both sides are divided by 2 pi and multiplied by the
             // pitch.
-            let outside = radius.is_at_most(&(positive("path.start_turn", *turns)? * Interval::new(*pitch)));
+            let outside = radius.is_at_most(&(Interval::positive("path.start_turn", *turns)? * Interval::new(*pitch)));
             if !outside {
                 return Err("path.start_turn is inside the turn".to_owned());
             }
@@ -323,7 +254,7 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
     };
     let lead_out = match lead_out {
         Some(metres) if *metres == 0.0 => Interval::new(0.0),
-        Some(metres) => positive("path.lead_out", *metres)?,
+        Some(metres) => Interval::positive("path.lead_out", *metres)?,
         None => team.links(0, team.benches - 1),
     };
     let both = (radius.square() + a.square()).sqrt();

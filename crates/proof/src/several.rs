@@ -4,12 +4,15 @@ use super::boards::{Board, covers};
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
 use super::events::{Events, Finish};
-use super::first_order::{FirstOrder, FirstOrderBoard, When};
+use super::first_order::FirstOrder;
+use super::first_order_board::FirstOrderBoard;
+use super::handle::When;
 use super::interval::{Interval, Vector};
 use super::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
 use super::path::{Place, Span};
 use super::scene::Scene;
-use super::steps::{Steps, straight_run};
+use super::steps::Steps;
+use super::unlisted::straight_run;
 
 /// Facts that the section of a dragon has shown.
 pub(super) struct Alone {

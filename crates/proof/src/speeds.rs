@@ -2,7 +2,8 @@
 
 use super::capsule::{Capsule, Pair};
 use super::chain::Chain;
-use super::first_order::{FirstOrder, Handle};
+use super::first_order::FirstOrder;
+use super::handle::Handle;
 use super::interval::Interval;
 use super::path::{Place, Span};
 use super::scene::Scene;

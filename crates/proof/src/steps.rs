@@ -1,9 +1,7 @@
 //! The steps of a certificate and their consequences: the rules of a step, Lemmas 3 and 4 of docs/proofs.md.
 
-use std::ops::Range;
-
 use super::apart;
-use super::boards::{Board, is_inside_ring};
+use super::boards::Board;
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
 use super::first_order::FirstOrder;
@@ -11,6 +9,7 @@ use super::interval::Interval;
 use super::lines::Links;
 use super::path::{Place, Span};
 use super::scene::Scene;
+use super::unlisted::{check_ring, straight_run};
 
 /// A step of the file.
 pub(super) struct Step {
@@ -366,20 +365,6 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
     Ok(pairs + about as u64)
 }
 
-/// Returns the first and the last handle of the boards from `first` on, and the metres between the two. Precondition:
-/// the last listed handle is on segment 0, a line.
-pub(super) fn straight_run(scene: &Scene, chain: &Chain, first: usize) -> (Capsule, Capsule, Interval) {
-    let (team, last) = (&scene.team, chain.last());
-    let length = team.links(first, team.benches - 1);
-    let front: Capsule = if first == last {
-        chain.capsules[last].clone()
-    } else {
-        chain.capsules[last].behind(&team.links(last, first - 1))
-    };
-    let rear = front.behind(&length);
-    (front, rear, length)
-}
-
 /// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The boards `about` are apart from
 /// them, and they are apart from each other.
 fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), String> {
@@ -400,25 +385,4 @@ fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), Strin
         }
     }
     Ok(())
-}
-
-/// Checks Lemma 3, *Ring*: some boards are more than `metres` apart from all body boards from a handle on.
-pub(super) fn check_ring(
-    scene: &Scene,
-    chain: &Chain,
-    boards: Range<usize>,
-    from_handle: usize,
-    metres: &Interval,
-) -> Result<(), String> {
-    let Span(_, latest) = chain.capsules[from_handle].span;
-    let ring = scene.path.spiral_radius(latest).filter(|_| latest.0 == 0);
-    let ring = ring.ok_or("it claims to be clear, but the last handle listed is not on segment 0, an inward spiral")?;
-    let reach = (chain.capsules[boards.start..=boards.end].iter())
-        .map(|capsule| capsule.point.norm() + capsule.half)
-        .fold(Interval::new(0.0), |most, metres| most.max(&metres));
-    if is_inside_ring(&scene.team, &reach, &ring, metres) {
-        Ok(())
-    } else {
-        Err("it claims to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)".to_owned())
-    }
 }

@@ -2,13 +2,14 @@
 //! Lemma 12 of `docs/proofs.md`.
 
 use crate::boards::MovingBoard;
-use crate::capsule::{Frame, Span, Spanned};
+use crate::capsule::{Frame, Spanned};
 use crate::first_order::{FirstOrderBoard, Pace};
 use crate::first_order_step::{FirstOrderStep, step_points};
 use crate::grid::GridPoint;
 use crate::interval::Interval;
 use crate::lines::Links;
-use crate::path::{ExactPath, Place};
+use crate::path::ExactPath;
+use crate::place::{Place, Span};
 use crate::search::{LEAST, Section, path_end};
 use crate::step::{Chain, Claim, Listed};
 use bench_dragon_motion::ensemble::Dragon;

@@ -2,11 +2,12 @@
 
 use super::{BEFORE_LOCK, Descent, TOUCH};
 use crate::boards::MovingBoard;
-use crate::capsule::{Span, Spanned};
+use crate::capsule::Spanned;
 use crate::first_order::When;
 use crate::first_order_step::FirstOrderStep;
 use crate::grid::GridPoint;
 use crate::lines::Links;
+use crate::place::Span;
 use crate::step::{Claim, Listed, sum_above};
 use bench_dragon_motion::event::Event;
 

@@ -6,7 +6,7 @@ use crate::first_order_step::{FirstOrderStep, step_points};
 use crate::grid::GridPoint;
 use crate::ground::BoardOverStep;
 use crate::lines::{Links, Step};
-use crate::path::Place;
+use crate::place::Place;
 use crate::step::{Listed, Obstacle};
 use bench_dragon_motion::timeline::TimedObstacleClearance;
 

@@ -10,7 +10,7 @@ use crate::first_order_step::{FirstOrderStep, step_points};
 use crate::grid::GridPoint;
 use crate::interval::Interval;
 use crate::lines::{About, CertificateLine, CertifiedClearance, CertifiedObstacleClearance, Links, Until};
-use crate::path::Place;
+use crate::place::Place;
 
 /// An allowance for the rounding of the checker, in metres, which is added to an upper bound.
 const SPARE: f64 = 1e-12;

@@ -9,10 +9,10 @@ use std::io;
 
 use super::PlanError;
 use super::trial::{Nearest, Obstacle, Proposal, deepest, free_from, obstacle};
-use crate::capsule::Span;
 use crate::clearance::Write;
 use crate::lines::{About, CertificateLine, CertifiedPitch};
 use crate::pitch::{Pitches, Reached, head_locks, reaches};
+use crate::place::Span;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 

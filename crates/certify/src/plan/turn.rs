@@ -6,7 +6,7 @@
 
 use super::PlanError;
 use super::turn_trial::{Family, Witness};
-use crate::path::Place;
+use crate::place::Place;
 use crate::turn::{Passage, Turns};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::team::Team;

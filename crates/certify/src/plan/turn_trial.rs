@@ -2,7 +2,7 @@
 //! suggest to the proofs of [`crate::turn`] where to search.
 
 use crate::grid::{param, place};
-use crate::path::Place;
+use crate::place::Place;
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::contact::ConservativeAdvancement;
 use bench_dragon_motion::event::{Budget, Event};

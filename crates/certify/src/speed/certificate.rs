@@ -8,7 +8,7 @@ use crate::clearance::Write;
 use crate::grid::{GridPoint, fine_place};
 use crate::interval::Interval;
 use crate::lines::{About, CertificateLine, CertifiedSpeed};
-use crate::path::Place;
+use crate::place::Place;
 use bench_dragon_motion::Motion;
 
 /// The share of the tolerance that the search uses: the checker has other capsules, and its bounds may be a little

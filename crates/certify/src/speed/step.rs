@@ -1,11 +1,11 @@
 //! Speeds over one step of the head: enclosures of the ratio of every handle's speed to the head's. See "Lemma 7" in
 //! `docs/proofs.md`. In: two places of the head. Out: bounds.
 
-use super::super::capsule::{Capsule, Span, Spanned};
+use super::super::capsule::{Capsule, Spanned};
 use super::super::grid::{GridPoint, param, span};
 use super::super::interval::{Interval, cross, dot, minus, norm, scaled};
 use super::super::link::follower_within;
-use super::super::path::Place;
+use super::super::place::{Place, Span};
 use super::super::step::Chain;
 use bench_dragon_motion::linkage::follower;
 

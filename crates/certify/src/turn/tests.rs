@@ -1,9 +1,10 @@
 //! Velocities of handles as the radius grows, against differences of handles that the ordinary solver places.
 
 use super::Turns;
-use crate::capsule::{Span, Spanned};
+use crate::capsule::Spanned;
 use crate::grid::{param, place};
-use crate::path::{ExactPath, Place};
+use crate::path::ExactPath;
+use crate::place::{Place, Span};
 use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;

@@ -1,0 +1,73 @@
+//! The team of benches of a scene.
+
+use serde::Deserialize;
+
+use super::interval::Interval;
+
+/// Limit of benches.
+const MOST: usize = 1_000_000;
+
+/// The team of benches.
+#[derive(Clone)]
+pub(super) struct Team {
+    pub benches: usize,
+    pub width: Interval,
+    pub hole_inset: Interval,
+    head_link: Interval,
+    body_link: Interval,
+}
+
+impl Team {
+    /// Returns the metres between the two handles of a bench.
+    pub fn link(&self, bench: usize) -> &Interval {
+        if bench == 0 { &self.head_link } else { &self.body_link }
+    }
+
+    /// Returns the same team in units of `unit` metres.
+    pub fn in_units(&self, unit: &Interval) -> Self {
+        let Self { benches, width, hole_inset, head_link, body_link } = self;
+        Self {
+            benches: *benches,
+            width: width / unit,
+            hole_inset: hole_inset / unit,
+            head_link: head_link / unit,
+            body_link: body_link / unit,
+        }
+    }
+
+    /// Returns the metres of the links from bench `first` to bench `last` in one line.
+    pub fn links(&self, first: usize, last: usize) -> Interval {
+        self.link(first) + self.link(1) * Interval::new((last - first) as f64)
+    }
+}
+
+/// The table `[team]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TeamText {
+    benches: usize,
+    head_length: f64,
+    body_length: f64,
+    width: f64,
+    hole_inset: f64,
+}
+
+impl TeamText {
+    pub fn read(&self) -> Result<Team, String> {
+        if self.benches == 0 || self.benches > MOST {
+            return Err(format!("team.benches is {}, expected from 1 to {MOST}", self.benches));
+        }
+        let hole_inset = Interval::positive("team.hole_inset", self.hole_inset)?;
+        let link = |field: &str, length: f64| {
+            let link = Interval::positive(field, length)? - Interval::new(2.0) * hole_inset;
+            if link.is_positive() { Ok(link) } else { Err(format!("{field} leaves no bench between its holes")) }
+        };
+        Ok(Team {
+            benches: self.benches,
+            width: Interval::positive("team.width", self.width)?,
+            head_link: link("team.head_length", self.head_length)?,
+            body_link: link("team.body_length", self.body_length)?,
+            hole_inset,
+        })
+    }
+}
