@@ -145,7 +145,7 @@ fn bends_as_wide_as_a_link_are_searched() {
             heading_turns: 0.0,
             steps: vec![
                 RouteStep::Line { length: 3.0 * link },
-                RouteStep::Arc { side: Side::Left, radius, turns: 0.5.into() },
+                RouteStep::Arc { side: Side::Left, radius: radius.into(), turns: 0.5.into() },
                 RouteStep::Line { length: 6.0 * link },
             ],
         };

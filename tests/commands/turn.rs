@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::process::Command;
 
-use crate::harness::{all, can_run, python, python_modules, text};
+use crate::harness::{all, can_run, json_lines, python, python_modules, text};
 use serde_json::Value;
 
 /// Plans a turn of the turnaround's team with 12 benches of a width in metres.
@@ -69,6 +69,122 @@ fn other_search(ratio_and_team: &[&str], line: usize) -> (f64, String) {
     (found.unwrap_or(f64::NAN), format!("{}{}", text(&peer.stderr), text(&peer.stdout)))
 }
 
+/// Runs the program with a scene, and returns the lines of its JSON.
+fn answers(scene: &str, arguments: &[&str]) -> Vec<Value> {
+    let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    file.write_all(scene.as_bytes()).unwrap();
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let output = program.args(["--json", "--scene"]).arg(file.path()).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    json_lines(&output)
+}
+
+/// A scene of the paper's benches with one spiral piece inward, a turn, and a spiral outward. `inward` has the rest of
+/// the first.
+fn coil(benches: u32, inward: &str, side: &str, turn: &str) -> String {
+    format!(
+        "[team]\nbenches = {benches}\n[path]\nkind = \"pieces\"\n[[path.pieces]]\nkind = \"spiral\"\npitch = 1.7\n\
+         radius = 14\nside = \"{side}\"\ndirection = \"in\"\n{inward}\n[[path.pieces]]\nkind = \"turn\"\n{turn}\n\
+         [[path.pieces]]\nkind = \"spiral\"\nlength = 150\n[motion]\nhead_speed = 1.0\non_contact = \
+         \"continue\"\n[alerts]\n"
+    )
+}
+
+/// The metres of a spiral of pitch 1.7 m from its centre.
+fn metres_of_spiral(radius: f64) -> f64 {
+    let a = 1.7 / std::f64::consts::TAU;
+    let theta = radius / a;
+    0.5 * a * (theta * 1f64.hypot(theta) + theta.asinh())
+}
+
+/// A route of an inward spiral, a turn and an outward spiral has the events and the least clearance of the turnaround
+/// that the paper's solution defines.
+#[test]
+fn a_turn_in_a_route_is_that_of_a_turnaround() {
+    let mut kinds = std::collections::BTreeSet::new();
+    for (benches, radius, ratio, side) in [
+        (12, 4.5, 2.0, "right"),
+        (12, 4.5, 1.0, "left"),
+        (12, 2.6, 2.0, "left"),
+        (12, 3.1, 0.7, "right"),
+        (40, 3.0, 1.0, "left"),
+    ] {
+        let turnaround = format!(
+            "[team]\nbenches = {benches}\n[path]\nkind = \"turnaround\"\npitch = 1.7\nturn_radius = {radius}\n\
+             arc_ratio = {ratio}\nlead_in = 200\nlead_out = 150\n[motion]\nhead_speed = 1.0\non_contact = \
+             \"continue\"\n[alerts]\n"
+        );
+        let turn = if ratio == 2.0 { String::new() } else { format!("arc_ratio = {ratio}") };
+        let to_radius = coil(benches, &format!("to_radius = {radius}"), side, &turn);
+        let turns = coil(benches, &format!("turns = {}", (14.0 - radius) / 1.7), side, &turn);
+        let lead_in = metres_of_spiral(14.0) - metres_of_spiral(radius);
+        for route in [to_radius, turns] {
+            for command in ["events", "check"] {
+                let (expected, found) = (answers(&turnaround, &[command]), answers(&route, &[command]));
+                assert_eq!(expected.len(), found.len(), "{expected:?} {found:?}");
+                for (expected, found) in expected.iter().zip(&found) {
+                    for key in ["event", "check", "bench_a", "bench_b"] {
+                        assert_eq!(expected[key], found[key], "{expected} {found}");
+                    }
+                    kinds.insert(expected["event"].as_str().unwrap_or("clearance").to_owned());
+                    if expected["check"] == "clearance" {
+                        let clearance = number(expected, "clearance") - number(found, "clearance");
+                        assert!(clearance.abs() < 1e-12, "{expected} {found}");
+                    } else {
+                        let time = number(expected, "time") - 200.0 + lead_in - number(found, "time");
+                        assert!(time.abs() < 1e-10, "{expected} {found}");
+                    }
+                }
+            }
+        }
+    }
+    assert_eq!(Vec::from_iter(kinds), ["clearance", "lock", "path_end", "stall"]);
+}
+
+#[test]
+fn a_turn_of_a_route_is_planned_as_that_of_a_turnaround() {
+    let turnaround = include_str!("../../config/turnaround.toml").replace("benches = 223", "benches = 12");
+    let arguments = ["plan", "turn", "--arc-ratio", "2"];
+    assert_eq!(answers(&coil(12, "to_radius = 5", "left", ""), &arguments), answers(&turnaround, &arguments));
+}
+
+#[test]
+fn a_turn_or_a_spiral_that_leads_nowhere_is_refused_in_one_sentence() {
+    let inward = "kind = \"spiral\"\npitch = 1.7\nradius = 14\nside = \"left\"\ndirection = \"in\"\n";
+    let cases: [(&[&str], &str); 9] = [
+        (&["kind = \"turn\""], "line 5: a turn has to follow an inward spiral"),
+        (&["kind = \"line\"\nlength = 3", "kind = \"turn\""], "line 8: a turn has to follow an inward spiral"),
+        (
+            &[&format!("{inward}to_radius = 14")],
+            "path.pieces.to_radius is 14, expected less than 14 m, where the spiral",
+        ),
+        (&[&format!("{inward}to_radius = 0")], "path.pieces.to_radius is 0, expected"),
+        (&[&format!("{inward}to_radius = 4\nturns = 1")], "one of turns around its centre, a length and a to_radius"),
+        (&[&format!("{inward}to_radius = 4"), "kind = \"turn\"\nside = \"left\""], "a turn has an arc_ratio"),
+        (
+            &[&format!("{inward}to_radius = 4"), "kind = \"turn\"\narc_ratio = 0"],
+            "path.pieces.arc_ratio is 0, expected",
+        ),
+        (
+            &[&format!("{inward}to_radius = 4"), "kind = \"turn\"", "kind = \"spiral\"\npitch = 2\nturns = 1"],
+            "the spiral after a turn leads outward about the same centre",
+        ),
+        (
+            &[&format!("{inward}to_radius = 4"), "kind = \"turn\"", "kind = \"spiral\"\nto_radius = 3"],
+            "path.pieces.to_radius is 3, expected more than 4 m",
+        ),
+    ];
+    for (pieces, sentence) in cases {
+        let pieces = pieces.iter().map(|piece| format!("[[path.pieces]]\n{piece}\n")).collect::<String>();
+        let scene = format!("[team]\nbenches = 12\n[path]\nkind = \"pieces\"\n{pieces}[motion]\nhead_speed = 1.0\n");
+        let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+        file.write_all(scene.as_bytes()).unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_bench-dragon")).arg("check").arg(file.path()).output().unwrap();
+        let said = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && said.lines().count() == 1 && said.contains(sentence), "{said}");
+    }
+}
+
 #[test]
 fn a_wrong_question_is_refused_in_one_sentence() {
     let cases = [
@@ -76,7 +192,7 @@ fn a_wrong_question_is_refused_in_one_sentence() {
         ("turnaround", "--arc-ratio=-1", "--arc-ratio is -1, expected"),
         ("turnaround", "--arc-ratio=nan", "--arc-ratio is NaN, expected"),
         ("turnaround", "--arc-ratio=1e9", "--arc-ratio is 1000000000, expected"),
-        ("procession", "--arc-ratio=1", "the scene's path is a route, which has no pitch"),
+        ("procession", "--arc-ratio=1", "the scene's path is a route without a turn, or with several"),
         ("crossing", "--arc-ratio=1", "the scene has several dragons"),
     ];
     for (scene, argument, expected) in cases {

@@ -265,7 +265,7 @@ fn motions() -> impl Strategy<Value = Motion> {
             if line {
                 RouteStep::Line { length: 2.0 * size }
             } else {
-                RouteStep::Arc { side, radius: size, turns: turns.into() }
+                RouteStep::Arc { side, radius: size.into(), turns: turns.into() }
             }
         });
         PathDescription::Route { heading_turns: 0.17, steps: steps.collect() }

@@ -156,7 +156,7 @@ fn motions() -> impl Strategy<Value = Motion> {
                     let side = if left { Side::Left } else { Side::Right };
                     match kind {
                         0..3 => RouteStep::Line { length: 4.0 * (size - 1.0) + 0.05 },
-                        _ => RouteStep::Arc { side, radius: tight * size, turns: turns.into() },
+                        _ => RouteStep::Arc { side, radius: (tight * size).into(), turns: turns.into() },
                     }
                 });
                 PathDescription::Route { heading_turns, steps: steps.collect() }

@@ -251,14 +251,14 @@ fn solvers_agree_with_50_digits_up_to_the_lock() {
 fn spiral_route() -> Subject {
     use Direction::{Inward, Outward};
     use Side::{Left, Right};
-    let spiral = |side, direction, pitch, radius, turns: f64| {
+    let spiral = |side, direction, pitch, radius: f64, turns: f64| {
         let turns = turns.into();
-        RouteStep::Spiral { side, direction, pitch, radius, turns }
+        RouteStep::Spiral { side, direction, pitch, radius: radius.into(), turns }
     };
     let steps = vec![
         RouteStep::Line { length: 15.0 },
         spiral(Left, Inward, 1.7, 12.0, 4.0),
-        RouteStep::Arc { side: Right, radius: 2.6, turns: 0.45.into() },
+        RouteStep::Arc { side: Right, radius: 2.6.into(), turns: 0.45.into() },
         spiral(Left, Outward, 1.3, 5.0, 1.5),
         spiral(Right, Inward, 0.9, 4.5, 2.0),
         RouteStep::Line { length: 6.0 },

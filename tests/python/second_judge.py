@@ -190,9 +190,13 @@ class PlacedSpiral(Spiral):
         return tangent.real, tangent.imag
 
 
+# Sizes that a scene may leave out, metres.
+SIZES = {"head_length": 3.41, "body_length": 2.2, "width": 0.3, "hole_inset": 0.275}
+
+
 class Scene:
     def __init__(self, file):
-        team, path, motion = file["team"], file["path"], file["motion"]
+        team, path, motion = SIZES | file["team"], file["path"], file["motion"]
         number = lambda table, key: arb(float(table[key]))
         self.benches = team["benches"]
         self.width, self.inset = number(team, "width"), number(team, "hole_inset")
@@ -239,28 +243,51 @@ class Scene:
         turns = 2 * PI * arb(float(path.get("heading_turns", 0.0)))
         direction = (turns.cos(), turns.sin())
         self.segments, self.start, self.length = [Line(point, direction, None, arb(0))], (0, arb(0)), arb(0)
+        turned = None
         for piece in path["pieces"]:
+            before = self.segments[-1]
             if piece["kind"] == "line":
-                segment = Line(point, direction, arb(0), number(piece, "length"))
+                added = [Line(point, direction, arb(0), number(piece, "length"))]
             elif piece["kind"] == "spiral":
-                segment = self.piece_of_spiral(piece, number, point, direction)
+                added = [self.piece_of_spiral(piece, number, point, direction, turned)]
+            elif piece["kind"] == "turn":
+                added = self.turn(before, arb(float(piece.get("arc_ratio", 2.0))), point, direction)
             else:
                 radius = number(piece, "radius")
                 angle = 2 * PI * number(piece, "turns") if "turns" in piece else number(piece, "length") / radius
-                segment = Arc(point, direction, radius, piece["side"] == "left", angle)
-            point, direction = segment.point(segment.end), segment.tangent(segment.end)
-            self.length += segment.metres(segment.end) - segment.metres(segment.begin)
-            self.segments.append(segment)
+                added = [Arc(point, direction, radius, piece["side"] == "left", angle)]
+            turned = before if piece["kind"] == "turn" else None
+            for segment in added:
+                self.length += segment.metres(segment.end) - segment.metres(segment.begin)
+            point, direction = added[-1].point(added[-1].end), added[-1].tangent(added[-1].end)
+            self.segments += added
 
-    def piece_of_spiral(self, piece, number, point, direction):
-        a, inward = number(piece, "pitch") / (2 * PI), piece["direction"] == "in"
-        begin = number(piece, "radius") / a
-        spiral = PlacedSpiral(a, inward, begin, None, point, direction, piece["side"] == "left")
+    def piece_of_spiral(self, piece, number, point, direction, turned):
+        """Returns the spiral of a piece, or after a turn the outward spiral about the centre of the spiral `turned`."""
+        if turned is None:
+            a, inward, left = number(piece, "pitch") / (2 * PI), piece["direction"] == "in", piece["side"] == "left"
+            begin = number(piece, "radius") / a
+        else:
+            a, inward, left, begin = turned.a, False, turned.side < 0, turned.end
+        spiral = PlacedSpiral(a, inward, begin, None, point, direction, left)
         if "turns" in piece:
             spiral.end = begin + spiral.sense * 2 * PI * number(piece, "turns")
+        elif "to_radius" in piece:
+            spiral.end = number(piece, "to_radius") / a
         else:
             spiral.end = self.inverse(spiral, spiral.metres(begin) + number(piece, "length"))
         return spiral
+
+    @staticmethod
+    def turn(spiral, ratio, point, direction):
+        """Returns the two arcs from the end of an inward spiral to the point opposite its centre: their angles are
+        alike, and their chords lie on the line through the centre."""
+        angle = 2 * spiral.end.atan()
+        both = spiral.a * (1 + spiral.end**2).sqrt()
+        left = spiral.side > 0
+        first = Arc(point, direction, both * ratio / (ratio + 1), left, angle)
+        middle = first.point(angle), first.tangent(angle)
+        return [first, Arc(*middle, both / (ratio + 1), not left, angle)]
 
     @staticmethod
     def inverse(curve, metres):

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::Table;
 
 /// Returns the crates of the workspace, by their folder.
-fn crates() -> Vec<String> {
+pub(crate) fn crates() -> Vec<String> {
     let folders = std::fs::read_dir("crates").unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let mut names: Vec<_> = folders.filter(|name| Path::new(&format!("crates/{name}/Cargo.toml")).exists()).collect();
     names.sort();
@@ -22,7 +22,7 @@ fn dependencies(name: &str) -> BTreeSet<String> {
 }
 
 /// Returns all Rust files below a folder.
-fn sources(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let below = |path: PathBuf| match path.is_dir() {
         true => sources(&path),
@@ -71,9 +71,9 @@ const KNOW_KINDS: [&str; 10] = [
     "crates/motion/src/model/segment.rs",
     "crates/motion/src/solve/reference/curve.rs",
     "crates/outputs/src/view/drawing.js",
-    "crates/proof/src/curve.rs",
+    "crates/proof/src/pieces.rs",
     "crates/show/src/convert.rs",
-    "crates/show/src/scene/path.rs",
+    "crates/show/src/scene/piece.rs",
 ];
 
 /// Returns the hand-written product code of all crates: the text of each file before its unit tests.

@@ -509,7 +509,7 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
             RouteStep::Arc { side, radius, turns: by } => {
                 let [x, y] = direction;
                 let inward = if side == Side::Left { [-y, x] } else { [y, -x] };
-                let radius = Interval::point(radius);
+                let radius = of_sum(radius);
                 let around = of_sum(by);
                 let angle = pi() * 2.0 * around;
                 turns = if side == Side::Left { turns + around } else { turns - around };
@@ -540,8 +540,8 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
 const OF_SUMS: f64 = 1e-28;
 
 /// Returns the polar angles at the ends of a route's spiral, within a part [`OF_SUMS`] of the greater one.
-fn spiral_ends(way: Direction, pitch: f64, radius: f64, turns: DoubleDouble) -> [DoubleDouble; 2] {
-    let DoubleDouble { high, low } = DoubleDouble::quotient(radius, pitch);
+fn spiral_ends(way: Direction, pitch: f64, radius: DoubleDouble, turns: DoubleDouble) -> [DoubleDouble; 2] {
+    let DoubleDouble { high, low } = radius.over(pitch);
     let first = DoubleDouble::from_turns(high).plus(std::f64::consts::TAU * low);
     let sign = if way == Direction::Inward { -1.0 } else { 1.0 };
     let around = DoubleDouble::from_turns(turns);

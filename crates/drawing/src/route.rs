@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn the_spirals_of_a_route_lie_on_the_path() {
         for (side, direction) in [(Side::Left, Direction::Inward), (Side::Right, Direction::Outward)] {
-            let piece = RouteStep::Spiral { side, direction, pitch: 1.7, radius: 6.0, turns: 2.25.into() };
+            let piece = RouteStep::Spiral { side, direction, pitch: 1.7, radius: 6.0.into(), turns: 2.25.into() };
             let steps = vec![RouteStep::Line { length: 3.0 }, piece];
             let description = PathDescription::Route { heading_turns: 0.1, steps };
             let motion = Motion::new(description, TEAM, 1.0, Method::Newton).unwrap();
@@ -230,8 +230,10 @@ mod tests {
 
     #[test]
     fn a_route_comes_from_beyond_the_picture_and_its_arcs_have_both_ends() {
-        let steps =
-            vec![RouteStep::Line { length: 3.0 }, RouteStep::Arc { side: Side::Left, radius: 2.0, turns: 1.25.into() }];
+        let steps = vec![
+            RouteStep::Line { length: 3.0 },
+            RouteStep::Arc { side: Side::Left, radius: 2.0.into(), turns: 1.25.into() },
+        ];
         let description = PathDescription::Route { heading_turns: 0.0, steps };
         let motion = Motion::new(description, TEAM, 1.0, Method::Newton).unwrap();
         let motion = motion.placed(Placement::IDENTITY.after_moving_by(Vector::new(1.0, 1.0)));

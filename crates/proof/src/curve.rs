@@ -1,8 +1,6 @@
 //! The curves of a path, in intervals: as functions of their coordinate, and as pieces in the text of a scene
 //! (docs/proofs.md, "Definitions"). No other file matches on the kinds of curves.
 
-use serde::Deserialize;
-
 use super::elementary;
 use super::interval::{Interval, Vector};
 
@@ -255,138 +253,8 @@ fn spiral_curvature(a: &Interval, theta: &Interval) -> Interval {
     (square + Interval::new(2.0)) / (a * w_squared * w_squared.sqrt())
 }
 
-#[derive(Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-pub(super) enum PieceText {
-    Line { length: f64 },
-    Arc { radius: f64, side: Side, turns: Option<f64>, length: Option<f64> },
-    Spiral { pitch: f64, radius: f64, direction: Way, side: Side, turns: Option<f64>, length: Option<f64> },
-}
-
-#[derive(Deserialize, Clone, Copy, PartialEq)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Way {
-    In,
-    Out,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Side {
-    Left,
-    Right,
-}
-
-fn direction(heading: &Interval) -> Vector {
+/// Returns the unit vector of a heading, in radians from x.
+pub(super) fn direction(heading: &Interval) -> Vector {
     let (sine, cosine) = elementary::sin_cos(heading);
     Vector { x: cosine, y: sine }
-}
-
-/// Returns the curve of a piece that begins at `origin`, its first and last coordinates, and the radians by which it
-/// turns to the left.
-pub(super) fn read_piece(
-    piece: &PieceText,
-    origin: Vector,
-    heading: &Interval,
-) -> Result<(Curve, Interval, Interval, Interval), String> {
-    let zero = Interval::new(0.0);
-    let to_left = |side: &Side| Interval::new(if matches!(side, Side::Left) { 1.0 } else { -1.0 });
-    match piece {
-        PieceText::Line { length } => {
-            let end = Interval::positive("path.pieces.length", *length)?;
-            Ok((Curve::line(origin, heading), zero, end, zero))
-        }
-        PieceText::Arc { radius, side, turns, length } => {
-            let radius = Interval::positive("path.pieces.radius", *radius)?;
-            let end = match (turns, length) {
-                (Some(turns), None) => {
-                    Interval::positive("path.pieces.turns", *turns)?;
-                    elementary::turns(*turns)
-                }
-                (None, Some(length)) => Interval::positive("path.pieces.length", *length)? / radius,
-                _ => return Err("an arc has either turns or a length".to_owned()),
-            };
-            let curve = Curve::arc(origin, direction(heading), to_left(side), radius);
-            Ok((curve, zero, end, to_left(side) * end))
-        }
-        PieceText::Spiral { pitch, radius, direction, side, turns, length } => {
-            let a = Interval::positive("path.pieces.pitch", *pitch)? / elementary::turns(1.0);
-            let first = Interval::positive("path.pieces.radius", *radius)? / a;
-            let is_inward = *direction == Way::In;
-            let last = match (turns, length) {
-                (Some(turns), None) => {
-                    Interval::positive("path.pieces.turns", *turns)?;
-                    let around = elementary::turns(*turns);
-                    if is_inward { first - around } else { first + around }
-                }
-                (None, Some(length)) => {
-                    let metres = Interval::positive("path.pieces.length", *length)?;
-                    last_angle(&a, &first, &if is_inward { -metres } else { metres })?
-                }
-                _ => return Err("a spiral has either turns or a length".to_owned()),
-            };
-            if !last.is_positive() {
-                return Err("a spiral leads to its centre or past it".to_owned());
-            }
-            let (inner, outer) = if is_inward { (last, first) } else { (first, last) };
-            let turned = (outer - inner) + (elementary::atan(&outer) - elementary::atan(&inner));
-            let is_left = matches!(side, Side::Left);
-            let curve = Curve::spiral_from(&origin, heading, is_inward, is_left, a, &first);
-            Ok((curve, first, last, to_left(side) * turned))
-        }
-    }
-}
-
-/// Returns the polar angle `metres` of a spiral further out than `first`, further in if they are negative. The angle
-/// comes from a step of Newton's method from a guess. The root is within an interval if the step from its middle leads
-/// into the interval with every rate in it.
-fn last_angle(a: &Interval, first: &Interval, metres: &Interval) -> Result<Interval, String> {
-    let outward = Curve::outward(*a);
-    let step = |from: f64, within: &Interval| {
-        let rate = a * (within.square() + Interval::new(1.0)).sqrt();
-        (metres - outward.metres(first, &Interval::new(from))) / rate
-    };
-    let guess = rough_angle(metres.rough() / a.rough(), first.rough());
-    // Near the centre the guess lacks digits, as a difference of lengths.
-    let guess = (0..4).fold(guess, |guess, _| guess + step(guess, &Interval::new(guess)).rough());
-    let within = Interval::new(guess) + Interval::new(1e-9 * guess.abs()).around_zero();
-    let last = Interval::new(guess) + step(guess, &within);
-    let is_found = guess > 0.0 && (last - Interval::new(guess)).abs().is_below(&Interval::new(1e-9 * guess));
-    if is_found { Ok(last) } else { Err("a spiral's length leads to its centre or past it".to_owned()) }
-}
-
-/// Returns a double near the polar angle that is `length` further out than `first` on the spiral r = theta.
-fn rough_angle(length: f64, first: f64) -> f64 {
-    let of = |theta: f64| 0.5 * (theta * theta.hypot(1.0) + theta.asinh());
-    let target = of(first) + length;
-    // The length is convex: Newton's method comes down from a guess that is too far out.
-    let mut theta = (2.0 * target.max(0.0)).sqrt();
-    for _ in 0..100 {
-        theta -= (of(theta) - target) / theta.hypot(1.0);
-    }
-    theta
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The metres to the angle found are the requested metres, with more digits than a double has, up to a centimetre
-    /// from the centre.
-    #[test]
-    fn the_angle_after_some_metres_of_a_spiral() {
-        let a = Interval::new(1.7) / elementary::turns(1.0);
-        let first = Interval::new(12.0) / a;
-        let to_centre = Curve::inward(a).metres(&first, &Interval::new(0.0));
-        let inward = [1e-3, 40.0, 266.0].map(|metres| Interval::new(-metres));
-        let outward = [1e-3, 1.0, 1e5].map(Interval::new);
-        let near_the_centre = [Interval::new(0.01) - to_centre];
-        for metres in inward.into_iter().chain(outward).chain(near_the_centre) {
-            let last = last_angle(&a, &first, &metres).unwrap();
-            let found = Curve::outward(a).metres(&first, &last);
-            assert!((found - metres).abs().is_below(&Interval::new(1e-19)), "{}", metres.rough());
-        }
-        assert!(last_angle(&a, &first, &-to_centre).is_err());
-        assert!(last_angle(&a, &first, &Interval::new(-300.0)).is_err());
-    }
 }

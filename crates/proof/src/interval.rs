@@ -33,6 +33,18 @@ impl Interval {
         Self { lo: end, hi: end }
     }
 
+    /// Creates the interval of a finite number of a text.
+    ///
+    /// # Errors
+    /// A sentence about the field, for another number.
+    pub fn finite(field: &str, number: f64) -> Result<Self, String> {
+        if number.is_finite() {
+            Ok(Self::new(number))
+        } else {
+            Err(format!("{field} is {number:?}, expected a number"))
+        }
+    }
+
     /// Creates the interval of a positive number of a text.
     ///
     /// # Errors

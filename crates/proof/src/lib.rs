@@ -22,6 +22,7 @@ mod lines;
 mod link;
 mod number;
 mod path;
+mod pieces;
 mod pitch;
 mod placement;
 mod results;

@@ -4,16 +4,14 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-use super::curve::{Curve, PieceText, read_piece};
+use super::curve::Curve;
 use super::elementary;
 use super::ground::{Obstacle, StageText};
-use super::interval::{Interval, Vector};
+use super::interval::Interval;
 use super::path::{Path, PathEnd, Segment};
+use super::pieces::{PieceText, route};
 use super::placement::{Mapping, PlacementText};
 use super::team::{Team, TeamText};
-
-/// Limit of the pieces of a route, as in a show: the cost of a step grows with them.
-const MOST_PIECES: usize = 4096;
 
 /// The greatest number of dragons.
 const MOST_DRAGONS: usize = 16;
@@ -99,14 +97,6 @@ enum PathText {
 /// Reads a text.
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     toml::from_str(text).map_err(|error: toml::de::Error| error.message().trim().replace('\n', ", "))
-}
-
-fn finite(field: &str, number: f64) -> Result<Interval, String> {
-    if number.is_finite() {
-        Ok(Interval::new(number))
-    } else {
-        Err(format!("{field} is {number:?}, expected a number"))
-    }
 }
 
 impl Scene {
@@ -274,33 +264,4 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
         Segment { curve: Curve::outward(a), begin: Some(turn), end: None },
     ];
     Ok(Path::new(segments, lead_in, PathEnd::Travelled, length))
-}
-
-fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Path, String> {
-    if pieces.is_empty() || pieces.len() > MOST_PIECES {
-        return Err(format!("path.pieces has {} pieces, expected from 1 to {MOST_PIECES}", pieces.len()));
-    }
-    finite("path.heading_turns", heading_turns)?;
-    finite("path.start", start[0]).and(finite("path.start", start[1]))?;
-    // The route in its own coordinates: no statement of a certificate depends on the place of its start.
-    let mut origin = Vector { x: Interval::new(0.0), y: Interval::new(0.0) };
-    // Directions follow from the angle turned so far: the product of thousands of rotations would be too wide.
-    let mut heading = elementary::turns(heading_turns);
-    let zero = || Interval::new(0.0);
-    let behind = Curve::line(origin, &heading);
-    let mut segments = vec![Segment { curve: behind, begin: None, end: Some(zero()) }];
-    let (mut length, mut end) = (zero(), zero());
-    for piece in pieces {
-        let (curve, begin, turned);
-        (curve, begin, end, turned) = read_piece(piece, origin, &heading)?;
-        length = length + curve.metres(&begin, &end);
-        origin = curve.at(&end).point;
-        heading = heading + turned;
-        segments.push(Segment { curve, begin: Some(begin), end: Some(end) });
-    }
-    // The last segment continues beyond the path's end.
-    if let Some(last) = segments.last_mut() {
-        last.end = None;
-    }
-    Ok(Path::new(segments, zero(), PathEnd::Coordinate(end), length))
 }

@@ -4,6 +4,12 @@ use serde::Deserialize;
 
 use super::interval::Interval;
 
+/// The sizes that a scene may leave out, metres: those of the paper.
+const HEAD_LENGTH: f64 = 3.41;
+const BODY_LENGTH: f64 = 2.20;
+const WIDTH: f64 = 0.30;
+const HOLE_INSET: f64 = 0.275;
+
 /// Limit of benches.
 const MOST: usize = 1_000_000;
 
@@ -46,10 +52,10 @@ impl Team {
 #[serde(deny_unknown_fields)]
 pub(super) struct TeamText {
     benches: usize,
-    head_length: f64,
-    body_length: f64,
-    width: f64,
-    hole_inset: f64,
+    head_length: Option<f64>,
+    body_length: Option<f64>,
+    width: Option<f64>,
+    hole_inset: Option<f64>,
 }
 
 impl TeamText {
@@ -57,16 +63,16 @@ impl TeamText {
         if self.benches == 0 || self.benches > MOST {
             return Err(format!("team.benches is {}, expected from 1 to {MOST}", self.benches));
         }
-        let hole_inset = Interval::positive("team.hole_inset", self.hole_inset)?;
+        let hole_inset = Interval::positive("team.hole_inset", self.hole_inset.unwrap_or(HOLE_INSET))?;
         let link = |field: &str, length: f64| {
             let link = Interval::positive(field, length)? - Interval::new(2.0) * hole_inset;
             if link.is_positive() { Ok(link) } else { Err(format!("{field} leaves no bench between its holes")) }
         };
         Ok(Team {
             benches: self.benches,
-            width: Interval::positive("team.width", self.width)?,
-            head_link: link("team.head_length", self.head_length)?,
-            body_link: link("team.body_length", self.body_length)?,
+            width: Interval::positive("team.width", self.width.unwrap_or(WIDTH))?,
+            head_link: link("team.head_length", self.head_length.unwrap_or(HEAD_LENGTH))?,
+            body_link: link("team.body_length", self.body_length.unwrap_or(BODY_LENGTH))?,
             hole_inset,
         })
     }

@@ -8,6 +8,7 @@ pub mod cue;
 mod dragons;
 mod mend;
 pub mod path;
+mod piece;
 pub mod precision;
 pub mod ros2;
 pub(crate) mod stage;

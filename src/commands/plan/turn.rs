@@ -30,9 +30,10 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
     }
     let scene: Scene = common.scene_text()?.parse()?;
     super::warn_of_obstacles(&scene);
-    let Some(pitch) = scene.motion.description().pitch() else {
-        let sentence =
-            "the scene's path is a route, which has no pitch: expected path.kind \"spiral\" or \"turnaround\"";
+    let description = scene.motion.description();
+    let Some(pitch) = description.pitch().or_else(|| description.pitch_of_turn()) else {
+        let sentence = "the scene's path is a route without a turn, or with several: expected path.kind \"spiral\" or \
+                        \"turnaround\", or a route with one piece of kind \"turn\"";
         return Err(CommandError::BadInput(sentence.to_owned()));
     };
     let bar = progress_bar(1000, common).with_message("searching for the turn");

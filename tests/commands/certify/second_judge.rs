@@ -73,6 +73,12 @@ fn scene(number: u64) -> String {
     )
 }
 
+/// A route with a turn, whose lock is proved; the sizes of its benches are the defaults.
+const TURN: &str = "[team]\nbenches = 12\n[path]\nkind = \"pieces\"\n[[path.pieces]]\nkind = \"spiral\"\npitch = 1.7\n\
+                    radius = 9\nside = \"left\"\ndirection = \"in\"\nto_radius = 2.6\n[[path.pieces]]\nkind = \"turn\"\n\
+                    arc_ratio = 1.5\n[[path.pieces]]\nkind = \"spiral\"\nto_radius = 9\n[motion]\nhead_speed = 1.0\n\
+                    on_contact = \"continue\"\n";
+
 /// Returns a stage with a shape of each kind, placed near the path, and a boundary around it.
 fn stage(link: f64, between: &mut impl FnMut(f64, f64) -> f64) -> String {
     let mut point = |far: f64| format!("[{}, {}]", link * between(-far, far), link * between(-far, far));
@@ -282,7 +288,8 @@ fn a_second_judge_agrees_and_refuses_what_was_changed() {
         if all() { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] } else { &["school"] };
     let all = cases(8, 50, 500);
     let read = |name: &&str| (name.to_string(), std::fs::read_to_string(format!("config/{name}.toml")).unwrap());
-    let scenes: Vec<_> = config.iter().map(read).collect();
+    let mut scenes: Vec<_> = config.iter().map(read).collect();
+    scenes.push(("turn".to_owned(), TURN.to_owned()));
     let random = (0..).map(|number| (format!("random{number}"), scene(number)));
     let left = Mutex::new(scenes.into_iter().chain(random).enumerate());
     let found = Mutex::new(Vec::new());

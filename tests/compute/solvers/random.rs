@@ -32,14 +32,20 @@ fn routes() -> impl Strategy<Value = Subject> {
         if line {
             RouteStep::Line { length: 2.0 * size }
         } else {
-            RouteStep::Arc { side, radius: size, turns: turns.into() }
+            RouteStep::Arc { side, radius: size.into(), turns: turns.into() }
         }
     });
     let spiral = (any::<bool>(), any::<bool>(), 0.3..2.0f64, 0.5..6.0f64, 0.01..0.95f64).prop_map(
         |(left, inward, pitch, radius, share)| {
             let side = if left { Side::Left } else { Side::Right };
             let direction = if inward { Direction::Inward } else { Direction::Outward };
-            RouteStep::Spiral { side, direction, pitch, radius, turns: (share * radius / pitch).min(3.0).into() }
+            RouteStep::Spiral {
+                side,
+                direction,
+                pitch,
+                radius: radius.into(),
+                turns: (share * radius / pitch).min(3.0).into(),
+            }
         },
     );
     let step = prop_oneof![3 => step, 1 => spiral];
@@ -65,10 +71,10 @@ fn far_routes() -> impl Strategy<Value = (Subject, f64)> {
             let first = if bend < 0.4 {
                 RouteStep::Line { length: far }
             } else {
-                RouteStep::Arc { side: Side::Left, radius: 0.5 * far, turns: 0.5.into() }
+                RouteStep::Arc { side: Side::Left, radius: (0.5 * far).into(), turns: 0.5.into() }
             };
             let length = if bend < 0.4 { far } else { PI * 0.5 * far };
-            let last = RouteStep::Arc { side: Side::Right, radius: size, turns: (0.1 + bend / 2.0).into() };
+            let last = RouteStep::Arc { side: Side::Right, radius: size.into(), turns: (0.1 + bend / 2.0).into() };
             let description = PathDescription::Route { heading_turns, steps: vec![first, last] };
             let team =
                 Team { benches, head_length: 1.5 * link + 0.1, body_length: link + 0.1, width: 0.1, hole_inset: 0.05 };

@@ -25,6 +25,16 @@ pub enum Side {
     Right,
 }
 
+impl Side {
+    /// Returns the other side.
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+}
+
 /// No point behind is as far away as the link is long: any further motion would make the handle jump.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("no point behind on the path is one link away")]

@@ -1,8 +1,11 @@
 //! A path by its numbers in a scene. [`Path`] is built from them in doubles, and the reference builds its path from
 //! them with more digits.
 
+use std::f64::consts::TAU;
+
 use super::curve::Side;
 use super::double_double::DoubleDouble;
+use super::elementary::{atan, hypot};
 use super::path::{Disjoint, Path};
 use super::spiral::Direction;
 
@@ -55,7 +58,7 @@ pub enum RouteStep {
         /// The side on which the circle's centre is.
         side: Side,
         /// The radius, in metres.
-        radius: f64,
+        radius: DoubleDouble,
         /// Change of direction, in turns (90 degrees are a quarter).
         turns: DoubleDouble,
     },
@@ -68,7 +71,7 @@ pub enum RouteStep {
         /// The pitch, in metres per turn.
         pitch: f64,
         /// The distance from the centre to its beginning, in metres.
-        radius: f64,
+        radius: DoubleDouble,
         /// The number of turns around the centre: its end is `pitch` times as many metres nearer to the centre, or
         /// further away.
         turns: DoubleDouble,
@@ -92,6 +95,29 @@ impl PathDescription {
             RouteStep::Line { .. } | RouteStep::Arc { .. } => None,
         });
         self.pitch().into_iter().chain(of_steps)
+    }
+
+    /// Returns the pitch of the spirals of the only turn of a route: an inward spiral and two arcs that lead to the
+    /// outward spiral about the same centre. `None` for another path, and for a route with several turns.
+    pub fn pitch_of_turn(&self) -> Option<f64> {
+        let Self::Route { steps, .. } = self else { return None };
+        let mut turns = steps.windows(3).filter_map(|steps| match *steps {
+            [
+                RouteStep::Spiral { side, direction: Direction::Inward, pitch, radius, turns },
+                RouteStep::Arc { side: first_side, radius: first, turns: first_turns },
+                RouteStep::Arc { side: second_side, radius: second, turns: second_turns },
+            ] => {
+                let theta = TAU * radius.minus_product(pitch, turns).high / pitch;
+                let radii = pitch / TAU * hypot(1.0, theta);
+                let is_turn = (side, first_turns) == (first_side, second_turns)
+                    && side.opposite() == second_side
+                    && (first.high + second.high - radii).abs() <= 1e-12 * radii
+                    && (TAU * first_turns.high - 2.0 * atan(theta)).abs() <= 1e-12;
+                is_turn.then_some(pitch)
+            }
+            _ => None,
+        });
+        turns.next().filter(|_| turns.next().is_none())
     }
 
     /// Builds the path in doubles.

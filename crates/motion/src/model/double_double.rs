@@ -55,6 +55,19 @@ impl DoubleDouble {
         Self { high, low: (-high).mul_add(divisor, dividend) / divisor }
     }
 
+    /// Returns this number over a double, to about 31 digits.
+    pub fn over(self, divisor: f64) -> Self {
+        let quotient = Self::quotient(self.high, divisor);
+        if self.low == 0.0 { quotient } else { quotient.plus(self.low / divisor) }
+    }
+
+    /// Returns this number minus a product, to about 31 digits of the greater of the two.
+    pub fn minus_product(self, factor: f64, other: Self) -> Self {
+        let product = factor * other.high;
+        let rest = factor.mul_add(other.high, -product) + factor * other.low;
+        self.plus(-product).plus(-rest)
+    }
+
     /// Returns this number plus `by`.
     pub fn plus(self, by: f64) -> Self {
         let (sum, error) = two_sum(self.high, by);

@@ -358,8 +358,8 @@ impl Route {
     }
 
     /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
-    pub fn arc(self, side: Side, radius: f64, turns: impl Into<DoubleDouble>) -> Self {
-        let around = turns.into();
+    pub fn arc(self, side: Side, radius: impl Into<DoubleDouble>, turns: impl Into<DoubleDouble>) -> Self {
+        let (radius, around) = (radius.into().high, turns.into());
         let turns = around.high;
         let arc = Arc::new(self.end, self.direction(), side, radius);
         let turned = if side == Side::Left { turns } else { -turns };
@@ -376,12 +376,12 @@ impl Route {
         side: Side,
         direction: Direction,
         pitch: f64,
-        radius: f64,
+        radius: impl Into<DoubleDouble>,
         turns: impl Into<DoubleDouble>,
     ) -> Self {
         let turns = turns.into();
         let spiral = Spiral::new(pitch, direction);
-        let DoubleDouble { high, low } = DoubleDouble::quotient(radius, pitch);
+        let DoubleDouble { high, low } = radius.into().over(pitch);
         let first = DoubleDouble::from_turns(high).plus(TAU * low);
         let around = DoubleDouble::from_turns(turns);
         let last = first.plus(spiral.sign() * around.high).plus(spiral.sign() * around.low);

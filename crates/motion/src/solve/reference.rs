@@ -43,7 +43,37 @@ pub struct Piece {
     /// The pitch, in metres per turn.
     pub pitch: f64,
     /// The distance from the centre to its beginning, in metres.
-    pub radius: f64,
+    pub radius: DoubleDouble,
+}
+
+/// The S of two arcs that leads from an inward spiral to the outward spiral about the same centre.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turn {
+    /// The pitch of both spirals, in metres per turn.
+    pub pitch: f64,
+    /// The distance from the centre to its beginning and to its end, in metres.
+    pub radius: DoubleDouble,
+    /// The radius of the first arc over the radius of the second.
+    pub arc_ratio: f64,
+}
+
+/// The arcs of a [`Turn`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnArcs {
+    /// The radii, in metres, in the order of travel.
+    pub radii: [DoubleDouble; 2],
+    /// The change of direction of each of the two, in turns.
+    pub turns: DoubleDouble,
+}
+
+impl Turn {
+    /// Returns the arcs, to 30 digits.
+    ///
+    /// # Errors
+    /// A sentence if there is no memory for the constants pi and ln 2.
+    pub fn arcs(self) -> Result<TurnArcs, String> {
+        curve::arcs_of_turn(self)
+    }
 }
 
 impl Piece {

@@ -7,24 +7,21 @@ use std::f64::consts::TAU;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::piece::RawPiece;
 use super::{Accepted, SceneError, Source};
 use bench_dragon_messages::sentence::number;
 use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::Vector;
-use bench_dragon_motion::model::curve::{Curve, Side};
-use bench_dragon_motion::model::description::{PathDescription, RouteStep};
+use bench_dragon_motion::model::curve::Curve;
+use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::double_double::DoubleDouble;
 use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::spiral::{Direction, Spiral};
 use bench_dragon_motion::model::team::Team;
-use bench_dragon_motion::solve::reference::Piece;
 
 /// The greatest number of pieces of a route.
 pub(crate) const MOST_STEPS: usize = 4096;
-/// The turns above which an arc is doubted: a dance has no ten rounds on one circle, and degrees are mostly above.
-const MOST_ARC_TURNS: f64 = 10.0;
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawPath {
@@ -37,41 +34,7 @@ pub(super) struct RawPath {
     lead_out: Option<Spanned<f64>>,
     start: Option<Spanned<[f64; 2]>>,
     heading_turns: Option<Spanned<f64>>,
-    pieces: Option<Spanned<Vec<Spanned<RawStep>>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawStep {
-    kind: RawStepKind,
-    length: Option<Spanned<f64>>,
-    radius: Option<Spanned<f64>>,
-    turns: Option<Spanned<f64>>,
-    side: Option<RawSide>,
-    pitch: Option<Spanned<f64>>,
-    direction: Option<RawDirection>,
-}
-
-#[derive(Clone, Copy, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum RawStepKind {
-    Line,
-    Arc,
-    Spiral,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum RawDirection {
-    In,
-    Out,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum RawSide {
-    Left,
-    Right,
+    pieces: Option<Spanned<Vec<Spanned<RawPiece>>>>,
 }
 
 impl RawPath {
@@ -230,152 +193,13 @@ impl RawPath {
             let sentence = format!("path.pieces has {} pieces, expected from 1 to {MOST_STEPS}", given.get_ref().len());
             return Err(source.field_error(given, &sentence));
         }
-        let segments = given.get_ref().iter().map(|step| step.get_ref().validated(source, step));
-        let steps = segments.collect::<Result<_, _>>()?;
+        let mut steps = Vec::with_capacity(given.get_ref().len());
+        let mut before = None;
+        for piece in given.get_ref() {
+            before = Some(piece.get_ref().add_to(&mut steps, before, source, piece)?);
+        }
         Ok(PathDescription::Route { heading_turns, steps })
     }
-}
-
-impl RawSide {
-    fn side(self) -> Side {
-        match self {
-            Self::Left => Side::Left,
-            Self::Right => Side::Right,
-        }
-    }
-}
-
-impl RawStep {
-    fn validated(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
-        match self.kind {
-            RawStepKind::Line => self.line(source, at),
-            RawStepKind::Arc => self.arc(source, at),
-            RawStepKind::Spiral => self.spiral(source, at),
-        }
-    }
-
-    fn line(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
-        match self {
-            Self {
-                length: Some(length), radius: None, turns: None, side: None, pitch: None, direction: None, ..
-            } => Ok(RouteStep::Line { length: checked(source, "length", length, Accepted::LEG)? }),
-            _ => Err(source.field_error(at, "a line has a length and nothing else")),
-        }
-    }
-
-    fn arc(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
-        let (Self { radius: Some(radius), side: Some(side), pitch: None, direction: None, .. }, Some(extent)) =
-            (self, self.extent())
-        else {
-            return Err(source.field_error(
-                at,
-                "an arc has a radius, a side (\"left\" or \"right\") and either turns (0.25 is a quarter circle) or a \
-                 length",
-            ));
-        };
-        let radius = checked(source, "radius", radius, Accepted::LENGTH)?;
-        let turns = match extent {
-            Extent::Turns(given) => {
-                let turns = checked(source, "turns", given, Accepted::ARC_TURNS)?;
-                if turns > MOST_ARC_TURNS {
-                    let metres = turns * TAU * radius;
-                    let sentence = format!(
-                        "path.pieces.turns is {turns}, an arc of {metres:.0} m: degrees? 90 degrees are 0.25 turns"
-                    );
-                    source.doubt(given, &sentence);
-                }
-                turns.into()
-            }
-            Extent::Length(length) => {
-                let metres = checked(source, "length", length, Accepted::LEG)?;
-                as_turns(source, length, metres / (TAU * radius))?;
-                turns_of_arc(metres, radius)
-            }
-        };
-        Ok(RouteStep::Arc { side: side.side(), turns, radius })
-    }
-
-    fn spiral(&self, source: &Source, at: &Spanned<Self>) -> Result<RouteStep, SceneError> {
-        let (
-            Self { pitch: Some(pitch), radius: Some(radius), side: Some(side), direction: Some(way), .. },
-            Some(extent),
-        ) = (self, self.extent())
-        else {
-            return Err(source.field_error(
-                at,
-                "a spiral has a pitch, a radius (its distance from its centre where it begins), a direction (\"in\" or \
-                 \"out\"), a side (\"left\" or \"right\") and either turns around its centre or a length",
-            ));
-        };
-        let pitch = checked(source, "pitch", pitch, Accepted::LENGTH)?;
-        let radius = checked(source, "radius", radius, Accepted::LENGTH)?;
-        let direction = match way {
-            RawDirection::In => Direction::Inward,
-            RawDirection::Out => Direction::Outward,
-        };
-        let (spiral, begin) = (Spiral::new(pitch, direction), DoubleDouble::from_turns(radius / pitch));
-        let turns_of = |metres: f64| spiral.advance(begin, metres).minus(begin).abs() / TAU;
-        let (turns, given, field, unit) = match extent {
-            Extent::Turns(turns) => (checked(source, "turns", turns, Accepted::ARC_TURNS)?, turns, "turns", "turns"),
-            Extent::Length(length) => {
-                (turns_of(checked(source, "length", length, Accepted::LEG)?), length, "length", "metres")
-            }
-        };
-        // The end has to be as far from the centre as the beginning of the tightest spiral.
-        if direction == Direction::Inward && radius - pitch * turns < Accepted::LENGTH.least {
-            let most = radius / pitch;
-            let most = if unit == "turns" { most } else { spiral.arc_length(begin, DoubleDouble::ZERO) };
-            let sentence = format!(
-                "path.pieces.{field} is {}, which leads to the centre of the spiral or past it, expected less than \
-                 {most:.3} {unit}",
-                number(*given.get_ref())
-            );
-            return Err(source.field_error(given, &sentence));
-        }
-        let turns = match extent {
-            Extent::Turns(_) => turns.into(),
-            Extent::Length(length) => {
-                let rough = as_turns(source, length, turns)?;
-                let turns = Piece { direction, pitch, radius }.turns_of_metres(*length.get_ref(), rough);
-                turns.map_err(|sentence| source.field_error(length, &sentence))?
-            }
-        };
-        Ok(RouteStep::Spiral { side: side.side(), direction, pitch, radius, turns })
-    }
-
-    /// Returns the turns or the length, if one of the two is given.
-    fn extent(&self) -> Option<Extent<'_>> {
-        match (&self.turns, &self.length) {
-            (Some(turns), None) => Some(Extent::Turns(turns)),
-            (None, Some(length)) => Some(Extent::Length(length)),
-            _ => None,
-        }
-    }
-}
-
-/// The extent of a bent piece.
-enum Extent<'a> {
-    Turns(&'a Spanned<f64>),
-    Length(&'a Spanned<f64>),
-}
-
-fn checked(source: &Source, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
-    source.check(&format!("path.pieces.{field}"), value, accepted)
-}
-
-/// Returns the turns of a piece whose length is given.
-fn as_turns(source: &Source, length: &Spanned<f64>, turns: f64) -> Result<f64, SceneError> {
-    let checked = Accepted::ARC_TURNS.check("path.pieces.length in turns", turns);
-    checked.map_err(|sentence| source.field_error(length, &sentence))
-}
-
-/// Returns the turns of an arc of some metres, to 30 digits.
-fn turns_of_arc(metres: f64, radius: f64) -> DoubleDouble {
-    let rough = metres / (TAU * radius);
-    let DoubleDouble { high, low } = DoubleDouble::from_turns(rough);
-    let product = high * radius;
-    let rest = (metres - product) - high.mul_add(radius, -product) - low * radius;
-    DoubleDouble::sum(rough, rest / (TAU * radius))
 }
 
 /// Returns true if one Euler step of the paper's rules, `metres` long, ends where a bench is folded back on itself, or

@@ -10,7 +10,7 @@ pub(crate) fn any_spiral() -> impl Strategy<Value = RouteStep> {
     let directions = prop_oneof![Just(Direction::Inward), Just(Direction::Outward)];
     (sides, directions, 0.3..2.0f64, 1.0..6.0f64, 0.01..0.95f64).prop_map(|(side, direction, pitch, radius, share)| {
         let turns = (share * radius / pitch).min(3.0);
-        RouteStep::Spiral { side, direction, pitch, radius, turns: turns.into() }
+        RouteStep::Spiral { side, direction, pitch, radius: radius.into(), turns: turns.into() }
     })
 }
 
@@ -27,7 +27,7 @@ pub(crate) fn any_path() -> impl Strategy<Value = Path> {
         if line {
             RouteStep::Line { length: size }
         } else {
-            RouteStep::Arc { side, radius: 0.5 * size, turns: turns.into() }
+            RouteStep::Arc { side, radius: (0.5 * size).into(), turns: turns.into() }
         }
     });
     let route = prop::collection::vec(prop_oneof![2 => step, 1 => any_spiral()], 2..8)

@@ -2,8 +2,8 @@
 //!
 //! In: a [`RouteStep`] with the end of the path before it. Out: its curve.
 
-use super::Piece;
 use super::real::{Functions, Real, RealVector};
+use super::{Piece, Turn, TurnArcs};
 use crate::model::Vector;
 use crate::model::curve::Side;
 use crate::model::description::RouteStep;
@@ -217,11 +217,11 @@ impl RealPiece {
             }
             RouteStep::Arc { side, radius, turns } => {
                 let angle = functions.turn() * Real::of_sum(turns);
-                Self::arc((origin, heading), side, Real::from(radius), &angle, functions)
+                Self::arc((origin, heading), side, Real::of_sum(radius), &angle, functions)
             }
             RouteStep::Spiral { side, direction, pitch, radius, turns } => {
                 let turn = functions.turn();
-                let first = &turn * Real::from(radius) / Real::from(pitch);
+                let first = &turn * Real::of_sum(radius) / Real::from(pitch);
                 let around = &turn * Real::of_sum(turns);
                 let last = if direction == Direction::Inward { &first - around } else { &first + around };
                 Self::spiral((origin, heading), (side, direction), Real::from(pitch) / turn, (first, &last), functions)
@@ -293,7 +293,7 @@ pub(super) fn turns_of_metres(
     let mut functions = Functions::new()?;
     let turn = functions.turn();
     let radius_per_radian = Real::from(pitch) / &turn;
-    let first = &turn * Real::from(radius) / Real::from(pitch);
+    let first = &turn * Real::of_sum(radius) / Real::from(pitch);
     let sense = Real::from(if direction == Direction::Inward { -1.0 } else { 1.0 });
     let target = spiral_length(&radius_per_radian, &first, &mut functions) + &sense * Real::from(metres);
     let mut last = &first + &sense * (&turn * Real::from(rough));
@@ -302,6 +302,19 @@ pub(super) fn turns_of_metres(
         last = last.clone() - excess / (&radius_per_radian * (Real::from(1.0) + last.square()).sqrt());
     }
     Ok((sense * (last - first) / turn).split())
+}
+
+/// Returns the two radii of a turn, and the turns of each of its arcs: see [`Path::turnaround`].
+///
+/// [`Path::turnaround`]: crate::model::path::Path::turnaround
+pub(super) fn arcs_of_turn(Turn { pitch, radius, arc_ratio }: Turn) -> Result<TurnArcs, String> {
+    let mut functions = Functions::new()?;
+    let turn = functions.turn();
+    let (one, ratio, a) = (Real::from(1.0), Real::from(arc_ratio), Real::from(pitch) / &turn);
+    let radius = Real::of_sum(radius);
+    let second = (radius.square() + a.square()).sqrt() / (&one + &ratio);
+    let turns = Real::from(2.0) * functions.atan(&(radius / a)) / turn;
+    Ok(TurnArcs { radii: [(ratio * &second).split(), second.split()], turns: turns.split() })
 }
 
 /// Returns the polar angle at `metres` of the spiral from its centre.

@@ -29,7 +29,7 @@ fn team(benches: usize) -> Team {
 /// The path of config/procession.toml.
 fn procession() -> PathDescription {
     let line = |length| RouteStep::Line { length };
-    let arc = |side, radius, turns: f64| RouteStep::Arc { side, radius, turns: turns.into() };
+    let arc = |side, radius: f64, turns: f64| RouteStep::Arc { side, radius: radius.into(), turns: turns.into() };
     let steps = vec![
         line(40.0),
         arc(Side::Left, 6.0, 0.25),
@@ -94,14 +94,14 @@ fn it_agrees_with_50_digits_on_the_turnaround() {
 fn spiral_route() -> PathDescription {
     use Direction::{Inward, Outward};
     use Side::{Left, Right};
-    let spiral = |side, direction, pitch, radius, turns: f64| {
+    let spiral = |side, direction, pitch, radius: f64, turns: f64| {
         let turns = turns.into();
-        RouteStep::Spiral { side, direction, pitch, radius, turns }
+        RouteStep::Spiral { side, direction, pitch, radius: radius.into(), turns }
     };
     let steps = vec![
         RouteStep::Line { length: 15.0 },
         spiral(Left, Inward, 1.7, 12.0, 4.0),
-        RouteStep::Arc { side: Right, radius: 2.6, turns: 0.45.into() },
+        RouteStep::Arc { side: Right, radius: 2.6.into(), turns: 0.45.into() },
         spiral(Left, Outward, 1.3, 5.0, 1.5),
         spiral(Right, Inward, 0.9, 4.5, 2.0),
         RouteStep::Line { length: 6.0 },
@@ -138,9 +138,19 @@ fn a_route_of_4096_pieces_keeps_its_digits() {
         7 => {
             let (pitch, radius) = (0.5 + share(), 4.0 + 3.0 * share());
             let direction = if k % 16 == 7 { Direction::Inward } else { Direction::Outward };
-            RouteStep::Spiral { side: sides[k / 16 % 2], direction, pitch, radius, turns: (0.1 + 0.2 * share()).into() }
+            RouteStep::Spiral {
+                side: sides[k / 16 % 2],
+                direction,
+                pitch,
+                radius: radius.into(),
+                turns: (0.1 + 0.2 * share()).into(),
+            }
         }
-        _ => RouteStep::Arc { side: sides[k % 2], radius: 3.0 + 5.0 * share(), turns: (0.05 + 0.2 * share()).into() },
+        _ => RouteStep::Arc {
+            side: sides[k % 2],
+            radius: (3.0 + 5.0 * share()).into(),
+            turns: (0.05 + 0.2 * share()).into(),
+        },
     };
     let steps = (0..4096).map(&mut step).collect();
     let description = PathDescription::Route { heading_turns: 0.3, steps };
@@ -392,7 +402,7 @@ fn handles_on_a_junction_are_found() {
     let steps = vec![
         RouteStep::Line { length: 1.5 },
         RouteStep::Line { length: 2.5 },
-        RouteStep::Arc { side: Side::Right, radius: 3.0, turns: 0.25.into() },
+        RouteStep::Arc { side: Side::Right, radius: 3.0.into(), turns: 0.25.into() },
     ];
     let description = PathDescription::Route { heading_turns: 0.125, steps };
     for (time, expected) in [(4.0, [3, 2, 1, 0]), (2.5, [2, 1, 0, 0]), (1.5, [2, 0, 0, 0])] {
@@ -412,8 +422,10 @@ fn followers_are_on_the_right_side_of_a_junction() {
     let mut sides = [0, 0];
     for k in 0..40 {
         let radius = 3.0 + 0.1 * f64::from(k);
-        let steps =
-            vec![RouteStep::Line { length: 1.0 }, RouteStep::Arc { side: Side::Left, radius, turns: 0.25.into() }];
+        let steps = vec![
+            RouteStep::Line { length: 1.0 },
+            RouteStep::Arc { side: Side::Left, radius: radius.into(), turns: 0.25.into() },
+        ];
         let description = PathDescription::Route { heading_turns: 0.1, steps };
         let time = 1.0 + 2.0 * radius * (0.5 * team(1).link(0) / radius).asin();
         // The root is at the junction for a time between two doubles: nearer than the error of a guess in doubles.
@@ -431,7 +443,7 @@ fn any_step() -> impl Strategy<Value = RouteStep> {
         (0.01..12.0).prop_map(|length| RouteStep::Line { length }),
         (side, 0.7..8.0, 0.01..0.6).prop_map(|(side, radius, turns): (Side, f64, f64)| RouteStep::Arc {
             side,
-            radius,
+            radius: radius.into(),
             turns: turns.into()
         }),
         any_spiral(),
