@@ -121,7 +121,11 @@ def lines_join_what_is_nearest():
         away = {name: min(one.distance(shape) for one in boards) - keep for name, shape, keep in OBSTACLES}
         name = min(away, key=away.get)
         assert met["obstacle"]["name"] == name and away[name] - 1e-6 < met["place"]["away"] < away[name] + 0.02, (away, met)
-        assert met["text"].startswith(f"{met['place']['away']:.3f}\u00a0m to the {met['obstacle']['name']}"), met
+        beyond, keep_out = met["place"]["away"], met["obstacle"]["keep_out"]
+        words = f"{beyond + keep_out:.3f}\u00a0m to the {met['obstacle']['name']}"
+        if keep_out > 0:
+            words += f", {beyond:.3f}\u00a0m beyond its keep-out"
+        assert met["text"].startswith(words), met
         assert pair["text"] == f"{pair['place']['away']:.3f}\u00a0m", pair
         # Both are lines: their ends are as far apart as their words state, and the second line begins on the board of
         # its bench.

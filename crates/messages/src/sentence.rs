@@ -151,17 +151,36 @@ pub fn rounded(value: f64, decimals: usize) -> String {
     if short == "-0" { "0".to_owned() } else { short.to_owned() }
 }
 
-/// Removes the sign of zero: the clearance of a touch is solved to the last bits, on either side.
 fn nearest(alert: &CollisionAlert, stage: &Stage, figures: Figures) -> Option<String> {
     alert.nearest_benches().next()?;
     let nearest = format!("nearest now are {}", names(alert.nearest_benches(), stage));
     if figures == Figures::Omitted {
         return Some(nearest);
     }
-    let clearance = (alert.clearance * 1e4).round() / 1e4 + 0.0;
-    let apart =
-        if clearance < 0.0 { format!("overlap by {:.4} m", -clearance) } else { format!("{clearance:.4} m apart") };
-    Some(format!("{nearest}, {apart}"))
+    Some(format!("{nearest}, {}", apart(alert.clearance, keep_out(stage, alert.bench_b), 4)))
+}
+
+/// Returns the metres that boards stay away from the obstacle of a number that follows the handles; 0 for a bench.
+pub fn keep_out(stage: &Stage, number: u32) -> f64 {
+    let obstacle = obstacle_number(stage, number).and_then(|index| stage.obstacles.get(index));
+    obstacle.map_or(0.0, |obstacle| obstacle.keep_out)
+}
+
+/// Returns the distance that belongs to a clearance in words, and the part of it beyond the keep-out, if there is one.
+pub fn apart(clearance: f64, keep_out: f64, decimals: usize) -> String {
+    let scale = 10f64.powi(decimals as i32);
+    // Without the sign of zero: the clearance of a touch is solved to the last bits, on either side.
+    let [clearance, distance] = [clearance, clearance + keep_out].map(|metres| (metres * scale).round() / scale + 0.0);
+    let apart = if distance < 0.0 {
+        format!("overlap by {:.decimals$} m", -distance)
+    } else {
+        format!("{distance:.decimals$} m apart")
+    };
+    if keep_out == 0.0 {
+        return apart;
+    }
+    let side = if clearance < 0.0 { "inside" } else { "beyond" };
+    format!("{apart}, {:.decimals$} m {side} the keep-out of {} m", clearance.abs(), number(keep_out))
 }
 
 fn names(concerned: impl Iterator<Item = u32>, stage: &Stage) -> String {
@@ -213,6 +232,16 @@ mod tests {
             "{sentence}"
         );
         assert_eq!(obstacle_in(&stage, &alert(Level::Approaching, None)), None);
+        let lamp = StageObstacle { keep_out: 0.5, ..lamp };
+        let kept = Stage { obstacles: List::of([lamp]), ..team(12) };
+        for (clearance, words) in [
+            (0.0031, "stone lamp, 0.5031 m apart, 0.0031 m beyond the keep-out of 0.5 m"),
+            (-0.1, "stone lamp, 0.4000 m apart, 0.1000 m inside the keep-out of 0.5 m"),
+            (-0.7, "stone lamp, overlap by 0.2000 m, 0.7000 m inside the keep-out of 0.5 m"),
+        ] {
+            let sentence = alert_sentence(&CollisionAlert { clearance, ..near }, &kept, SHOWN);
+            assert!(sentence.contains(words), "{sentence}");
+        }
         // A number that the stage does not list, and a stage that has not come.
         assert_eq!(name_in(&stage, 14), "obstacle 2");
         assert_eq!(name_in(&Stage::default(), 14), "bench 15");

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{HasStamp, Header, Time, level_of};
 use crate::settings::DiagnosticLimits;
 use bench_dragon_messages::chase::{ChaseSource, ChaseState};
-use bench_dragon_messages::sentence::{chase_sentence, name_in, obstacle_name};
+use bench_dragon_messages::sentence::{chase_sentence, keep_out, name_in, number, obstacle_name};
 use bench_dragon_messages::state::{EventKind, Severity};
 use bench_dragon_messages::{ChaseStatus, CollisionAlert, LoopStatus, Stage};
 
@@ -132,6 +132,11 @@ impl DiagnosticArray {
             value("scene", status.scene.as_str().to_owned()),
         ];
         if let Some(alert) = alert {
+            let keep_out = keep_out(stage, alert.bench_b);
+            if keep_out > 0.0 {
+                values.push(value("distance (m)", format!("{:.4}", alert.clearance + keep_out)));
+                values.push(value("keep-out (m)", number(keep_out)));
+            }
             values.push(value("clearance (m)", format!("{:.4}", alert.clearance)));
             values.push(value("time to event (s)", format!("{:.3}", alert.event_time - status.sim_time)));
             let from = if stage.dragons.len() > 1 { 1 } else { 0 };

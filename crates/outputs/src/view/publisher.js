@@ -182,8 +182,10 @@ export class Publisher {
   distanceWords({ place, benches = [], obstacle }) {
     const parts = [...new Set(benches.map((number) => ownerOf(this.dragons, number).part))].filter(Boolean);
     const of = parts.length > 1 ? say("both", { a: parts[0], b: parts[1] }) : parts[0] ?? "";
-    const metres = say("distance", { metres: place.away.toFixed(3) });
-    const to = obstacle ? say("distanceTo", { metres, to: say("theObstacle", obstacle) }) : metres;
+    const keepOut = obstacle?.keep_out ?? 0, distance = (metres) => say("distance", { metres: metres.toFixed(3) });
+    const metres = distance(place.away + keepOut);
+    let to = obstacle ? say("distanceTo", { metres, to: say("theObstacle", obstacle) }) : metres;
+    if (keepOut > 0) to = say("distanceBeyond", { to, metres: distance(place.away) });
     return of ? say("distanceOf", { distance: to, of }) : to;
   }
 

@@ -68,6 +68,7 @@ const WORDS = {
   chase_sought: ["", "等待：演出被跳转，暂停并继续后恢复"],
   distance: ["{metres}\u00a0m", "{metres}\u00a0m"],
   distanceTo: ["{metres} to {to}", "距{to} {metres}"],
+  distanceBeyond: ["{to}, {metres} beyond its keep-out", "{to}，超出警戒距离 {metres}"],
   distanceOf: ["{of}: {distance}", "{of}：{distance}"],
   spokenNow: ["Head at {x}, {y} metres. Speed {speed}. Clearance {clearance}.",
       "龙头位于 {x}、{y} 米。速度 {speed}。间距 {clearance}。"],
