@@ -28,16 +28,16 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
     if let Some(ratio) = arc_ratio {
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
-    let scene: Scene = common.scene_text()?.parse()?;
+    let (scene, motion) = common.scene_text()?.parse_only()?;
     super::warn_of_obstacles(&scene);
-    let Some(pitch) = scene.motion.description().pitch() else {
+    let Some(pitch) = motion.description().pitch() else {
         let sentence =
             "the scene's path is a route, which has no pitch: expected path.kind \"spiral\" or \"turnaround\"";
         return Err(CommandError::BadInput(sentence.to_owned()));
     };
     let bar = progress_bar(1000, common).with_message("searching for the turn");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let found = least_turn(scene.team(), pitch, arc_ratio, &mut progress)?;
+    let found = least_turn(motion.team(), pitch, arc_ratio, &mut progress)?;
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
