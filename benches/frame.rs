@@ -61,7 +61,7 @@ fn newton_cold(bencher: Bencher, rate: f64) {
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
 fn scene_on_a_spiral(bencher: Bencher, rate: f64) {
     let scene = bench_dragon::show::scene::Scene::paper();
-    play(bencher, scene.motion.solver(scene.velocities).solver.as_mut(), 224, rate);
+    play(bencher, scene.ensemble.only().unwrap().solver(scene.velocities).solver.as_mut(), 224, rate);
 }
 
 /// The turnaround, with the head from 20 m before its turn on: the team is on spiral, arcs and spiral.
@@ -195,7 +195,7 @@ fn show(bencher: Bencher, with: &str) {
         scene.alerts = None;
     }
     scene.velocities = if with.contains("velocities") { Velocities::Computed } else { Velocities::Omitted };
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let playback = Playback { start: 200.0, at_end: AtEnd::Loop, end_hold: 0.0, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let mut tick = 0;
@@ -210,7 +210,7 @@ fn show(bencher: Bencher, with: &str) {
 #[divan::bench(sample_count = 500, sample_size = 4)]
 fn show_where_every_turn_is_as_near(bencher: Bencher) {
     let scene = Scene::paper();
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let playback = Playback { start: 156.0, rate: 1000.0, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("156 s is before the contact");
     let mut tick = 0;
@@ -223,7 +223,7 @@ fn show_where_every_turn_is_as_near(bencher: Bencher) {
 /// The events of the paper scene, contact, stall and lock: found once, before the show.
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn events() -> Timeline {
-    Scene::paper().motion.timeline(&mut |_| ())
+    Scene::paper().ensemble.timeline(&mut |_| ())
 }
 
 /// A frame into iceoryx2's shared memory, without solving.
@@ -232,17 +232,17 @@ fn publish_over_iceoryx2(bencher: Bencher) {
     let scene = Scene::paper();
     let playback = Playback { start: 200.0, ..Playback::of(&scene) };
     let mut show =
-        Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).expect("200 s is before the contact");
+        Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), playback).expect("200 s is before the contact");
     let config = PublisherConfig {
         name: format!("bench_{}_frame", std::process::id()),
-        handles: scene.team().handles(),
+        handles: scene.ensemble.handles(),
         single_precision: None,
         queue: 64,
         subscribers: 8,
         alerts: true,
         cues: 0,
         scene: String::new(),
-        stage: stage(1, 0, [0; 32], &scene.motion, &show),
+        stage: stage(1, 0, [0; 32], &scene.ensemble, &show),
     };
     let mut publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let frame = show.frame(0);

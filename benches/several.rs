@@ -54,7 +54,7 @@ fn dragon(number: usize, coil: bool, table: &str) -> String {
 fn several(dragons: usize, coil: bool) -> Scene {
     let named = |number: usize| format!("[[dragons]]\nname = \"d{number}\"\n{}", dragon(number, coil, "dragons."));
     let text = format!("[alerts]\n{}", (0..dragons).map(named).collect::<String>());
-    Scene::parse_any(&text, "several.toml", "several").expect("a scene of several")
+    Scene::parse(&text, "several.toml", "several").expect("a scene of several")
 }
 
 fn one(number: usize, coil: bool) -> Scene {
@@ -70,7 +70,7 @@ fn show(scene: &Scene, alerts: bool) -> Show {
     let scene = Scene { alerts: scene.alerts.filter(|_| alerts), ..scene.clone() };
     // A search for contacts would take long, and there is none before the end.
     let playback = Playback { start: START, ..Playback::of(&scene) };
-    Show::new(&scene, scene.timeline_without_contact(), playback).expect("100 s is before the end")
+    Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).expect("100 s is before the end")
 }
 
 fn measure(name: &str, dragons: usize, coil: bool) {

@@ -84,13 +84,13 @@ struct Times {
 
 fn measure(benches: usize) {
     let scene = scene(benches);
-    let handles = scene.team().handles();
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let handles = scene.ensemble.handles();
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let show_of = |scene: &Scene| Show::new(scene, timeline.clone(), playback).expect("200 s is before the contact");
     let (mut show, mut bare_show) = (show_of(&scene), show_of(&Scene { alerts: None, ..scene.clone() }));
-    let mut choice = scene.motion.solver(scene.velocities);
-    let mut monitor = scene.motion.clearance_monitor(&choice);
+    let mut choice = scene.ensemble.only().unwrap().solver(scene.velocities);
+    let mut monitor = scene.ensemble.only().unwrap().clearance_monitor(&choice);
     let name = format!("bench_{}_{benches}", std::process::id());
     let (mut publisher, mut connection) = publisher_and_subscriber(&name, &scene, &show);
     let mut frame = show.frame(0).clone();
@@ -143,7 +143,7 @@ fn measure(benches: usize) {
         for tick in ticks.clone() {
             let time = START + tick as f64 / 60.0;
             choice.solver.solve(time, &mut frame.chain).expect("200 s is before the lock");
-            let travelled = scene.motion.travelled_at(time);
+            let travelled = scene.ensemble.only().unwrap().travelled_at(time);
             timed(&mut times.clearance, || monitor.least_clearance(&frame.chain, travelled));
         }
         for copy in &mut copies {
@@ -156,14 +156,14 @@ fn measure(benches: usize) {
 fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMemoryPublisher, Connection) {
     let config = PublisherConfig {
         name: name.to_owned(),
-        handles: scene.team().handles(),
+        handles: scene.ensemble.handles(),
         single_precision: None,
         queue: QUEUE,
         subscribers: 1,
         alerts: true,
         cues: 0,
         scene: String::new(),
-        stage: stage(1, 0, [0; 32], &scene.motion, show),
+        stage: stage(1, 0, [0; 32], &scene.ensemble, show),
     };
     let publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
     let subscription = Subscription::new(name, Wake::Never).expect("the publisher has taken this name");
@@ -176,7 +176,7 @@ fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMe
 fn measure_queues() {
     let scene = scene(223);
     let playback = Playback { start: START, ..Playback::of(&scene) };
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_queues", std::process::id()), &scene, &show);
@@ -232,13 +232,13 @@ fn measure_queues() {
 fn measure_log() {
     let scene = scene(223);
     let playback = Playback { start: START, rate: 10_000.0, ..Playback::of(&scene) };
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show);
     let file = std::env::temp_dir().join(format!("bench_dragon_step_{}.jsonl", std::process::id()));
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), show.solver_reason(), (1, 0));
-    let (mut log, outcome) = log::open(&file, line, scene.team().handles()).expect("a file in the temporary folder");
+    let (mut log, outcome) = log::open(&file, line, scene.ensemble.handles()).expect("a file in the temporary folder");
     let mut logging = log.publisher().expect("no other caller has taken it");
     let (mut times, mut after): ([Vec<f64>; 2], Vec<f64>) = Default::default();
     let began = Instant::now();

@@ -13,19 +13,20 @@ use bench_dragon::show::scene::Scene;
 fn main() {
     let scene = Scene::paper();
     let began = Instant::now();
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let exact = began.elapsed();
     let contact = timeline.find(EventKind::Contact).map_or(f64::NAN, |contact| contact.time);
 
-    let mut solver = scene.motion.solver(scene.velocities).solver;
-    let mut chain = Chain::new(scene.team().handles());
+    let mut solver = scene.ensemble.solver(scene.velocities);
+    let mut chain = Chain::new(scene.ensemble.handles());
     let began = Instant::now();
     let mut samples = 0u32;
     let overlap = (41_000..).map(|hundredths| f64::from(hundredths) / 100.0).find(|time| {
         samples += 1;
         // The motion continues well past the contact.
         solver.solve(*time, &mut chain).is_ok()
-            && least_clearance_all_pairs(&chain, scene.team()).is_some_and(|least| least.value <= 0.0)
+            && least_clearance_all_pairs(&chain, scene.ensemble.dragons()[0].motion.team())
+                .is_some_and(|least| least.value <= 0.0)
     });
     let a_sample = began.elapsed() / samples;
     let overlap = overlap.unwrap_or(f64::NAN);

@@ -55,7 +55,6 @@ use std::time::Duration;
 use anstyle::AnsiColor;
 use bench_dragon::messages::sentence::{self, number, rounded};
 use bench_dragon::messages::state::Severity;
-use bench_dragon::motion::Method;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::{Scene, SceneError, SceneText};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -119,12 +118,12 @@ impl Common {
         self.names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Reads the scene that the command line names, of one dragon or of several.
+    /// Reads the scene that the command line names.
     ///
     /// # Errors
     /// Bad input: the sentence names the file, the line and the field.
     pub fn load_scene(&self) -> Result<Scene, CommandError> {
-        Ok(self.scene_text()?.parse_any()?)
+        Ok(self.scene_text()?.parse()?)
     }
 
     /// Returns the text of that scene.
@@ -286,7 +285,7 @@ pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
 /// Returns all events of a scene, with a progress bar for the long searches.
 pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     let bar = progress_bar(1000, common).with_message("searching for contact");
-    let timeline = scene.timeline(&mut |share| bar.set_position((1000.0 * share) as u64));
+    let timeline = scene.ensemble.timeline(&mut |share| bar.set_position((1000.0 * share) as u64));
     bar.finish_and_clear();
     warn_of_gap(&timeline);
     timeline
@@ -314,7 +313,7 @@ pub fn shows_colour(stream: &impl io::IsTerminal) -> bool {
 
 /// Refuses a scene with the paper's solver, since its motion has no proof.
 pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
-    if !matches!(scene.motion.method(), Method::Paper(_)) {
+    if scene.ensemble.is_exact() {
         return Ok(());
     }
     let sentence = "the scene names the solver \"paper\", whose head is too fast: only exact motion can be certified, \

@@ -106,15 +106,15 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         end_hold: 0.0,
         ..Playback::of(&scene)
     };
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
-    let stage = stage(1, 0, [0; 32], &scene.motion, &show);
+    let stage = stage(1, 0, [0; 32], &scene.ensemble, &show);
     let config = TransportConfig::of(&name, &scene, &stage);
     let mut transports = transports::open(&config, &[transports::iceoryx2::open]).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", (1, 2));
-    transports.push(log::open(&folder.path().join("log"), line, scene.team().handles()).unwrap().0);
+    transports.push(log::open(&folder.path().join("log"), line, scene.ensemble.handles()).unwrap().0);
     let mut publishers: Vec<_> = transports.iter_mut().map(|transport| transport.publisher().unwrap()).collect();
     let subscription = Subscription::new(&name, Wake::OnFrame).unwrap();
     let mut connection = subscription.connect().unwrap().unwrap();

@@ -49,12 +49,12 @@ struct Moving {
 /// Returns every board's pose in a chain.
 fn poses(chain: &Chain, scene: &Scene) -> Vec<(Pose, Cuboid)> {
     let pose = |bench| {
-        let board = board(chain, scene.team(), bench);
+        let board = board(chain, scene.ensemble.only().unwrap().team(), bench);
         let angle = board.axis.y.atan2(board.axis.x);
         let half_extents = [board.half_length, board.half_width];
         (Pose::new([board.centre.x, board.centre.y].into(), angle), Cuboid::new(half_extents.into()))
     };
-    (0..scene.team().benches).map(pose).collect()
+    (0..scene.ensemble.benches()).map(pose).collect()
 }
 
 /// Returns the boards between two lists of poses.
@@ -84,8 +84,8 @@ fn impact(one: &Moving, other: &Moving, step: f64, cast: Cast) -> Option<f64> {
 
 /// Finds the first contact by steps.
 fn search(scene: &Scene, (step, from): (f64, f64), cast: Cast) -> Found {
-    let mut solver: Box<dyn Solver> = scene.motion.solver(scene.velocities).solver;
-    let mut chain = Chain::new(scene.team().handles());
+    let mut solver: Box<dyn Solver> = scene.ensemble.only().unwrap().solver(scene.velocities).solver;
+    let mut chain = Chain::new(scene.ensemble.handles());
     let mut at = |time: f64| {
         solver.solve(time, &mut chain).expect("the motion continues well past the contact");
         poses(&chain, scene)
@@ -122,7 +122,7 @@ fn main() {
     let scene = Scene::paper();
     let searches = (0..SEARCHES).map(|_| {
         let began = Instant::now();
-        let timeline = scene.motion.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut |_| ());
         (began.elapsed(), timeline)
     });
     let (exact, timeline) = searches.min_by_key(|(took, _)| *took).expect("there is at least one");

@@ -194,17 +194,18 @@ fn scene_text(common: &Common, stop: &AtomicBool) -> Result<Option<SceneText>, C
 }
 
 /// Returns the motion of the head that the tracker is at, and its delay in the show.
-fn followed(scene: Scene, dragon: Option<&str>) -> Result<(Motion, f64), CommandError> {
+fn followed(scene: &Scene, dragon: Option<&str>) -> Result<(Motion, f64), CommandError> {
     let refused = |sentence: String| Err(CommandError::BadInput(sentence));
-    match (&scene.ensemble, dragon) {
-        (None, None) => Ok((scene.motion, 0.0)),
-        (None, Some(name)) => {
+    let dragons = scene.ensemble.dragons();
+    match (scene.ensemble.only(), dragon) {
+        (Some(motion), None) => Ok((motion.clone(), 0.0)),
+        (Some(_), Some(name)) => {
             refused(format!("--dragon names {name} and the scene has one dragon, expected no --dragon"))
         }
-        (Some(ensemble), name) => match ensemble.dragons().iter().find(|dragon| Some(dragon.name.as_str()) == name) {
+        (None, name) => match dragons.iter().find(|dragon| Some(dragon.name.as_str()) == name) {
             Some(dragon) => Ok((dragon.motion.clone(), dragon.delay)),
             None => {
-                let names: Vec<&str> = ensemble.dragons().iter().map(|dragon| dragon.name.as_str()).collect();
+                let names: Vec<&str> = dragons.iter().map(|dragon| dragon.name.as_str()).collect();
                 let names = names.join(", ");
                 refused(format!(
                     "the scene has several dragons, expected --dragon with one of {names}: a tracker is at one head"
@@ -218,9 +219,9 @@ fn psn(common: &Common, arguments: &PsnArguments, stop: &Arc<AtomicBool>) -> Res
     let PsnArguments { tracker, group, interface, axes, ref dragon, freewheel } = *arguments;
     let Some(text) = scene_text(common, stop)? else { return Ok(()) };
     let scene_hash = scene_hash(&text.text);
-    let scene = text.parse_any()?;
+    let scene = text.parse()?;
     expect_exact_motion(&scene)?;
-    let (motion, delay) = followed(scene, dragon.as_deref())?;
+    let (motion, delay) = followed(&scene, dragon.as_deref())?;
     let inputs = sources::psn(group, interface, tracker, stop)?;
     let to_stage = Box::new(move |position| {
         let [x, y, _up] = axes.stage(position);

@@ -1,16 +1,12 @@
 //! `check`: the model of a scene, its omissions, and its solver with the reason.
 
 mod description;
-mod several;
+mod parts;
 
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use bench_dragon::certify::{
-    CertificateLine, CertifyError, ClearanceEnclosure, ClearanceEnclosures, ClearanceHints, MOST_CLEARANCE_STEPS,
-    ObstacleEnclosure, certify_least_clearance, enclose_least_clearance,
-};
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ground::Obstacle;
@@ -20,8 +16,8 @@ use bench_dragon::show::timed_cues;
 use serde::Serialize;
 
 use description::describe;
+use parts::{Found, Parts};
 
-use super::certificate_file::CertificateFile;
 use super::events::{bench_name, find_least_clearance, least_clearance, least_clearance_between, sentence};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
@@ -55,68 +51,10 @@ pub struct CheckArguments {
     certify: Option<PathBuf>,
 }
 
-/// The proved bounds of a least clearance, in every line of `check --prove --json`.
-#[derive(Serialize)]
-struct ProvedBounds {
-    #[serde(rename = "least_clearance_lo")]
-    lo: Option<f64>,
-    #[serde(rename = "least_clearance_hi")]
-    hi: Option<f64>,
-    #[serde(rename = "least_clearance_status")]
-    status: &'static str,
-    /// Simulated seconds up to which the bounds are proved, unless to the end of the show.
-    proved_until: Option<f64>,
-    time: Option<f64>,
-}
-
-impl ProvedBounds {
-    /// Creates the fields of a proof up to a time, or to the end of the show. The upper bound is met at `time`.
-    fn new(lo: Option<f64>, hi: Option<f64>, until: Option<f64>, time: Option<f64>) -> Self {
-        let status = match (lo.is_some() && hi.is_some(), until.is_none()) {
-            (true, true) => "proved",
-            (true, false) => "given_up",
-            (false, _) => "searched",
-        };
-        Self { lo, hi, status, proved_until: until.map(rounded_down), time }
-    }
-
-    /// Creates the fields of an enclosure, if there is one. The fields are its bounds, the metres of travel up to which
-    /// these hold, and the metres where the upper bound is met.
-    fn of(found: Option<([f64; 2], Option<f64>, f64)>, time_at: impl Fn(f64) -> f64) -> Self {
-        let Some(([lo, hi], until, travelled)) = found else { return Self::new(None, None, None, None) };
-        Self::new(Some(lo), Some(hi), until.map(&time_at), Some(time_at(travelled)))
-    }
-}
-
-/// Returns a proved time rounded down, so that it is not after the exact one.
-fn rounded_down(time: f64) -> f64 {
-    time.next_down().max(0.0)
-}
-
-/// The line of `check --prove --json`.
-#[derive(Serialize)]
-struct ClearanceLine {
-    least_clearance: Option<f64>,
-    #[serde(flatten)]
-    proved: ProvedBounds,
-    bench_a: Option<usize>,
-    bench_b: Option<usize>,
-}
-
-/// A line of `check --prove --json` for an obstacle.
-#[derive(Serialize)]
-struct ProvedObstacleLine<'a> {
-    obstacle: &'a str,
-    least_clearance: f64,
-    #[serde(flatten)]
-    proved: ProvedBounds,
-    bench: Option<usize>,
-}
-
 /// Validates the scene and prints what it does.
 pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
-    let scene = text.parse_any()?;
+    let scene = text.parse()?;
     if arguments.prove {
         expect_exact_motion(&scene)?;
     }
@@ -127,16 +65,14 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if let (Some(covered), true) = (&covered, common.json) {
         output.json(&covered.line())?;
     }
-    if let (Some(ensemble), true, true) = (&scene.ensemble, arguments.prove, common.json) {
-        let show_end = timeline.show_end(scene.stops_at_contact());
-        let file = arguments.certify.as_deref();
-        for part in several::enclosed((&scene, ensemble, &text.text), show_end, file, common)? {
-            output.json(&part)?;
-        }
-        return output.finish();
-    }
+    let prove = |found: Found<'_>, show_end| {
+        Parts::enclosed((&scene, &text.text), show_end, found, arguments.certify.as_deref(), common)
+    };
     if arguments.prove && common.json {
-        return print_proof(&scene, &text.text, &timeline, arguments, common, output);
+        let (found, show_end) = find_least_clearance(&scene, &timeline, common);
+        let beside = obstacle_clearances(&scene, show_end, common);
+        prove((found.of_show(), &beside), show_end)?.print_lines(&mut output)?;
+        return output.finish();
     }
     if common.json {
         return if covered.is_some() { output.finish() } else { print_lines(&scene, &timeline, common, output) };
@@ -148,28 +84,15 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show()) {
         output.line(&format!("  {}", least_clearance_between(&scene, &between)))?;
     }
-    let found = found.of_show();
     let beside = obstacle_clearances(&scene, show_end, common);
-    let enclosures = match arguments.prove && scene.ensemble.is_none() {
-        true => {
-            let hints = (found, beside.as_slice(), show_end);
-            Some(enclosed(&scene, &text.text, hints, arguments.certify.as_deref(), common)?)
-        }
-        false => None,
-    };
-    if let Some(ClearanceEnclosures { boards, .. }) = &enclosures {
-        output.line(&format!("  {}", proof_sentence(&scene, *boards)))?;
-    }
+    let parts = arguments.prove.then(|| prove((found.of_show(), &beside), show_end)).transpose()?;
+    parts.iter().try_for_each(|parts| parts.print_unnamed(None, &mut output))?;
     for least in &beside {
         output.line(&format!("  {}", obstacle_sentence(&scene, &timeline, least)))?;
-        if let Some(ClearanceEnclosures { obstacles, .. }) = &enclosures {
-            output.line(&format!("  {}", obstacle_proof(&scene, enclosure_of(obstacles, least))))?;
-        }
+        let name = &scene.ensemble.ground().obstacles()[least.obstacle].name;
+        parts.iter().try_for_each(|parts| parts.print_unnamed(Some(name), &mut output))?;
     }
-    if let (Some(ensemble), true) = (&scene.ensemble, arguments.prove) {
-        let parts = several::enclosed((&scene, ensemble, &text.text), show_end, arguments.certify.as_deref(), common)?;
-        several::print(&parts, &mut output)?;
-    }
+    parts.iter().try_for_each(|parts| parts.print_named(&mut output))?;
     if let Some(covered) = covered {
         output.line(&format!("  {}", covered.sentence()))?;
     }
@@ -178,27 +101,6 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         for sentence in sentences {
             output.line(&format!("    {sentence}."))?;
         }
-    }
-    output.finish()
-}
-
-/// Proves the least clearances and prints them as JSON lines.
-fn print_proof(
-    scene: &Scene,
-    text: &str,
-    timeline: &Timeline,
-    arguments: &CheckArguments,
-    common: &Common,
-    mut output: Output,
-) -> Result<(), CommandError> {
-    let (found, show_end) = find_least_clearance(scene, timeline, common);
-    let found = found.of_show();
-    let beside = obstacle_clearances(scene, show_end, common);
-    let hints = (found, beside.as_slice(), show_end);
-    let ClearanceEnclosures { boards, obstacles } = enclosed(scene, text, hints, arguments.certify.as_deref(), common)?;
-    output.json(&clearance_line(scene, found, boards))?;
-    for found in &beside {
-        output.json(&obstacle_line(scene, found, enclosure_of(&obstacles, found)))?;
     }
     output.finish()
 }
@@ -256,11 +158,11 @@ fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: 
         bench_b: found.map(|found| found.least.bench_b),
     };
     output.json(&line("clearance", found.of_show()))?;
-    if scene.ensemble.is_some() {
+    if scene.ensemble.only().is_none() {
         output.json(&line("clearance_between_dragons", found.between))?;
     }
     for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, show_end, common) {
-        let obstacle = &scene.ground().obstacles()[obstacle].name;
+        let obstacle = &scene.ensemble.ground().obstacles()[obstacle].name;
         let (check, clearance, bench) = ("obstacle", least.value, least.bench);
         output.json(&ObstacleLine { check, obstacle, clearance, time, bench })?;
     }
@@ -271,10 +173,7 @@ fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: 
 fn obstacle_clearances(scene: &Scene, show_end: &TimedEvent, common: &Common) -> Vec<TimedObstacleClearance> {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
     let mut progress = |share: f64| bar.set_position((1000.0 * share) as u64);
-    let found = match &scene.ensemble {
-        Some(ensemble) => ensemble.obstacle_clearances(show_end, &mut progress),
-        None => scene.motion.obstacle_clearances(show_end, &mut progress),
-    };
+    let found = scene.ensemble.obstacle_clearances(show_end, &mut progress);
     bar.finish_and_clear();
     found
 }
@@ -282,12 +181,12 @@ fn obstacle_clearances(scene: &Scene, show_end: &TimedEvent, common: &Common) ->
 /// Returns a sentence for people on the least clearance of an obstacle, and on its first touch.
 fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleClearance) -> String {
     let TimedObstacleClearance { obstacle, least, time, searched_until } = *found;
-    let Obstacle { name, keep_out, .. } = &scene.ground().obstacles()[obstacle];
+    let Obstacle { name, keep_out, .. } = &scene.ensemble.ground().obstacles()[obstacle];
     let (value, at, bench) = (figure(least.value), figure(time), bench_name(scene, least.bench));
     let up_to = searched_until
         .map_or(String::new(), |until| format!(" up to t = {} s, where the search gave up", figure(until)));
     let beyond = if *keep_out > 0.0 { format!(" beyond its keep-out of {keep_out} m") } else { String::new() };
-    let number = Some((scene.handles() + obstacle) as u32);
+    let number = Some((scene.ensemble.handles() + obstacle) as u32);
     let first = timeline.events().iter().find(|timed| timed.event.bench_b == number);
     let first = first.map_or(String::new(), |timed| format!(" First met at t = {} s.", figure(timed.time)));
     format!(
@@ -305,113 +204,6 @@ impl CheckArguments {
         let ground = swept(scene, timeline, stretch, common)?;
         ground.write(scene, file)?;
         Ok(Some(ground))
-    }
-}
-
-/// Encloses the least clearances between two numbers each, if they can be proved. Writes the certificate to `file`.
-fn enclosed(
-    scene: &Scene,
-    text: &str,
-    (found, obstacles, show_end): (Option<TimedClearance>, &[TimedObstacleClearance], &TimedEvent),
-    file: Option<&Path>,
-    common: &Common,
-) -> Result<ClearanceEnclosures, CommandError> {
-    expect_exact_motion(scene)?;
-    let certificate = file.map(CertificateFile::create).transpose()?;
-    if found.is_none() && obstacles.is_empty() {
-        let sentence = "no certificate is written: the search found no least clearance";
-        let nothing = ClearanceEnclosures { boards: None, obstacles: Vec::new() };
-        return if file.is_some() { Err(CommandError::Failed(sentence.to_owned())) } else { Ok(nothing) };
-    }
-    let least = found.map(|found| found.least);
-    let hints = ClearanceHints { boards: least.as_ref(), obstacles };
-    let bar = progress_bar(1000, common).with_message("proving the least clearance");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let most_steps = MOST_CLEARANCE_STEPS;
-    let Some(mut certificate) = certificate else {
-        let enclosures = enclose_least_clearance(&scene.motion, show_end, hints, most_steps, &mut progress);
-        bar.finish_and_clear();
-        return Ok(enclosures);
-    };
-    let mut write = |line: &CertificateLine| certificate.write(line);
-    let motion = &scene.motion;
-    let enclosures = certify_least_clearance(motion, show_end, hints, text, most_steps, &mut write, &mut progress);
-    bar.finish_and_clear();
-    let enclosures = enclosures.map_err(|CertifyError::Write(error)| error)?;
-    certificate.finish()?;
-    Ok(enclosures)
-}
-
-/// Returns the enclosure of the obstacle of a found clearance.
-fn enclosure_of(enclosures: &[Option<ObstacleEnclosure>], found: &TimedObstacleClearance) -> Option<ObstacleEnclosure> {
-    enclosures.get(found.obstacle).copied().flatten()
-}
-
-/// Returns a sentence for people on the proof of the least clearance of an obstacle.
-fn obstacle_proof(scene: &Scene, enclosure: Option<ObstacleEnclosure>) -> String {
-    let Some(ObstacleEnclosure { lo, hi, until, travelled, .. }) = enclosure else {
-        return "Nothing of it could be proved.".to_owned();
-    };
-    match until {
-        None => format!("Proved: it is between {lo} m and {hi} m."),
-        Some(until) => {
-            let [until, at] = [until, travelled].map(|travelled| scene.motion.time_at(travelled));
-            format!(
-                "Proved: up to t = {} s it is not less than {lo} m; at t = {at} s it is at most {hi} m. Not decided \
-                 beyond.",
-                rounded_down(until)
-            )
-        }
-    }
-}
-
-fn obstacle_line<'a>(
-    scene: &'a Scene,
-    found: &TimedObstacleClearance,
-    enclosure: Option<ObstacleEnclosure>,
-) -> ProvedObstacleLine<'a> {
-    let proved = enclosure.map(|found| ([found.lo, found.hi], found.until, found.travelled));
-    ProvedObstacleLine {
-        obstacle: &scene.ground().obstacles()[found.obstacle].name,
-        least_clearance: found.least.value,
-        proved: ProvedBounds::of(proved, |travelled| scene.motion.time_at(travelled)),
-        bench: enclosure.map(|enclosure| enclosure.bench),
-    }
-}
-
-/// Returns a sentence for people on the proof of the least clearance.
-fn proof_sentence(scene: &Scene, enclosure: Option<ClearanceEnclosure>) -> String {
-    let Some(ClearanceEnclosure { lo, hi, until, travelled, .. }) = enclosure else {
-        return "Nothing of it could be proved.".to_owned();
-    };
-    let time_at = |travelled| scene.motion.time_at(travelled);
-    proved_sentence((lo, hi), until.map(time_at).map(rounded_down), time_at(travelled))
-}
-
-/// Returns a sentence for people on a least clearance that is proved up to a time, rounded down, or to the end of the
-/// show.
-fn proved_sentence((lo, hi): (f64, f64), until: Option<f64>, at: f64) -> String {
-    match until {
-        None if lo == hi => format!("Proved: it is {lo} m."),
-        None => format!("Proved: it is between {lo} m and {hi} m."),
-        Some(until) => format!(
-            "Proved: up to t = {until} s no two boards are nearer than {lo} m; at t = {at} s two are no further apart \
-             than {hi} m. Not decided beyond."
-        ),
-    }
-}
-
-fn clearance_line(
-    scene: &Scene,
-    found: Option<TimedClearance>,
-    enclosure: Option<ClearanceEnclosure>,
-) -> ClearanceLine {
-    let proved = enclosure.map(|found| ([found.lo, found.hi], found.until, found.travelled));
-    ClearanceLine {
-        least_clearance: found.map(|found| found.least.value),
-        proved: ProvedBounds::of(proved, |travelled| scene.motion.time_at(travelled)),
-        bench_a: enclosure.map(|enclosure| enclosure.bench_a),
-        bench_b: enclosure.map(|enclosure| enclosure.bench_b),
     }
 }
 

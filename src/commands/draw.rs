@@ -145,11 +145,6 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
     }
 }
 
-/// Returns the dragons of a scene.
-fn dragons(scene: &Scene) -> Dragons<'_> {
-    scene.ensemble.as_ref().map_or_else(|| Dragons::one(&scene.motion), Dragons::several)
-}
-
 /// Returns the number of steps of --every between two times.
 fn steps(every: f64, from: f64, until: f64) -> Result<u64, CommandError> {
     if !(every.is_finite() && every > 0.0) {
@@ -190,11 +185,8 @@ struct Session<'a> {
 impl<'a> Session<'a> {
     fn new(scene: &'a Scene, timeline: &'a Timeline, file: Option<&'a Path>, json: bool) -> Self {
         // Boards are coloured by speed, even if the scene publishes no speeds.
-        let solver = match &scene.ensemble {
-            Some(ensemble) => Box::new(ensemble.solver(Velocities::Computed)),
-            None => scene.motion.solver(Velocities::Computed).solver,
-        };
-        let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.handles()));
+        let solver = scene.ensemble.solver(Velocities::Computed);
+        let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.ensemble.handles()));
         Self { scene, timeline, solver, chain, earlier, file, json }
     }
 
@@ -202,16 +194,16 @@ impl<'a> Session<'a> {
         let solver = self.solver.as_mut();
         let time = solve_at_or_just_before(solver, time, &mut self.chain)
             .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))?;
-        // Several dragons are coloured by their names.
-        if self.scene.ensemble.is_none() {
-            mean_speeds(&self.scene.motion, solver, time, &mut self.chain, &mut self.earlier);
+        // Dragons with names are coloured by their names.
+        if let Some(motion) = self.scene.ensemble.only() {
+            mean_speeds(motion, solver, time, &mut self.chain, &mut self.earlier);
         }
         Ok(())
     }
 
     fn extent(&mut self, times: &[f64]) -> Result<Extent, CommandError> {
         let mut extent = Extent::NONE;
-        let dragons = dragons(self.scene);
+        let dragons = Dragons::of(&self.scene.ensemble);
         for time in times {
             self.solve(*time)?;
             extent.include(&dragons, *time, &self.chain);
@@ -223,7 +215,7 @@ impl<'a> Session<'a> {
     where
         'a: 'd,
     {
-        Drawing::new(&self.scene.name, dragons(self.scene), self.timeline, extent, look)
+        Drawing::new(&self.scene.name, Dragons::of(&self.scene.ensemble), self.timeline, extent, look)
     }
 
     fn draw_one(&mut self, look: Look, time: f64, swept: Option<&SweptArea>) -> Result<(), CommandError> {

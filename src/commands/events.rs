@@ -47,7 +47,7 @@ struct EventLine {
 /// Prints the events of the scene.
 pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
-    let scene = text.parse_any()?;
+    let scene = text.parse()?;
     warn_of_doubts(&scene);
     let timeline = search_timeline(&scene, common);
     let proved = match &arguments.certify {
@@ -63,8 +63,8 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     };
     let proof = |kind, obstacle| Some(&outcome_of(kind, obstacle, &[])?.status);
     let number = |event: &Event| {
-        let named = scene.obstacle_of(event)?;
-        scene.ground().obstacles().iter().position(|obstacle| obstacle.name == named.name)
+        let named = scene.ensemble.obstacle_of(event)?;
+        scene.ensemble.ground().obstacles().iter().position(|obstacle| obstacle.name == named.name)
     };
     let outcome = |event: &Event| outcome_of(event.kind, number(event), &dragons_of(&scene, event));
     let status = |event: &Event| Some(&outcome(event)?.status);
@@ -77,7 +77,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 time,
                 bench_a: event.bench_a,
                 bench_b: event.bench_b,
-                obstacle: scene.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
+                obstacle: scene.ensemble.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
                 x: event.place.map(|place| place.x),
                 y: event.place.map(|place| place.y),
                 enclosure: status(&event).map(enclosure),
@@ -94,7 +94,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
             Some(time) => format!("up to t = {} s, where the search gave up", figure(time)),
             None => "before the motion ends".to_owned(),
         };
-        let obstacle = (!scene.ground().is_empty()).then_some(EventKind::Obstacle);
+        let obstacle = (!scene.ensemble.ground().is_empty()).then_some(EventKind::Obstacle);
         for kind in [EventKind::Contact].into_iter().chain(obstacle).chain([EventKind::Stall]) {
             if timeline.find(kind).is_none() {
                 match kind {
@@ -106,7 +106,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 }
             }
         }
-        if scene.ensemble.is_some() {
+        if scene.ensemble.only().is_none() {
             let all = timeline.all();
             let told: Vec<_> = all.iter().filter_map(|timed| outcome(&timed.event)).collect();
             for other in proved.iter().flatten().filter(|other| !told.contains(other)) {
@@ -114,7 +114,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 output.line(&proof_sentence(other.event, &other.status))?;
             }
         }
-        for (number, obstacle) in scene.motion.ground().obstacles().iter().enumerate() {
+        for (number, obstacle) in scene.ensemble.ground().obstacles().iter().enumerate() {
             if let Some(status @ (Status::None { .. } | Status::Undecided { .. })) =
                 proof(EventKind::Obstacle, Some(number))
             {
@@ -127,22 +127,21 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     output.finish()
 }
 
-/// Returns the dragons that an event of a show of several is about, in their order; an empty list for one dragon.
+/// Returns the dragons with names that an event is about, in their order.
 fn dragons_of(scene: &Scene, event: &Event) -> Vec<usize> {
-    let Some(ensemble) = &scene.ensemble else { return Vec::new() };
-    let numbers = event.bench_a.into_iter().chain(event.bench_b);
-    let mut dragons: Vec<usize> = numbers.filter_map(|number| Some(ensemble.owner(number as usize)?.0)).collect();
+    let numbers = event.bench_a.into_iter().chain(event.bench_b).filter(|_| scene.ensemble.only().is_none());
+    let mut dragons: Vec<usize> = numbers.filter_map(|number| Some(scene.ensemble.owner(number as usize)?.0)).collect();
     dragons.sort_unstable();
     dragons.dedup();
     dragons
 }
 
-/// Returns the subject of a result of a show of several dragons: the kind of event, and the names.
+/// Returns the subject of a result about dragons with names: the kind of event, and the names.
 fn subject(scene: &Scene, outcome: &CertifiedEvent) -> String {
-    let dragons = scene.ensemble.as_ref().map_or(&[][..], |ensemble| ensemble.dragons());
+    let dragons = scene.ensemble.dragons();
     let names: Vec<&str> =
         outcome.dragons.iter().filter_map(|dragon| Some(dragons.get(*dragon)?.name.as_str())).collect();
-    let obstacle = outcome.obstacle.and_then(|number| scene.ground().obstacles().get(number));
+    let obstacle = outcome.obstacle.and_then(|number| scene.ensemble.ground().obstacles().get(number));
     let at = obstacle.map_or(String::new(), |obstacle| format!(" and {}", obstacle_label(obstacle)));
     format!("{}{at}, {}", names.join(" and "), outcome.event.name().replace('_', " "))
 }
@@ -160,10 +159,8 @@ fn certified(
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| certificate.write(line);
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let outcomes = match &scene.ensemble {
-        Some(ensemble) => certify::certify_several(ensemble, text, MOST_STEPS, &mut write, &mut progress),
-        None => certify::certify(&scene.motion, timeline, text, MOST_STEPS, &mut write, &mut progress),
-    };
+    let (ensemble, most_steps) = (&scene.ensemble, MOST_STEPS);
+    let outcomes = certify::certify(ensemble, timeline, text, most_steps, &mut write, &mut progress);
     bar.finish_and_clear();
     let outcomes = outcomes.map_err(|CertifyError::Write(error)| error)?;
     certificate.finish()?;
@@ -207,19 +204,17 @@ pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
         EventKind::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
         EventKind::Contact => format!("{first} and {second} touch{place}"),
         EventKind::Obstacle => {
-            let obstacle = scene.obstacle_of(&event).map_or(second, obstacle_label);
+            let obstacle = scene.ensemble.obstacle_of(&event).map_or(second, obstacle_label);
             let how = if time == 0.0 { "is at" } else { "meets" };
             format!("{first} {how} {obstacle}{}{place}", if time == 0.0 { " from the start," } else { "" })
         }
         EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
         EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot continue"),
-        EventKind::PathEnd => match (&scene.ensemble, event.bench_a) {
-            (Some(all), Some(head)) => {
-                let name = all.owner(head as usize).map_or("a dragon", |(dragon, _)| &all.dragons()[dragon].name);
-                format!("the head of {name} reaches the end of the path")
-            }
-            _ => "the head reaches the end of the path".to_owned(),
-        },
+        EventKind::PathEnd => {
+            let dragon = event.bench_a.and_then(|head| scene.ensemble.owner(head as usize));
+            let head = dragon.map(|(dragon, _)| scene.ensemble.dragons()[dragon].titled("the head"));
+            format!("{} reaches the end of the path", head.unwrap_or_else(|| "the head".to_owned()))
+        }
     };
     format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), figure(time))
         .replace("path (counting from 1)", "path")
@@ -239,13 +234,7 @@ pub fn find_least_clearance<'t>(
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
     let show_end = timeline.show_end(scene.stops_at_contact());
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let found = match &scene.ensemble {
-        Some(ensemble) => ensemble.least_clearances(show_end, &mut progress),
-        None => {
-            let own = scene.motion.least_clearance(timeline, show_end, &mut progress);
-            LeastClearances { own, between: None }
-        }
-    };
+    let found = scene.ensemble.least_clearances(timeline, show_end, &mut progress);
     bar.finish_and_clear();
     (found, show_end)
 }
@@ -270,5 +259,5 @@ pub fn least_clearance_between(scene: &Scene, found: &TimedClearance) -> String 
 
 /// Returns a bench's name for people, counted from 1.
 pub fn bench_name(scene: &Scene, bench: u32) -> String {
-    scene.bench_name(bench)
+    scene.ensemble.roster().bench(bench)
 }

@@ -96,18 +96,18 @@ pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandErr
 fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), CommandError> {
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
-    let scene = text.parse()?;
+    let (scene, motion) = text.parse_only()?;
     warn_of_obstacles(&scene);
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
     let found = if let Some(file) = file {
         let mut certificate = CertificateFile::create(file)?;
         let mut write = |line: &CertificateLine| certificate.write(line);
-        let found = certify_least_pitch(scene.team(), radius, &text.text, &mut write, &mut progress)??;
+        let found = certify_least_pitch(motion.team(), radius, &text.text, &mut write, &mut progress)??;
         certificate.finish()?;
         found
     } else {
-        least_pitch(scene.team(), radius, &mut progress)?
+        least_pitch(motion.team(), radius, &mut progress)?
     };
     bar.finish_and_clear();
     let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;
@@ -165,7 +165,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
 fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), CommandError> {
     Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
-    let scene = text.parse()?;
+    let (scene, _) = text.parse_only()?;
     expect_exact_motion(&scene)?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
@@ -209,7 +209,7 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
 
 /// Warns that the obstacles of a scene change nothing.
 fn warn_of_obstacles(scene: &Scene) {
-    if !scene.ground().is_empty() {
+    if !scene.ensemble.ground().is_empty() {
         log::warn!("the plan leaves out the obstacles of the scene: it is about boards alone");
     }
 }

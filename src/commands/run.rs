@@ -84,7 +84,7 @@ pub struct RunArguments {
 pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError> {
     arguments.parent.watch()?;
     let text = common.scene_text()?;
-    let mut scene = text.parse_any()?;
+    let mut scene = text.parse()?;
     warn_of_doubts(&scene);
     if arguments.ros2 {
         scene.ros2.get_or_insert_default();
@@ -105,7 +105,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let timeline = if scene.alerts.is_some() {
         search_timeline(&scene, common)
     } else {
-        let timeline = scene.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact();
         warn_of_gap(&timeline);
         timeline
     };
@@ -146,7 +146,7 @@ impl RunSession<'_> {
     /// Opens the transports, publishes, and prints the summary.
     fn run(&self, show: Show, stop: &AtomicBool) -> Result<(), CommandError> {
         let scene_hash = bench_dragon::proof::scene_hash(&self.text.text);
-        let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, self.scene, &show);
+        let stage = convert::stage(self.run_id, realtime_ns(), scene_hash, &self.scene.ensemble, &show);
         let config =
             TransportConfig { scene: &self.text.text, ..TransportConfig::of(self.common.name(), self.scene, &stage) };
         let (mut transports, queues) = open_transports(&config)?;
@@ -189,7 +189,7 @@ impl RunSession<'_> {
         let Some(file) = &self.arguments.log else { return Ok(None) };
         let run = (self.run_id, realtime_ns());
         let show = ShowLine::new(self.text, &self.playback, Arithmetic::of(self.scene), &self.solver, run);
-        Ok(Some(recording_log::open(file, show, self.scene.handles())?))
+        Ok(Some(recording_log::open(file, show, self.scene.ensemble.handles())?))
     }
 
     /// Opens the log of distributions, if requested.
@@ -205,7 +205,12 @@ impl RunSession<'_> {
             return;
         }
         let (scene, playback) = (self.scene, self.playback);
-        eprintln!("Scene \"{}\": {} benches, {} handles.", scene.name, scene.benches(), scene.handles());
+        eprintln!(
+            "Scene \"{}\": {} benches, {} handles.",
+            scene.name,
+            scene.ensemble.benches(),
+            scene.ensemble.handles()
+        );
         eprintln!("Solver {}.", self.solver);
         let scale = if playback.time_scale == 1.0 {
             String::new()

@@ -17,7 +17,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Returns the facts about the scene with this text; `None` for a text that is no scene.
 pub fn scene_facts(text: &str) -> Option<SceneFacts> {
-    let mut scene = Scene::parse_any(text, "the scene of the show", "show").ok()?;
+    let mut scene = Scene::parse(text, "the scene of the show", "show").ok()?;
     let loop_stand = (scene.at_end == AtEnd::Loop).then_some(scene.end_hold);
     // Frames have a clearance only with alerts, and a cue may let a show wait.
     scene.alerts.get_or_insert(AlertRules { approach_time: 0.0, approach_clearance: 0.0 });
@@ -28,7 +28,7 @@ pub fn scene_facts(text: &str) -> Option<SceneFacts> {
 /// Returns the clearance over the show: of boards, and of boards and obstacles. `None` for fewer than three benches on
 /// empty ground, where a search gave up, or where it takes too long.
 fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
-    let timeline = scene.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let show_end = *timeline.show_end(scene.stops_at_contact());
     let least = least(scene, &timeline, &show_end)?;
     let patience = Instant::now() + PATIENCE;
@@ -44,16 +44,8 @@ fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
 /// Returns the least clearance of the show; `None` if a search gave up.
 fn least(scene: &Scene, timeline: &Timeline, show_end: &TimedEvent) -> Option<LeastOfShow> {
     let mut silent = |_| ();
-    let (boards, obstacles) = match &scene.ensemble {
-        Some(all) => {
-            (all.least_clearances(show_end, &mut silent).of_show(), all.obstacle_clearances(show_end, &mut silent))
-        }
-        None => {
-            let motion = &scene.motion;
-            let boards = motion.least_clearance(timeline, show_end, &mut silent);
-            (boards, motion.obstacle_clearances(show_end, &mut silent))
-        }
-    };
+    let boards = scene.ensemble.least_clearances(timeline, show_end, &mut silent).of_show();
+    let obstacles = scene.ensemble.obstacle_clearances(show_end, &mut silent);
     let is_whole = boards.is_none_or(|found| found.searched_until.is_none())
         && obstacles.iter().all(|found| found.searched_until.is_none());
     let of_boards = boards.map(|found| LeastOfShow {
@@ -67,7 +59,7 @@ fn least(scene: &Scene, timeline: &Timeline, show_end: &TimedEvent) -> Option<Le
         clearance: found.least.value,
         bench_a: found.least.bench,
         // Obstacles follow the handles.
-        bench_b: (scene.handles() + found.obstacle) as u32,
+        bench_b: (scene.ensemble.handles() + found.obstacle) as u32,
     });
     let all = of_boards.into_iter().chain(of_obstacles).filter(|_| is_whole);
     all.min_by(|one, other| one.clearance.total_cmp(&other.clearance))

@@ -289,7 +289,7 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
     arguments.parent.watch()?;
     let stop = stop_on_signals()?;
     let mut feed = Feed::new(common.name(), FeedOptions { wake: Wake::OnFrame, frames: Delivery::All })?;
-    let mut observer = Observer::new(common.load_scene()?.link_tolerance());
+    let mut observer = Observer::new(common.load_scene()?.ensemble.link_tolerance());
     let mut output = std::io::stdout().lock();
     let mut print = |observer: &mut Observer| -> Result<(), CommandError> {
         serde_json::to_writer(&mut output, &observer.observation()).map_err(std::io::Error::from)?;

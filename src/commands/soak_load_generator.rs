@@ -55,10 +55,10 @@ pub fn conduct(common: &Common, arguments: &SoakLoadGeneratorArguments) -> Resul
 
 /// Returns the facts of a scene's show. Searches for its events.
 fn facts_of(scene: &Scene) -> ShowFacts {
-    let timeline = scene.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
     let stops = scene.alerts.is_some() && scene.on_contact == OnContact::Stop;
-    let cue = |cue: &Cue| Some((cue.time(&scene.motion, &timeline)?, cue.then == CueAction::Pause));
+    let cue = |cue: &Cue| Some((cue.time(&scene.ensemble, &timeline)?, cue.then == CueAction::Pause));
     let mut cues = Vec::from_iter(scene.cues.iter().filter_map(cue));
     cues.sort_by(|a, b| a.0.total_cmp(&b.0));
     ShowFacts { end: timeline.show_end(stops).time, cues }

@@ -35,10 +35,11 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
     let scene = common.load_scene()?;
     let searched = [EventKind::Contact, EventKind::Obstacle];
     let wants_contact = arguments.at.iter().any(|time| searched.iter().any(|kind| time.trim() == kind.name()));
-    let timeline = if wants_contact { search_timeline(&scene, common) } else { scene.timeline_without_contact() };
+    let timeline =
+        if wants_contact { search_timeline(&scene, common) } else { scene.ensemble.timeline_without_contact() };
     let (count, times) = arguments.times(&timeline)?;
-    let mut solver = scene.solver();
-    let mut chain = Chain::new(scene.handles());
+    let mut solver = scene.ensemble.solver(scene.velocities);
+    let mut chain = Chain::new(scene.ensemble.handles());
     let mut output = match &arguments.output {
         Some(file) => Output::file(file)?,
         None => Output::standard(),

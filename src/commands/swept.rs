@@ -26,7 +26,7 @@ pub struct Stretch<'a> {
 /// The benches of one dragon.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Benches {
-    /// The name of the dragon; `None` in a show of one.
+    /// The name of the dragon, if one is given.
     dragon: Option<String>,
     /// The first and the last bench, counted from 1.
     range: (usize, usize),
@@ -99,34 +99,29 @@ fn selected<'s>(
     benches: Option<&Benches>,
 ) -> Result<(Vec<SweptStretch<'s>>, [usize; 2], String), CommandError> {
     let refused = |sentence: String| Err(CommandError::BadInput(sentence));
-    let Some(ensemble) = &scene.ensemble else {
-        if benches.is_some_and(|benches| benches.dragon.is_some()) {
-            return refused("--benches names a dragon and the scene has one, expected benches as in 1-20".to_owned());
-        }
-        let range = range(benches, scene.team().benches)?;
-        let travelled = times.map(|time| scene.motion.travelled_at(time)).into();
-        let words = format!("benches {} to {}", range.start + 1, range.end);
-        let (ends, motion) = ([range.start, range.end - 1], &scene.motion);
-        return Ok((vec![SweptStretch { motion, travelled, benches: range }], ends, words));
-    };
+    let ensemble = &scene.ensemble;
     let of = |dragon: &'s Dragon, benches: Range<usize>| SweptStretch {
         motion: &dragon.motion,
         travelled: times.map(|time| dragon.travelled_at(time)).into(),
         benches,
     };
-    let Some(benches) = benches else {
-        let all = ensemble.dragons().iter().map(|dragon| of(dragon, 0..dragon.motion.team().benches)).collect();
-        return Ok((all, [0, ensemble.handles() - 2], "all benches".to_owned()));
-    };
-    let named = ensemble.dragons().iter().position(|dragon| Some(&dragon.name) == benches.dragon.as_ref());
+    let name = benches.and_then(|benches| benches.dragon.as_deref()).unwrap_or_default();
+    let named = ensemble.dragons().iter().position(|dragon| dragon.name == name);
     let Some(number) = named else {
+        if benches.is_none() {
+            let all = ensemble.dragons().iter().map(|dragon| of(dragon, 0..dragon.motion.team().benches)).collect();
+            return Ok((all, [0, ensemble.handles() - 2], "all benches".to_owned()));
+        }
+        if ensemble.only().is_some() {
+            return refused("--benches names a dragon and the scene has one, expected benches as in 1-20".to_owned());
+        }
         let names: Vec<&str> = ensemble.dragons().iter().map(|dragon| dragon.name.as_str()).collect();
         let names = names.join(", ");
         return refused(format!("--benches names no dragon of the scene, expected one of {names}, as in gold:1-20"));
     };
     let (dragon, first) = (&ensemble.dragons()[number], ensemble.handles_of(number).start);
-    let range = range(Some(benches), dragon.motion.team().benches)?;
-    let words = format!("benches {} to {} of {}", range.start + 1, range.end, dragon.name);
+    let range = range(benches, dragon.motion.team().benches)?;
+    let words = dragon.titled(&format!("benches {} to {}", range.start + 1, range.end));
     let ends = [first + range.start, first + range.end - 1];
     Ok((vec![of(dragon, range)], ends, words))
 }

@@ -4,10 +4,10 @@ use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
 
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
-use bench_dragon::motion::ensemble::Dragon;
+use bench_dragon::motion::ensemble::{Dragon, Ensemble};
 use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::display::{self, Display, DisplayMeasurement, Precision, Reader};
-use bench_dragon::trade::{LAST_SECOND_SAMPLES, Measurement, SPREAD_SAMPLES, measure, publisher_frame_ns};
+use bench_dragon::trade::{LAST_SECOND_SAMPLES, Measurement, SPREAD_SAMPLES, Subject, measure, publisher_frame_ns};
 use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 use serde::Serialize;
@@ -68,7 +68,7 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
         [&arguments.plot, &arguments.display_plot].map(|file| file.as_deref().map(Output::file).transpose());
     let (mut plot_file, mut display_file) = (plot_file?, display_file?);
     announce(&scene, common);
-    if !scene.ground().is_empty() {
+    if !scene.ensemble.ground().is_empty() {
         log::warn!("`trade` leaves out the obstacles of the scene: it measures handles and the boards' first contact");
     }
     let bar = progress_bar(1000, common);
@@ -76,18 +76,19 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     let share = 1.0 / parts.len() as f64;
     for (k, part) in parts.iter().enumerate() {
         let progress = |done: f64| bar.set_position((1000.0 * share * (k as f64 + done)) as u64);
-        let timeline = part.scene.timeline(&mut |_| ());
+        let Part { subject, .. } = part;
+        let timeline = Ensemble::alone(subject.motion.clone()).timeline(&mut |_| ());
         warn_of_gap(&timeline);
         bar.set_message("measuring");
-        let measured = measure(&part.scene, &timeline, &mut |done| progress(SOLVERS * done));
+        let measured = measure(subject, &timeline, &mut |done| progress(SOLVERS * done));
         let measurements = measured.map_err(CommandError::Failed)?;
         let displayed = if common.json && !arguments.wants_display() {
             Vec::new()
         } else {
-            let frame_ns = publisher_frame_ns(&part.scene, &timeline);
+            let frame_ns = publisher_frame_ns(subject, &timeline);
             let display = Display { rate: arguments.display_rate.unwrap_or(60.0), delay: arguments.delay, frame_ns };
             let mut progress = |done| progress(SOLVERS + (1.0 - SOLVERS) * done);
-            display::measure(&part.scene, &timeline, display, &mut progress).map_err(CommandError::Failed)?
+            display::measure(subject, &timeline, display, &mut progress).map_err(CommandError::Failed)?
         };
         if k + 1 == parts.len() {
             bar.finish_and_clear();
@@ -105,13 +106,13 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
 
 /// One dragon, measured alone.
 struct Part {
-    /// Its name, if the scene has several.
+    /// Its name, if it has one.
     dragon: Option<String>,
-    /// The scene of that dragon, where its path has it: errors do not depend on the placement.
-    scene: Scene,
+    /// The dragon itself. With a name, it is where its path has it: errors do not depend on the placement.
+    subject: Subject,
 }
 
-/// A JSON line, with the name of the dragon if there are several.
+/// A JSON line, with the name of the dragon if it has one.
 #[derive(Serialize)]
 struct TradeLine<'a, M: Serialize> {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -120,14 +121,15 @@ struct TradeLine<'a, M: Serialize> {
     measurement: &'a M,
 }
 
-/// Returns the dragons of a scene, each as a scene of its own.
+/// Returns the dragons of a scene.
 fn parts(scene: &Scene) -> Vec<Part> {
-    let Some(ensemble) = &scene.ensemble else { return vec![Part { dragon: None, scene: scene.clone() }] };
-    let part = |Dragon { name, delay: _, motion }: &Dragon| Part {
-        dragon: Some(name.clone()),
-        scene: Scene { motion: motion.in_own_frame(), ensemble: None, ..scene.clone() },
+    let part = |Dragon { name, delay: _, motion }: &Dragon| {
+        let dragon = (!name.is_empty()).then(|| name.clone());
+        let motion = if dragon.is_some() { motion.in_own_frame() } else { motion.clone() };
+        let (velocities, rate, stops_at_contact) = (scene.velocities, scene.rate, scene.stops_at_contact());
+        Part { dragon, subject: Subject { motion, velocities, rate, stops_at_contact } }
     };
-    ensemble.dragons().iter().map(part).collect()
+    scene.ensemble.dragons().iter().map(part).collect()
 }
 
 impl Part {
@@ -144,11 +146,11 @@ impl Part {
             return displayed.iter().try_for_each(|measurement| output.json(&TradeLine { dragon, measurement }));
         }
         if let Some(name) = dragon {
-            let benches = self.scene.team().benches;
+            let benches = self.subject.motion.team().benches;
             output.line(&format!("{name}, {benches} benches, measured alone in its own time:"))?;
         }
         print(output, measurements)?;
-        print_display(output, &self.scene, displayed)?;
+        print_display(output, &self.subject, displayed)?;
         if dragon.is_some() { output.line("") } else { Ok(()) }
     }
 }
@@ -158,9 +160,9 @@ fn announce(scene: &Scene, common: &Common) {
     if common.quiet || stderr().is_terminal() {
         return;
     }
-    let benches = scene.benches();
+    let benches = scene.ensemble.benches();
     let time = if benches > 1000 { "some minutes" } else { "about half a minute" };
-    let each = if scene.ensemble.is_some() { " a dragon" } else { "" };
+    let each = if scene.ensemble.only().is_none() { " a dragon" } else { "" };
     eprintln!("measuring every solver on scene {} ({benches} benches), which takes {time}{each}", scene.name);
 }
 
@@ -215,7 +217,7 @@ fn print(output: &mut Output, measurements: &[Measurement]) -> Result<(), Comman
 }
 
 /// One row for both precisions, which are neighbours.
-fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasurement]) -> Result<(), CommandError> {
+fn print_display(output: &mut Output, subject: &Subject, displayed: &[DisplayMeasurement]) -> Result<(), CommandError> {
     output.line("")?;
     output.line(&format!(
         "  {:8} {:>7} {:>9}   {:>10} {:>11}   {:>10} {:>11}   {:>9}",
@@ -245,7 +247,7 @@ fn print_display(output: &mut Output, scene: &Scene, displayed: &[DisplayMeasure
          before the show ends and at {} moments spread over it, against newton at the simulated time meant to be on display. Single: poses \
          rounded to 32 bits, as `precision = \"f32\"` publishes them. Of a core: computing the frames by the solver of the scene, \
          without transport.",
-        scene.team().handles(),
+        subject.motion.team().handles(),
         display::WINDOW,
         display::SPREAD_SAMPLES
     ))

@@ -8,6 +8,7 @@ use std::process::Command;
 use bench_dragon::certify::plan::{greatest_speed, least_pitch};
 use bench_dragon::messages::state::EventKind::{self, Contact, Lock, PathEnd, Stall};
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
+use bench_dragon::motion::ensemble::Ensemble;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
 use bench_dragon::motion::model::team::Team;
@@ -24,7 +25,7 @@ fn scene(name: &str) -> Scene {
 }
 
 fn timeline(scene: &Scene) -> Timeline {
-    scene.motion.timeline(&mut |_| ())
+    scene.ensemble.timeline(&mut |_| ())
 }
 
 /// Returns the time of an event and its benches.
@@ -33,7 +34,8 @@ fn event(timeline: &Timeline, kind: EventKind) -> Option<(f64, Option<u32>, Opti
 }
 
 fn newton(scene: &Scene) -> Newton {
-    Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed)
+    let motion = scene.ensemble.only().unwrap();
+    Newton::new(motion.path().clone(), *motion.team(), 1.0, Velocities::Computed)
 }
 
 /// Returns the program's output within ten minutes, a deadline for hanging and no measure of speed.
@@ -50,19 +52,22 @@ fn a_team_that_is_pushed_back_stays_on_its_route() {
         let scene = scene(name);
         let timeline = timeline(&scene);
         assert_eq!(timeline.searched_until(), None);
-        let (newton, mut chain) = (newton(&scene), Chain::new(scene.team().handles()));
+        let (newton, mut chain) = (newton(&scene), Chain::new(scene.ensemble.handles()));
         let to = timeline.end().event.travelled;
         let mut sampled = f64::INFINITY;
         for k in 0..2000 {
             newton.solve_at(to * f64::from(k) / 2000.0, &mut chain).unwrap();
-            for bench in 0..scene.team().benches {
+            for bench in 0..scene.ensemble.benches() {
                 let link = (chain.x[bench] - chain.x[bench + 1]).hypot(chain.y[bench] - chain.y[bench + 1]);
-                assert!((link - scene.team().link(bench)).abs() < 1e-12, "{name}, link {bench}: {link} m");
+                assert!(
+                    (link - scene.ensemble.only().unwrap().team().link(bench)).abs() < 1e-12,
+                    "{name}, link {bench}: {link} m"
+                );
             }
-            let least = least_clearance_all_pairs(&chain, scene.team()).unwrap();
+            let least = least_clearance_all_pairs(&chain, scene.ensemble.only().unwrap().team()).unwrap();
             sampled = sampled.min(least.value);
         }
-        let least = scene.motion.least_clearance(&timeline, timeline.end(), &mut |_| ()).unwrap();
+        let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).own.unwrap();
         assert_eq!(least.searched_until, None);
         println!("{name}: least clearance {} m, sampled {sampled} m", least.least.value);
         assert!(least.least.value <= sampled && least.least.value > sampled - 0.05, "{name}: {least:?} {sampled}");
@@ -106,7 +111,7 @@ fn no_handle_jumps_before_the_motion_ends() {
         assert_eq!(event(&timeline, Contact), None, "{name}");
         let (lock, ..) = event(&timeline, Lock).unwrap_or_else(|| panic!("{name}: no lock"));
         assert!((lock - time).abs() < 1e-12, "{name}: {lock}");
-        let (newton, handles) = (newton(&scene), scene.team().handles());
+        let (newton, handles) = (newton(&scene), scene.ensemble.handles());
         let (mut before, mut last) = (Chain::new(handles), Chain::new(handles));
         let to = timeline.end().event.travelled;
         newton.solve_at(to - 1e-6, &mut before).unwrap();
@@ -151,7 +156,7 @@ fn bends_as_wide_as_a_link_are_searched() {
         };
         let team = Team { benches: 4, head_length: link, body_length: link, width: 0.1 * link, hole_inset: 0.0 };
         let motion = Motion::new(description, team, 1.0, Method::Newton).unwrap();
-        let timeline = motion.timeline(&mut |_| ());
+        let timeline = Ensemble::alone(motion).timeline(&mut |_| ());
         assert_eq!(timeline.searched_until(), None, "link {link}, offset {offset}");
         // In a bend wider than the link, the rear handle always has a next place; in a narrower bend the link stalls
         // and locks.
@@ -191,14 +196,14 @@ fn the_fastest_handle_is_the_highest_peak() {
 /// N8: boards that touch in a bend far outside with small pitches, and boards that overlap on a straight line.
 #[test]
 fn a_pitch_that_does_not_exist_is_refused_and_one_that_cannot_be_decided_is_not_stated() {
-    let error = least_pitch(scene("pp_16").team(), 4.5, &mut |_| ()).unwrap_err().to_string();
+    let error = least_pitch(scene("pp_16").ensemble.only().unwrap().team(), 4.5, &mut |_| ()).unwrap_err().to_string();
     assert!(error.contains("no pitch"), "{error}");
     if !harness::long() {
         aloud("a pitch that cannot be decided: not without BENCH_DRAGON_LONG=1, it takes a minute");
         return;
     }
     // With the pitch of the scene, 2.4 m, boards touch (by brute force, as with all others up to 24 m).
-    let plan = least_pitch(scene("plan_pitch_wrong").team(), 1.2, &mut |_| ()).unwrap();
+    let plan = least_pitch(scene("plan_pitch_wrong").ensemble.only().unwrap().team(), 1.2, &mut |_| ()).unwrap();
     println!("{plan:?}");
     assert!(plan.value_lo > 2.4, "{plan:?}");
     assert!(plan.proved || plan.value_hi.is_none_or(|pitch| pitch > 24.0), "{plan:?}");
@@ -235,11 +240,12 @@ fn long_scenes_end_or_say_how_far_they_came() {
 fn short_links_near_the_centre_of_a_wide_spiral_hold() {
     for name in ["tiny_1", "tiny_2"] {
         let scene = scene(name);
-        let (team, path) = (scene.team(), scene.motion.path());
-        let mut solver = scene.motion.solver(Velocities::Computed).solver;
+        let motion = scene.ensemble.only().unwrap();
+        let (team, path) = (motion.team(), motion.path());
+        let mut solver = motion.solver(Velocities::Computed).solver;
         let mut chain = Chain::new(team.handles());
         for share in [0.0, 0.3, 0.9, 0.999] {
-            solver.solve(scene.motion.time_at(share * path.length()), &mut chain).unwrap();
+            solver.solve(motion.time_at(share * path.length()), &mut chain).unwrap();
             for bench in 0..team.benches {
                 let link = (chain.x[bench] - chain.x[bench + 1]).hypot(chain.y[bench] - chain.y[bench + 1]);
                 let r = chain.x[bench + 1].hypot(chain.y[bench + 1]);

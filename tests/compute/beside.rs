@@ -5,7 +5,7 @@
 //! `BENCH_DRAGON_ALL=1` makes 120 scenes in place of 30, `BENCH_DRAGON_LONG=1` 3,000.
 
 use bench_dragon::certify::{
-    CertificateLine, ClearanceEnclosures, ClearanceHints, ObstacleEnclosure, certify_least_clearance,
+    CertificateLine, ClearanceEnclosures, ClearanceHints, ObstacleEnclosure, certify_clearances,
 };
 use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::model::shape::ShapeKind;
@@ -37,16 +37,17 @@ struct Enclosed {
 
 fn enclosed(text: &str) -> Enclosed {
     let scene = Scene::parse(text, "beside", "beside").unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let show_end = *timeline.show_end(scene.stops_at_contact());
-    let boards = scene.motion.least_clearance(&timeline, &show_end, &mut |_| ()).map(|found| found.least);
-    let found = scene.motion.obstacle_clearances(&show_end, &mut |_| ());
+    let boards = scene.ensemble.least_clearances(&timeline, &show_end, &mut |_| ()).own.map(|found| found.least);
+    let found = scene.ensemble.obstacle_clearances(&show_end, &mut |_| ());
     let hints = ClearanceHints { boards: boards.as_ref(), obstacles: &found };
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    let motion = &scene.motion;
-    let enclosures =
-        certify_least_clearance(motion, &show_end, hints, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    let enclosures = certify_clearances(&scene.ensemble, &show_end, hints, text, MOST_STEPS, &mut write, &mut |_| ())
+        .unwrap()
+        .own
+        .remove(0);
     let lines = String::from_utf8(lines).unwrap();
     Enclosed { found, enclosures, end: show_end.event.travelled, lines, scene }
 }
@@ -57,7 +58,7 @@ fn check(lines: &str) -> Result<Proved, Refused> {
 
 /// Returns the clearance of a bench from an obstacle by parry; where they overlap, minus the keep-out.
 fn clearance(scene: &Scene, team: &chain::Team, pose: &chain::Pose, bench: usize, obstacle: &Obstacle) -> f64 {
-    let placement = scene.motion.placement();
+    let placement = scene.ensemble.only().unwrap().placement();
     let turn = std::f64::consts::TAU * placement.rotation_turns();
     let placed = |handle: usize| {
         let point = pose.handles[handle].point;
@@ -90,7 +91,7 @@ fn clearance(scene: &Scene, team: &chain::Team, pose: &chain::Pose, bench: usize
 fn compared(text: &str, samples: u32) -> (usize, usize) {
     let Enclosed { scene, found, enclosures, end, lines } = enclosed(text);
     let proved = check(&lines).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
-    let obstacles = scene.motion.ground().obstacles();
+    let obstacles = scene.ensemble.ground().obstacles();
     assert_eq!(proved.obstacle_clearances.len(), obstacles.len());
     // The placement has the start of a route.
     let without_start = text.lines().filter(|line| !line.starts_with("start = [")).collect::<Vec<_>>().join("\n");

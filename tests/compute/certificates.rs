@@ -22,8 +22,8 @@ const STEPS_IN_VAIN: u64 = 1000;
 
 /// Returns the outcomes of a scene, contact first, and the ordinary events.
 fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<CertifiedEvent>, Timeline) {
-    let timeline = scene.motion.timeline(&mut |_| ());
-    let mut outcomes = certify(&scene.motion, &timeline, "", most_steps, &mut |_| Ok(()), &mut |_| ()).unwrap();
+    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let mut outcomes = certify(&scene.ensemble, &timeline, "", most_steps, &mut |_| Ok(()), &mut |_| ()).unwrap();
     // The outcomes of obstacles are compared in `staged`.
     outcomes.retain(|outcome| outcome.event != EventKind::Obstacle);
     assert_eq!(outcomes.iter().map(|outcome| outcome.event).collect::<Vec<_>>(), KINDS);
@@ -242,7 +242,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     // The least pitch with which the head reaches a radius. A little below it, two boards touch outside. A little above
     // it, they pass, and touch further in.
     const REACH: f64 = 2.0;
-    let team = *Scene::paper().team();
+    let team = *Scene::paper().ensemble.only().unwrap().team();
     let least = bench_dragon::certify::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;
     let contact = |pitch: f64| {
         let scene = paper_with("pitch", &pitch.to_string());
@@ -250,7 +250,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
         let (wrong, _) = compared(&outcomes, &timeline);
         assert!(wrong.is_empty(), "{wrong:?}");
         let (lo, hi) = proved(&outcomes[0]);
-        let path = scene.motion.path();
+        let path = scene.ensemble.only().unwrap().path();
         let radius = path.point(path.param_at(lo)).coords.norm();
         (radius, hi - lo)
     };
@@ -285,7 +285,7 @@ fn the_rounding_mode_of_the_processor_changes_nothing() {
         // SAFETY: the register is set back before anything else runs, and the code in between is meant to hold in any
         // mode.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &changed) };
-        let outcomes = certify(&scene.motion, &timeline, "", STEPS, &mut |_| Ok(()), &mut |_| ());
+        let outcomes = certify(&scene.ensemble, &timeline, "", STEPS, &mut |_| Ok(()), &mut |_| ());
         // SAFETY: as above.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &usual) };
         let outcomes = outcomes.unwrap();

@@ -3,7 +3,9 @@
 //!
 //! `BENCH_DRAGON_ALL=1` makes 24 pairs in place of 6, `BENCH_DRAGON_LONG=1` 600.
 
-use bench_dragon::certify::{BetweenEnclosure, CertificateLine, SeveralClearances, certify_several_clearances};
+use bench_dragon::certify::{
+    BetweenEnclosure, CertificateLine, ClearanceHints, EnsembleClearances, certify_clearances,
+};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ensemble::Ensemble;
 use bench_dragon::proof::{Proved, ProvedClearance, Refused, Until, verify};
@@ -18,12 +20,13 @@ const MOST_STEPS: u64 = 20_000;
 /// Greatest error of the brute force, metres.
 const ROUNDING: f64 = 1e-10;
 
-fn certificate(text: &str, scene: &Scene) -> (SeveralClearances, String) {
+fn certificate(text: &str, scene: &Scene) -> (EnsembleClearances, String) {
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    let (ensemble, timeline) = (scene.ensemble.as_ref().unwrap(), scene.timeline(&mut |_| ()));
+    let (ensemble, timeline) = (&scene.ensemble, scene.ensemble.timeline(&mut |_| ()));
     let show_end = timeline.show_end(scene.stops_at_contact());
-    let found = certify_several_clearances(ensemble, show_end, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    let hints = ClearanceHints { boards: None, obstacles: &[] };
+    let found = certify_clearances(ensemble, show_end, hints, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
     (found, String::from_utf8(lines).unwrap())
 }
 
@@ -100,8 +103,8 @@ fn compare(ensemble: &Ensemble, claim: &ProvedClearance, (end, stated): (f64, Op
 }
 
 fn ends_with_a_contact_of_two(scene: &Scene) -> bool {
-    let end = scene.timeline(&mut |_| ()).show_end(true).event;
-    let dragon = |bench: Option<u32>| Some(scene.ensemble.as_ref()?.owner(bench? as usize)?.0);
+    let end = scene.ensemble.timeline(&mut |_| ()).show_end(true).event;
+    let dragon = |bench: Option<u32>| Some(scene.ensemble.owner(bench? as usize)?.0);
     end.kind == EventKind::Contact && dragon(end.bench_a) != dragon(end.bench_b)
 }
 
@@ -117,7 +120,7 @@ fn least_clearances_of_random_pairs_are_proved() {
         let text = format!("[motion]\non_contact = \"{stop}\"\n[alerts]\n")
             + &any_dragon(&mut rng, "gold")
             + &any_dragon(&mut rng, "jade");
-        let Ok(scene) = Scene::parse_any(&text, "pair.toml", "pair") else { continue };
+        let Ok(scene) = Scene::parse(&text, "pair.toml", "pair") else { continue };
         if must_touch && !ends_with_a_contact_of_two(&scene) {
             continue;
         }
@@ -125,7 +128,7 @@ fn least_clearances_of_random_pairs_are_proved() {
         let (found, lines) = certificate(&text, &scene);
         let proved = check(&lines).unwrap_or_else(|refused| panic!("{cases}: {refused}\n{text}"));
         assert_eq!(proved.least_clearances.len(), 3, "{text}");
-        let (ensemble, timeline) = (scene.ensemble.as_ref().unwrap(), scene.timeline(&mut |_| ()));
+        let (ensemble, timeline) = (&scene.ensemble, scene.ensemble.timeline(&mut |_| ()));
         let end = timeline.show_end(scene.stops_at_contact()).time;
         let own_time = |dragon: usize| {
             let (boards, dragon) = (found.own[dragon].boards?, &ensemble.dragons()[dragon]);
@@ -159,7 +162,7 @@ fn clearances_of_standing_dragons_are_proved() {
     // Jade stands 5 m beside gold's way, and leaves at 30 s: gold stands with its front at 10.275 m.
     let ahead = dragon("jade", 3, "{ origin = [30.0, 5.0] }", 1.5, 30.0, &line(20.0));
     let text = gold.clone() + &ahead;
-    let scene = Scene::parse_any(&text, "pair.toml", "pair").unwrap();
+    let scene = Scene::parse(&text, "pair.toml", "pair").unwrap();
     let (found, lines) = certificate(&text, &scene);
     let proved = check(&lines).unwrap();
     let BetweenEnclosure { lo, hi, until, benches, .. } = found.between[0];
@@ -170,7 +173,7 @@ fn clearances_of_standing_dragons_are_proved() {
     // Side by side at one speed, the distance is constant: 1.2 m - 0.3 m, and jade stops earlier.
     let beside = dragon("jade", 3, "{ origin = [0.0, 1.2] }", 1.0, 0.0, &line(8.0));
     let text = gold + &beside;
-    let scene = Scene::parse_any(&text, "pair.toml", "pair").unwrap();
+    let scene = Scene::parse(&text, "pair.toml", "pair").unwrap();
     let (found, lines) = certificate(&text, &scene);
     check(&lines).unwrap();
     let BetweenEnclosure { lo, hi, until, .. } = found.between[0];
@@ -186,7 +189,7 @@ fn changed_certificates_of_clearances_are_refused() {
                { kind = \"arc\", radius = 8.0, side = \"right\", turns = 0.4 }]";
     let west = dragon("jade", 3, "{ origin = [15.0, 4.2], rotation_turns = 0.5 }", 1.5, 2.0, arc);
     let text = east + &west;
-    let scene = Scene::parse_any(&text, "pair.toml", "pair").unwrap();
+    let scene = Scene::parse(&text, "pair.toml", "pair").unwrap();
     let (found, lines) = certificate(&text, &scene);
     let proved = check(&lines).unwrap();
     let BetweenEnclosure { lo, hi, benches, .. } = found.between[0];
@@ -243,14 +246,14 @@ fn changed_certificates_of_clearances_are_refused() {
 fn the_example_scenes_of_several_dragons_have_proved_clearances() {
     for name in ["coil", "crossing"] {
         let text = std::fs::read_to_string(format!("config/{name}.toml")).unwrap();
-        let scene = Scene::parse_any(&text, "scene.toml", name).unwrap();
+        let scene = Scene::parse(&text, "scene.toml", name).unwrap();
         let (found, lines) = certificate(&text, &scene);
         let proved = check(&lines).unwrap();
         println!("{name}: {} bytes, {:?}", lines.len(), proved.least_clearances);
-        let ensemble = scene.ensemble.as_ref().unwrap();
-        let timeline = scene.timeline(&mut |_| ());
+        let ensemble = &scene.ensemble;
+        let timeline = scene.ensemble.timeline(&mut |_| ());
         let show_end = timeline.show_end(scene.stops_at_contact());
-        let least = ensemble.least_clearances(show_end, &mut |_| ());
+        let least = ensemble.least_clearances(&timeline, show_end, &mut |_| ());
         assert!(found.own.iter().all(|own| own.boards.is_some_and(|own| own.until.is_none())), "{:?}", found.own);
         let BetweenEnclosure { lo, hi, until, .. } = found.between[0];
         let (value, room) = (least.between.unwrap().least.value, 1e-9);

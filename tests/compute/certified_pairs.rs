@@ -3,7 +3,7 @@
 //!
 //! `BENCH_DRAGON_ALL=1` makes 60 pairs in place of 15, `BENCH_DRAGON_LONG=1` 1,000.
 
-use bench_dragon::certify::{CertificateLine, certify_several};
+use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::messages::state::EventKind as Kind;
 use bench_dragon::proof::{EventKind, Proved, ProvedEvent, Refused, Status, verify};
 use bench_dragon::show::scene::Scene;
@@ -17,8 +17,8 @@ const MOST_STEPS: u64 = 20_000;
 fn certificate(text: &str, scene: &Scene) -> String {
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    let ensemble = scene.ensemble.as_ref().unwrap();
-    certify_several(ensemble, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    let timeline = scene.ensemble.timeline(&mut |_| ());
+    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
     String::from_utf8(lines).unwrap()
 }
 
@@ -27,7 +27,7 @@ fn check(lines: &str) -> Result<Proved, Refused> {
 }
 
 fn proved(text: &str) -> (Scene, Proved) {
-    let scene = Scene::parse_any(text, "pair.toml", "pair").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let scene = Scene::parse(text, "pair.toml", "pair").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let proved = check(&certificate(text, &scene)).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
     (scene, proved)
 }
@@ -51,13 +51,13 @@ fn first_contacts_of_random_pairs_are_proved() {
     let (mut between, mut without, mut undecided, mut cases) = (0, 0, 0, 0);
     while cases < count {
         let text = any_dragon(&mut rng, "gold") + &any_dragon(&mut rng, "jade");
-        if Scene::parse_any(&text, "pair.toml", "pair").is_err() {
+        if Scene::parse(&text, "pair.toml", "pair").is_err() {
             continue;
         }
         cases += 1;
         let (scene, proved) = proved(&text);
         assert_eq!((proved.dragons.len(), proved.results.len()), (2, 9), "{text}");
-        let timeline = scene.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut |_| ());
         let found = timeline.find(Kind::Contact).map(|timed| timed.time);
         let Some(first) = first_contact(&proved) else {
             if contacts(&proved).any(|result| result.status == Status::Undecided) {
@@ -66,7 +66,7 @@ fn first_contacts_of_random_pairs_are_proved() {
                 continue;
             }
             assert_eq!(found, None, "{cases}: {text}");
-            let truth = brute_force(scene.ensemble.as_ref().unwrap(), timeline.end().time * (1.0 - 1e-9));
+            let truth = brute_force(&scene.ensemble, timeline.end().time * (1.0 - 1e-9));
             assert_eq!(truth, None, "{cases}: {text}");
             without += 1;
             continue;
@@ -77,7 +77,7 @@ fn first_contacts_of_random_pairs_are_proved() {
         if lo > timeline.end().time {
             continue;
         }
-        let (truth, _) = brute_force(scene.ensemble.as_ref().unwrap(), hi + 0.1).unwrap();
+        let (truth, _) = brute_force(&scene.ensemble, hi + 0.1).unwrap();
         assert!(lo - 1e-10 <= truth && truth <= hi + 1e-10, "{cases}: {truth} {first:?}\n{text}");
         assert!((truth - found.unwrap()).abs() < 2e-9, "{cases}: {found:?} {truth}\n{text}");
         between += usize::from(first.dragons.len() == 2);
@@ -132,7 +132,7 @@ fn changed_certificates_of_pairs_are_refused() {
     let east = dragon("gold", 3, "{ origin = [-20.0, 0.0] }", 1.0, 0.0, &line(100.0));
     let west = dragon("jade", 3, "{ origin = [20.0, 0.2], rotation_turns = 0.5 }", 1.5, 2.0, &line(100.0));
     let text = east + &west;
-    let scene = Scene::parse_any(&text, "pair.toml", "pair").unwrap();
+    let scene = Scene::parse(&text, "pair.toml", "pair").unwrap();
     let lines = certificate(&text, &scene);
     let proved = check(&lines).unwrap();
     let first = first_contact(&proved).unwrap();
@@ -177,7 +177,7 @@ fn the_example_scenes_of_several_dragons_are_proved() {
             println!("{name}: {result:?}");
             assert_ne!(result.status, Status::Undecided, "{name}: {result:?}");
         }
-        let found = scene.timeline(&mut |_| ()).find(Kind::Contact).map(|timed| timed.time);
+        let found = scene.ensemble.timeline(&mut |_| ()).find(Kind::Contact).map(|timed| timed.time);
         match (found, first_contact(&shown)) {
             (Some(time), Some(first)) => {
                 assert!(first.time_lo.unwrap() <= time + 1e-9 && time - 1e-9 <= first.time_hi.unwrap(), "{first:?}");
@@ -196,7 +196,7 @@ fn a_claim_that_two_dragons_do_not_meet_needs_its_steps() {
     let coil = dragon("gold", 3, "{ origin = [0.0, 0.0] }", 1.0, 0.5, wide);
     let far = dragon("jade", 3, "{ origin = [500.0, 0.0] }", 1.5, 0.0, &line(400.0));
     let text = coil + &far;
-    let scene = Scene::parse_any(&text, "pair.toml", "pair").unwrap();
+    let scene = Scene::parse(&text, "pair.toml", "pair").unwrap();
     let lines = certificate(&text, &scene);
     let shown = check(&lines).unwrap();
     let lock = shown.results.iter().find(|result| result.event == EventKind::Lock).unwrap();

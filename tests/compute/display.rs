@@ -1,21 +1,25 @@
 //! The error at the time of display, compared with figures that an independent program measured.
 
 use bench_dragon::motion::Method;
+use bench_dragon::motion::ensemble::Ensemble;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::show::scene::Scene;
+use bench_dragon::trade::Subject;
 use bench_dragon::trade::display::{Display, DisplayMeasurement, Precision, RATES, Reader, measure};
 
-/// Returns the paper's scene with the safe solver, which needs no table.
-fn paper(velocities: Velocities) -> Scene {
+/// Returns the paper's dragon with the safe solver, which needs no table.
+fn paper(velocities: Velocities) -> Subject {
     let scene = Scene::paper();
-    Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), velocities, ..scene }
+    let motion = scene.ensemble.only().unwrap().with_method(Method::Newton).unwrap();
+    Subject { motion, velocities, rate: scene.rate, stops_at_contact: scene.stops_at_contact() }
 }
 
 /// Returns all measurements; computing a frame takes a microsecond.
-fn measured(scene: &Scene, delay: Option<f64>) -> Vec<DisplayMeasurement> {
+fn measured(subject: &Subject, delay: Option<f64>) -> Vec<DisplayMeasurement> {
     let display = Display { rate: 60.0, delay, frame_ns: 1000.0 };
     let mut shares = vec![0.0];
-    let measured = measure(scene, &scene.motion.timeline(&mut |_| ()), display, &mut |share| shares.push(share));
+    let timeline = Ensemble::alone(subject.motion.clone()).timeline(&mut |_| ());
+    let measured = measure(subject, &timeline, display, &mut |share| shares.push(share));
     assert!(shares.is_sorted() && shares.last() == Some(&1.0), "{shares:?}");
     measured.unwrap()
 }

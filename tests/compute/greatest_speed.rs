@@ -34,8 +34,13 @@ fn speeds(newton: &Newton, travelled: f64, handle: u32, chain: &mut Chain) -> (f
 /// Asserts that the proved enclosure holds every speed that the safe solver finds, and that the named handle is as fast
 /// as stated.
 fn assert_holds(scene: &Scene, plan: &GreatestSpeed, show_end: f64, every: f64, who: &str) {
-    let newton = Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed);
-    let mut chain = Chain::new(scene.team().handles());
+    let newton = Newton::new(
+        scene.ensemble.only().unwrap().path().clone(),
+        *scene.ensemble.only().unwrap().team(),
+        1.0,
+        Velocities::Computed,
+    );
+    let mut chain = Chain::new(scene.ensemble.handles());
     let rounding = 1.0 + 1e-12;
     let most = LIMIT / plan.value_lo * rounding;
     for k in 0..(show_end / every) as u32 {
@@ -43,7 +48,7 @@ fn assert_holds(scene: &Scene, plan: &GreatestSpeed, show_end: f64, every: f64, 
         let (greatest, _) = speeds(&newton, at, 0, &mut chain);
         assert!(greatest <= most, "{who}: {greatest} at {at} m, {plan:?}");
     }
-    let peak = scene.motion.travelled_at(plan.time);
+    let peak = scene.ensemble.only().unwrap().travelled_at(plan.time);
     let (greatest, own) = speeds(&newton, peak, plan.handle, &mut chain);
     assert!(greatest <= most, "{who}: {greatest} {plan:?}");
     assert!((own / plan.ratio - 1.0).abs() < 1e-9, "{who}: {own} {plan:?}");
@@ -57,8 +62,11 @@ fn assert_holds(scene: &Scene, plan: &GreatestSpeed, show_end: f64, every: f64, 
 fn the_scenes_of_the_repository_are_proved_to_a_nanometre_a_second() {
     for name in ["paper", "school", "tight", "wide", "turnaround", "procession", "long"] {
         let scene = load(name);
-        let timeline =
-            if name == "long" { scene.motion.timeline_without_contact() } else { scene.motion.timeline(&mut |_| ()) };
+        let timeline = if name == "long" {
+            scene.ensemble.timeline_without_contact()
+        } else {
+            scene.ensemble.timeline(&mut |_| ())
+        };
         let show_end = timeline.show_end(scene.stops_at_contact());
         if show_end.event.kind == EventKind::Lock {
             println!("{name}: lock");
@@ -70,7 +78,7 @@ fn the_scenes_of_the_repository_are_proved_to_a_nanometre_a_second() {
         println!("{name}: {:.2} s, width {width:.1e}, {plan:?}", clock.elapsed().as_secs_f64());
         assert!(plan.proved && (0.0..=1e-9).contains(&width), "{name}: {plan:?}");
         let every = if name == "turnaround" { 0.05 } else { 0.2 };
-        if scene.team().benches < 1000 {
+        if scene.ensemble.benches() < 1000 {
             assert_holds(&scene, &plan, show_end.event.travelled, every, name);
         }
     }
@@ -79,7 +87,7 @@ fn the_scenes_of_the_repository_are_proved_to_a_nanometre_a_second() {
 #[test]
 fn on_the_way_in_nothing_is_faster_than_the_head() {
     let scene = Scene::paper();
-    let plan = plan(&scene, &scene.motion.timeline(&mut |_| ()));
+    let plan = plan(&scene, &scene.ensemble.timeline(&mut |_| ()));
     assert_eq!((plan.value_lo, plan.value_hi, plan.handle, plan.ratio), (LIMIT, LIMIT, 0, 1.0));
 }
 
@@ -87,12 +95,14 @@ fn on_the_way_in_nothing_is_faster_than_the_head() {
 #[ignore = "tests/run --all"]
 fn tables_of_50_digits_and_the_reference_agree_with_the_turnaround() {
     let scene = load("turnaround");
-    let plan = plan(&scene, &scene.motion.timeline(&mut |_| ()));
+    let plan = plan(&scene, &scene.ensemble.timeline(&mut |_| ()));
     let (least, most) = (LIMIT / plan.value_hi, LIMIT / plan.value_lo);
     let rows = tables::table(include_str!("../truth/turnaround_table.csv"));
     let greatest = rows.iter().map(|row| row.speed).fold(0f64, f64::max);
     assert!(greatest > 1.0 && greatest <= most, "{greatest} {most}");
-    let mut reference = Reference::new(*scene.team(), scene.motion.description(), 1.0).unwrap();
+    let mut reference =
+        Reference::new(*scene.ensemble.only().unwrap().team(), scene.ensemble.only().unwrap().description(), 1.0)
+            .unwrap();
     let handles = reference.handles(plan.time).unwrap();
     let speed = handles[plan.handle as usize].speed;
     println!("{speed:.17} in [{least:.17}, {most:.17}]");
@@ -134,7 +144,7 @@ fn random_paths_hold_what_dense_sampling_finds() {
              [path]\n{path}\n[motion]\nhead_speed = 1.0\n"
         );
         let Ok(scene) = Scene::parse(&text, "test", "test") else { continue };
-        let timeline = scene.motion.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact();
         if timeline.end().event.kind == EventKind::Lock {
             locked += 1;
             assert!(greatest_speed(&scene, &timeline, LIMIT, &mut |_| ()).is_err());
@@ -159,6 +169,6 @@ fn random_paths_hold_what_dense_sampling_finds() {
 #[test]
 fn a_huge_limit_is_met_to_nine_digits() {
     let scene = load("procession");
-    let found = greatest_speed(&scene, &scene.motion.timeline_without_contact(), 1e6, &mut |_| ()).unwrap();
+    let found = greatest_speed(&scene, &scene.ensemble.timeline_without_contact(), 1e6, &mut |_| ()).unwrap();
     assert!(found.proved && found.value_hi / found.value_lo - 1.0 <= 1e-9, "{found:?}");
 }

@@ -3,6 +3,7 @@
 
 use bench_dragon::messages::state::{EventKind, FrameState, Level};
 use bench_dragon::motion::clearance::{board, least_clearance_all_pairs};
+use bench_dragon::motion::ensemble::Ensemble;
 use bench_dragon::motion::ground::{Ground, Obstacle};
 use bench_dragon::motion::model::shape::Shape;
 use bench_dragon::motion::model::{Point, Vector};
@@ -28,18 +29,18 @@ fn blocked() -> Scene {
 }
 
 fn timeline(scene: &Scene) -> Timeline {
-    scene.motion.timeline(&mut |_| ())
+    scene.ensemble.timeline(&mut |_| ())
 }
 
 /// The least of all clearances of a chain: of pairs, and of each bench with each obstacle.
 fn least_of_all(scene: &Scene, chain: &Chain) -> (f64, u32, u32) {
-    let team = scene.team();
+    let team = scene.ensemble.only().unwrap().team();
     let pair =
         least_clearance_all_pairs(chain, team).map(|pair| (pair.value, pair.bench_a as u32, pair.bench_b as u32));
-    let ground = scene.motion.ground().obstacles();
+    let ground = scene.ensemble.ground().obstacles();
     let meetings = (0..team.benches).flat_map(|bench| (0..ground.len()).map(move |j| (bench, j)));
     let of = |(bench, j): (usize, usize)| {
-        (ground[j].clearance(&board(chain, team, bench)), bench as u32, scene.motion.obstacle_number(j))
+        (ground[j].clearance(&board(chain, team, bench)), bench as u32, scene.ensemble.obstacle_number(j))
     };
     meetings.map(of).chain(pair).min_by(|one, other| one.0.total_cmp(&other.0)).unwrap()
 }
@@ -56,7 +57,7 @@ fn the_clearance_of_every_frame_is_the_least_of_all() {
     let newton = SQUARE.replace("head_speed = 1.0", "head_speed = 1.0\nsolver = \"newton\"");
     for (text, seconds) in [(SQUARE, 60.0), (&newton, 60.0), (&paper, 410.0), (&turnaround, 200.0)] {
         let scene = scene(&text.replace("on_contact = \"stop\"", "on_contact = \"continue\""));
-        let timeline = scene.motion.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact();
         let playback = Playback { rate: 3.0, on_contact: OnContact::Continue, ..Playback::of(&scene) };
         let mut show = Show::new(&scene, timeline, playback).unwrap();
         let mut by_obstacle = 0;
@@ -64,7 +65,7 @@ fn the_clearance_of_every_frame_is_the_least_of_all() {
             let frame = show.frame(tick);
             let (value, ..) = least_of_all(&scene, &frame.chain);
             assert!((frame.min_clearance - value).abs() < 1e-11, "tick {tick}: {} {value}", frame.min_clearance);
-            let pair = least_clearance_all_pairs(&frame.chain, scene.team()).unwrap().value;
+            let pair = least_clearance_all_pairs(&frame.chain, scene.ensemble.only().unwrap().team()).unwrap().value;
             by_obstacle += u64::from(value < pair);
         }
         assert!(by_obstacle > 30, "{by_obstacle} frames");
@@ -121,7 +122,7 @@ fn a_show_that_continues_passes_every_obstacle_and_lists_each_kind_once() {
     }
     // The first touch is at the start, and the level stays.
     assert_eq!(levels, [Level::Obstacle]);
-    let stage = stage(1, 2, [0; 32], &scene.motion, &show);
+    let stage = stage(1, 2, [0; 32], &scene.ensemble, &show);
     let listed: Vec<_> = stage.stage.events.iter().map(|event| event.kind().unwrap()).collect();
     // The first event of each obstacle.
     assert_eq!(listed, [EventKind::Obstacle, EventKind::Obstacle, EventKind::PathEnd]);
@@ -147,14 +148,15 @@ proptest! {
     ) {
         let home = scene(&SQUARE.replace("center = [4.0, 3.5]", &format!("center = [4.0, {lamp:?}]")));
         let placement = Placement::new(Vector::new(x, y), turns, mirror);
-        let own = home.motion.in_own_frame();
+        let own = home.ensemble.only().unwrap().in_own_frame();
         let placed = |obstacle: &Obstacle| Obstacle {
             shape: obstacle.shape.mapped(|point: Point| placement.point(point)),
             ..obstacle.clone()
         };
         let ground = Ground::new(own.ground().obstacles().iter().map(placed).collect());
-        let away = own.clone().placed(placement).on_ground(ground);
-        let timelines = [&own, &away].map(|motion| motion.timeline(&mut |_| ()));
+        let away = Ensemble::alone(own.clone().placed(placement).on_ground(ground));
+        let own = Ensemble::alone(own);
+        let timelines = [&own, &away].map(|ensemble| ensemble.timeline(&mut |_| ()));
         prop_assert_eq!(timelines[0].events().len(), timelines[1].events().len());
         for (one, other) in timelines[0].events().iter().zip(timelines[1].events()) {
             prop_assert!((one.time - other.time).abs() < 1e-11 && one.event.bench_a == other.event.bench_a);
@@ -176,8 +178,8 @@ fn an_obstacle_changes_no_pose() {
         scene(&[&SQUARE[..SQUARE.find("[stage]").unwrap()], &SQUARE[SQUARE.find("[motion]").unwrap()..]].concat());
     let full = scene(SQUARE);
     let mut chains = [&empty, &full].map(|scene| {
-        let mut chain = Chain::new(scene.team().handles());
-        scene.motion.solver(Velocities::Computed).solver.solve(17.25, &mut chain).unwrap();
+        let mut chain = Chain::new(scene.ensemble.handles());
+        scene.ensemble.only().unwrap().solver(Velocities::Computed).solver.solve(17.25, &mut chain).unwrap();
         chain
     });
     assert_eq!(chains[0], chains[1]);
@@ -188,7 +190,8 @@ fn an_obstacle_changes_no_pose() {
         shape: Shape::circle(Point::new(1e4, 0.0), 1.0),
         keep_out: 0.0,
     }]);
-    let full = Scene { motion: empty.motion.clone().on_ground(far), ..empty.clone() };
+    let ensemble = Ensemble::alone(empty.ensemble.only().unwrap().clone().on_ground(far));
+    let full = Scene { ensemble, ..empty.clone() };
     let mut shows = [&empty, &full].map(|scene| Show::new(scene, timeline(scene), Playback::of(scene)).unwrap());
     for tick in (0..3000).step_by(50) {
         let [one, other] = shows.each_mut().map(|show| show.frame(tick));

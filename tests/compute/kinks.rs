@@ -3,6 +3,7 @@
 
 use std::cell::Cell;
 
+use bench_dragon::motion::ensemble::Ensemble;
 use bench_dragon::motion::linkage;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
@@ -117,8 +118,9 @@ fn assert_kept(motion: &Motion, accuracy: f64, kinks: &[f64]) -> (usize, f64) {
 fn velocities_keep_their_promise_at_the_kinks_of_the_scenes() {
     // With a time, seconds, at which a table was once far beyond its promise.
     for (name, known) in [("turnaround", 432.109_566_744_412_75), ("procession", 105.225_319_949_667_78)] {
-        let motion = Scene::load(&std::path::Path::new("config").join(format!("{name}.toml"))).unwrap().motion;
-        let end = motion.timeline_without_contact().end().event.travelled;
+        let scene = Scene::load(&std::path::Path::new("config").join(format!("{name}.toml"))).unwrap();
+        let motion = scene.ensemble.only().unwrap();
+        let end = scene.ensemble.timeline_without_contact().end().event.travelled;
         let mut kinks = kinks(&motion, end, usize::MAX);
         assert!(kinks.len() > 2 * motion.team().handles(), "{name}: {} kinks", kinks.len());
         kinks.push(known * motion.head_speed());
@@ -178,7 +180,7 @@ fn velocities_keep_their_promise_at_the_kinks_of_random_routes() {
     let accuracy = (-9.0..-3.0f64).prop_map(|exponent| 10f64.powf(exponent));
     TestRunner::new(config)
         .run(&(motions(), accuracy), |(motion, accuracy)| {
-            let end = motion.timeline_without_contact().end().event.travelled;
+            let end = Ensemble::alone(motion.clone()).timeline_without_contact().end().event.travelled;
             let kinks = kinks(&motion, end, if long { usize::MAX } else { 100 });
             let (handles, part) = assert_kept(&motion, accuracy, &kinks);
             compared.set(compared.get() + handles);

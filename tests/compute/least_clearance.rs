@@ -2,7 +2,7 @@
 //! force in `tests/compute/oracle`, with distances by parry2d.
 
 use bench_dragon::certify::plan::{LeastPitch, Overlap, least_pitch};
-use bench_dragon::certify::{ClearanceEnclosure, ClearanceHints, enclose_least_clearance};
+use bench_dragon::certify::{CertificateLine, ClearanceEnclosure, ClearanceHints, certify_clearances};
 use bench_dragon::show::scene::Scene;
 
 use crate::oracle::{chain, scenes};
@@ -41,11 +41,13 @@ fn least_distance(team: &chain::Team, pose: &chain::Pose, limit: f64) -> f64 {
 /// Compares the enclosure of a scene's show with `samples` times of the show. Returns `None` if there is no enclosure.
 fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclosure> {
     let scene = Scene::parse(text, "test", "test").ok()?;
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let show_end = timeline.show_end(scene.stops_at_contact());
-    let hint = scene.motion.least_clearance(&timeline, show_end, &mut |_| ())?.least;
+    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut |_| ()).own?.least;
     let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
-    let enclosure = enclose_least_clearance(&scene.motion, show_end, hints, most_steps, &mut |_| ()).boards?;
+    let mut write = |_: &CertificateLine| Ok(());
+    let enclosure = certify_clearances(&scene.ensemble, show_end, hints, "", most_steps, &mut write, &mut |_| ());
+    let enclosure = enclosure.unwrap().own[0].boards?;
     let ClearanceEnclosure { lo, hi, travelled, bench_a, bench_b, until, .. } = enclosure;
     println!("{:?} {enclosure:?}", show_end.event.kind);
     assert!(lo <= hi && hi - lo <= 1e-9, "{enclosure:?}");
@@ -114,12 +116,15 @@ fn random_shows_are_no_nearer_than_is_proved() {
 /// `value_hi`, all boards near the head are apart, sampled densely on the last turns.
 fn least_pitch_compared(text: &str, radius: f64) -> LeastPitch {
     let scene = Scene::parse(text, "test", "test").unwrap();
-    let plan = least_pitch(scene.team(), radius, &mut |_| ()).unwrap();
+    let plan = least_pitch(scene.ensemble.only().unwrap().team(), radius, &mut |_| ()).unwrap();
     println!("{plan:?}");
     let (lo, hi) = (plan.value_lo, plan.value_hi.unwrap());
-    assert!(plan.proved && plan.from == 0.5 * scene.team().width && hi - lo <= 1e-9, "{plan:?}");
+    assert!(
+        plan.proved && plan.from == 0.5 * scene.ensemble.only().unwrap().team().width && hi - lo <= 1e-9,
+        "{plan:?}"
+    );
     let Overlap { bench_a, bench_b, head_radius } = plan.overlap.unwrap();
-    let longest = scene.team().longest_link();
+    let longest = scene.ensemble.only().unwrap().team().longest_link();
     let least = |pitch: f64, sampled: bool| {
         let turns = radius.max(longest) / pitch + 3.0;
         let mut scene: toml::Table = text.parse().unwrap();

@@ -28,14 +28,19 @@ fn turnaround() -> Scene {
 }
 
 fn timeline(scene: &Scene) -> Timeline {
-    scene.motion.timeline(&mut |_| ())
+    scene.ensemble.timeline(&mut |_| ())
 }
 
 /// Computes the chain on the stage at `travelled` metres with the safe solver.
 fn chain_at(scene: &Scene, travelled: f64, chain: &mut Chain) -> bool {
-    let newton = Newton::new(scene.motion.path().clone(), *scene.team(), 1.0, Velocities::Computed);
+    let newton = Newton::new(
+        scene.ensemble.only().unwrap().path().clone(),
+        *scene.ensemble.only().unwrap().team(),
+        1.0,
+        Velocities::Computed,
+    );
     let solved = newton.solve_at(travelled, chain).is_ok();
-    scene.motion.placement().chain(&mut chain.all_mut());
+    scene.ensemble.only().unwrap().placement().chain(&mut chain.all_mut());
     solved
 }
 
@@ -46,17 +51,17 @@ fn the_turnaround_is_free_and_its_least_clearance_is_that_of_dense_sampling() {
     let timeline = timeline(&scene);
     assert_eq!(timeline.events().iter().map(|timed| timed.event.kind).collect::<Vec<_>>(), [EventKind::PathEnd]);
     assert!((timeline.end().time - 482.7812449068211).abs() < 1e-9);
-    let found = scene.motion.least_clearance(&timeline, timeline.end(), &mut |_| ()).unwrap();
-    let mut chain = Chain::new(scene.team().handles());
+    let found = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).own.unwrap();
+    let mut chain = Chain::new(scene.ensemble.handles());
     let mut sampled = f64::INFINITY;
     for k in 0..=4828 {
         assert!(chain_at(&scene, f64::from(k) * 0.1, &mut chain));
-        sampled = sampled.min(least_clearance_all_pairs(&chain, scene.team()).unwrap().value);
+        sampled = sampled.min(least_clearance_all_pairs(&chain, scene.ensemble.only().unwrap().team()).unwrap().value);
     }
     println!("{found:?}, sampled {sampled}");
     assert!(found.least.value <= sampled && found.least.value > sampled - 0.01);
     assert!(chain_at(&scene, found.least.travelled, &mut chain));
-    let there = least_clearance_all_pairs(&chain, scene.team()).unwrap();
+    let there = least_clearance_all_pairs(&chain, scene.ensemble.only().unwrap().team()).unwrap();
     assert!((there.value - found.least.value).abs() < 1e-12);
     assert_eq!((there.bench_a as u32, there.bench_b as u32), (found.least.bench_a, found.least.bench_b));
 }
@@ -120,7 +125,7 @@ fn nothing_jumps_at_the_junctions_and_no_alert_flickers() {
 fn a_procession_is_straight_at_first_and_ends_where_its_path_does() {
     let text = include_str!("../../config/procession.toml");
     let scene = Scene::parse(text, "procession.toml", "procession").unwrap();
-    let mut chain = Chain::new(scene.team().handles());
+    let mut chain = Chain::new(scene.ensemble.handles());
     assert!(chain_at(&scene, 0.0, &mut chain));
     assert!((chain.x[0] + 30.0).abs() < 1e-12 && chain.y.iter().all(|y| (y + 10.0).abs() < 1e-12));
     assert!(chain.speed.iter().all(|speed| (speed - 1.0).abs() < 1e-12));
@@ -153,7 +158,7 @@ fn a_hairpin_that_is_too_tight_stalls_and_locks() {
 
 #[test]
 fn the_least_pitch_to_4_5_m_is_where_boards_just_touch() {
-    let team = *Scene::paper().team();
+    let team = *Scene::paper().ensemble.only().unwrap().team();
     let plan = least_pitch(&team, 4.5, &mut |_| ()).unwrap();
     println!("{plan:?}");
     let overlap = plan.overlap.unwrap();
@@ -184,7 +189,7 @@ fn the_greatest_speed_of_the_turnaround_is_that_of_dense_sampling() {
     let scene = turnaround();
     let plan = greatest_speed(&scene, &timeline(&scene), 2.0, &mut |_| ()).unwrap();
     println!("{plan:?}");
-    let mut chain = Chain::new(scene.team().handles());
+    let mut chain = Chain::new(scene.ensemble.handles());
     assert!(chain_at(&scene, plan.time, &mut chain));
     assert!((chain.speed[plan.handle as usize] - plan.ratio).abs() < 1e-10);
     let mut sampled = 0f64;
@@ -252,6 +257,6 @@ fn the_smallest_teams_turn_round() {
         let scene = scene("kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 9", benches);
         assert_eq!(timeline(&scene).end().event.kind, EventKind::PathEnd);
         let timeline = timeline(&scene);
-        assert_eq!(scene.motion.least_clearance(&timeline, timeline.end(), &mut |_| ()), None);
+        assert_eq!(scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).own, None);
     }
 }

@@ -25,7 +25,7 @@ const SPIRAL: &str = "kind = \"spiral\"\npitch = 0.55\nstart_turn = 16";
 fn what_is_left_out_has_its_documented_default() {
     let scene = scene(SPIRAL, 1.0, "[alerts]\n");
     assert_eq!(scene.name, "dragons", "the stem of its file");
-    assert_eq!(scene.motion.method(), Method::Accuracy(1e-9));
+    assert_eq!(scene.ensemble.only().unwrap().method(), Method::Accuracy(1e-9));
     assert_eq!((scene.on_contact, scene.at_end, scene.end_hold), (OnContact::Stop, AtEnd::Hold, 5.0));
     let alerts = scene.alerts.unwrap();
     assert_eq!((alerts.approach_time, alerts.approach_clearance), (10.0, 0.05));
@@ -49,8 +49,8 @@ fn an_arc_by_its_length_is_the_arc_by_its_turns() {
     let of = |how: &str| {
         let arc = "kind = \"pieces\"\n[[path.pieces]]\nkind = \"arc\"\nside = \"left\"\nradius = 2.0\n";
         let scene = scene(&format!("{arc}{how}"), 1.0, "");
-        let end = scene.motion.path().point(scene.motion.path().param_at(scene.motion.path().length()));
-        (scene.motion.path().length(), end)
+        let path = scene.ensemble.only().unwrap().path();
+        (path.length(), path.point(path.param_at(path.length())))
     };
     let (by_turns, by_length) = (of("turns = 0.25"), of(&format!("length = {PI:?}")));
     for (length, end) in [by_turns, by_length] {
@@ -62,7 +62,8 @@ fn an_arc_by_its_length_is_the_arc_by_its_turns() {
 #[test]
 fn a_turnaround_leads_out_by_the_length_of_its_team() {
     let turn = "kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 9";
-    let PathDescription::Turnaround { lead_in, lead_out, .. } = *scene(turn, 1.0, "").motion.description() else {
+    let scene = scene(turn, 1.0, "");
+    let PathDescription::Turnaround { lead_in, lead_out, .. } = *scene.ensemble.only().unwrap().description() else {
         panic!("not a turnaround")
     };
     assert_eq!(lead_in, 9.0);
@@ -75,8 +76,9 @@ fn cues_are_at_the_times_that_the_scene_states() {
     let cues = "[alerts]\n[[cues]]\nname = \"way\"\ntravelled = 3.0\n[[cues]]\nname = \"time\"\nat = 4.0\n\
                 [[cues]]\nname = \"before\"\nbefore = \"contact\"\nseconds = 7.0\n";
     let scene = scene(SPIRAL, 2.0, cues);
-    let scene = Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene };
-    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let ensemble = scene.ensemble.try_map(|motion| motion.with_method(Method::Newton)).unwrap();
+    let scene = Scene { ensemble, ..scene };
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let times: Vec<_> = show.cues().iter().map(|cue| (&*cue.name, cue.time)).collect();
     // The head and the ninth bench touch after 412.47 m, with 20 benches as with 223.
     let before = 0.5 * 412.473837682115 - 7.0;
@@ -86,9 +88,10 @@ fn cues_are_at_the_times_that_the_scene_states() {
 
 fn stage_of(path: &str) -> StageMessage {
     let scene = scene(path, 1.0, "");
-    let scene = Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene };
-    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
-    stage(1, 2, [0; 32], &scene.motion, &show)
+    let ensemble = scene.ensemble.try_map(|motion| motion.with_method(Method::Newton)).unwrap();
+    let scene = Scene { ensemble, ..scene };
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    stage(1, 2, [0; 32], &scene.ensemble, &show)
 }
 
 /// Returns the radius at which a spiral ends, from the numbers of its message alone, metres.
@@ -196,12 +199,12 @@ fn a_route_has_up_to_4096_pieces() {
     let text = format!("{}{path}\n[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n", TEAM.replace("= 20", "= 1"));
     let scene = Scene::parse(&text, "test", "test").unwrap();
     let length = 4096.0 * 5.0 * TAU / 8.0;
-    assert!((scene.motion.path().length() - length).abs() < 1e-9);
-    let timeline = scene.motion.timeline(&mut |_| ());
+    assert!((scene.ensemble.only().unwrap().path().length() - length).abs() < 1e-9);
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     assert_eq!((timeline.events().len(), timeline.searched_until()), (1, None), "{timeline:?}");
     assert!((timeline.end().time - length).abs() < 1e-9);
     let show = Show::new(&scene, timeline, Playback::of(&scene)).unwrap();
-    let message = stage(1, 2, [0; 32], &scene.motion, &show);
+    let message = stage(1, 2, [0; 32], &scene.ensemble, &show);
     assert_eq!(message.segments.len(), 4096);
     // Each pair of bends is the same step along one straight line.
     let (from, to) = (message.segments[0], message.segments[4094]);

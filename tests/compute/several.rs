@@ -31,11 +31,11 @@ pub fn line(length: f64) -> String {
 }
 
 fn scene(text: &str) -> Scene {
-    Scene::parse_any(text, "several.toml", "several").unwrap()
+    Scene::parse(text, "several.toml", "several").unwrap()
 }
 
 fn timeline(text: &str) -> Timeline {
-    scene(text).timeline(&mut |_| ())
+    scene(text).ensemble.timeline(&mut |_| ())
 }
 
 fn contact(text: &str) -> Option<TimedEvent> {
@@ -160,9 +160,9 @@ fn first_contacts_are_those_of_a_brute_force_over_random_pairs() {
     let (mut contacts, mut between, mut without) = (0, 0, 0);
     for case in 0..240 {
         let text = any_dragon(&mut rng, "gold") + &any_dragon(&mut rng, "jade");
-        let Ok(scene) = Scene::parse_any(&text, "pair.toml", "pair") else { continue };
-        let ensemble = scene.ensemble.as_ref().unwrap();
-        let timeline = scene.timeline(&mut |_| ());
+        let Ok(scene) = Scene::parse(&text, "pair.toml", "pair") else { continue };
+        let ensemble = &scene.ensemble;
+        let timeline = scene.ensemble.timeline(&mut |_| ());
         assert_eq!(timeline.searched_until(), None, "{case}: {text}");
         let found = timeline.find(EventKind::Contact);
         // In the last digits before a lock there may be no solution.
@@ -200,9 +200,8 @@ fn heads_that_meet_on_parallel_lines() {
     let beside = dragon("jade", 3, "{ origin = [20.0, 0.31], rotation_turns = 0.5 }", 1.5, 0.0, &line(100.0));
     assert!(contact(&(east.clone() + &beside)).is_none());
     let scene = scene(&(east + &beside));
-    let least = scene.ensemble.as_ref().unwrap();
-    let timeline = scene.timeline(&mut |_| ());
-    let least = least.least_clearances(timeline.end(), &mut |_| ()).of_show().unwrap();
+    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).of_show().unwrap();
     assert!((least.least.value - 0.01).abs() < 1e-12, "{}", least.least.value);
 }
 
@@ -250,10 +249,10 @@ fn the_first_lock_of_any_ends_the_show_and_a_path_end_does_not() {
     let gold = dragon("gold", 3, "{ origin = [0.0, 0.0] }", 1.0, 7.0, spiral);
     let jade = dragon("jade", 3, "{ origin = [100.0, 0.0] }", 1.0, 0.0, &line(3.0));
     let both = scene(&(gold.clone() + &jade));
-    let timeline = both.timeline(&mut |_| ());
+    let timeline = both.ensemble.timeline(&mut |_| ());
     let alone = gold.replace("[[dragons]]\nname = \"gold\"\nplacement = { origin = [0.0, 0.0] }\ndelay = 7.0\n", "");
     let alone = Scene::parse(&alone.replace("[dragons.", "["), "one.toml", "one").unwrap();
-    let own = alone.motion.timeline(&mut |_| ());
+    let own = alone.ensemble.timeline(&mut |_| ());
     assert_eq!(own.end().event.kind, EventKind::Lock);
     assert_eq!((timeline.end().event.kind, timeline.end().time), (EventKind::Lock, own.end().time + 7.0));
     let path_ends = timeline.all().into_iter().filter(|of| of.event.kind == EventKind::PathEnd);
@@ -269,8 +268,8 @@ fn a_frame_has_the_handles_of_all_and_the_least_clearance_of_any_two() {
     let rose = dragon("rose", 4, "{ origin = [18.0, -10.0], rotation_turns = 0.3 }", 1.0, 0.0, &line(20.0));
     let text = format!("[motion]\non_contact = \"continue\"\n[alerts]\n{gold}{jade}{rose}");
     let scene = scene(&text);
-    let ensemble = scene.ensemble.as_ref().unwrap();
-    let mut show = Show::new(&scene, scene.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let ensemble = &scene.ensemble;
+    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let of = |Dragon { motion, .. }: &Dragon| {
         (motion.solver(Velocities::Computed).solver, Chain::new(motion.team().handles()))
     };
@@ -320,9 +319,9 @@ fn the_least_clearance_of_a_frame_is_that_of_all_pairs_after_any_jump() {
         let dragons: String = names.iter().map(|name| any_dragon(&mut rng, name)).collect();
         let dragons = dragons.replace("[dragons.motion]\n", &format!("[dragons.motion]\n{accuracy}"));
         let text = format!("[motion]\non_contact = \"continue\"\n[alerts]\n{dragons}");
-        let Ok(scene) = Scene::parse_any(&text, "jumps.toml", "jumps") else { continue };
-        let ensemble = scene.ensemble.as_ref().unwrap();
-        let timeline = scene.timeline_without_contact();
+        let Ok(scene) = Scene::parse(&text, "jumps.toml", "jumps") else { continue };
+        let ensemble = &scene.ensemble;
+        let timeline = scene.ensemble.timeline_without_contact();
         let ticks = (60.0 * timeline.end().time) as u64;
         // The show loops, so that later ticks are at any time of a showing, before or after the last.
         let playback = Playback { at_end: AtEnd::Loop, ..Playback::of(&scene) };
@@ -343,7 +342,7 @@ fn the_least_clearance_of_a_frame_is_that_of_all_pairs_after_any_jump() {
 fn of_dragons_that_coil_few_boards_are_tested() {
     let scene = scene(&std::fs::read_to_string("config/coil.toml").unwrap());
     let playback = Playback { start: 150.0, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, scene.timeline_without_contact(), playback).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
     (0..600).for_each(|tick| _ = show.frame(tick));
     // A search from frame to frame tests more than 20.
     assert!(show.pairs_tested() < 600 * 8, "{} of 600 frames", show.pairs_tested());
@@ -378,7 +377,7 @@ fn what_cannot_be_is_refused_in_one_sentence() {
             "motion.head_speed: unknown field here, head_speed stands in [dragons.motion]",
         ),
     ] {
-        let error = Scene::parse_any(&text, "x.toml", "x").unwrap_err().to_string();
+        let error = Scene::parse(&text, "x.toml", "x").unwrap_err().to_string();
         assert!(error.contains(expected), "{error}\ninstead of: {expected}");
         assert!(!error.contains('\n'), "{error}");
     }

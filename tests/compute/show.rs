@@ -13,7 +13,7 @@ use bench_dragon::show::{Playback, Show};
 use proptest::prelude::*;
 
 fn paper_timeline() -> Timeline {
-    Scene::paper().motion.timeline(&mut |_| ())
+    Scene::paper().ensemble.timeline(&mut |_| ())
 }
 
 fn show(playback: Playback) -> Show {
@@ -34,8 +34,8 @@ fn a_frame_is_that_of_its_tick_whatever_came_before() {
     assert!((contact - 412.473837682115).abs() < 1e-10);
     // 12.47 s are 748.4 ticks; the next is the contact, and the one after that the start again.
     let period = 750;
-    let mut solver = scene.motion.solver(Velocities::Computed).solver;
-    let mut chain = Chain::new(scene.team().handles());
+    let mut solver = scene.ensemble.only().unwrap().solver(Velocities::Computed).solver;
+    let mut chain = Chain::new(scene.ensemble.handles());
     for step in [1, 3, 41] {
         let mut show = show(Playback { start, rate, at_end: AtEnd::Loop, ..playback() });
         for tick in (0..2000).step_by(step) {
@@ -49,7 +49,7 @@ fn a_frame_is_that_of_its_tick_whatever_came_before() {
             assert_eq!((frame.tick, frame.sim_time, u64::from(frame.epoch)), (tick, time, tick / period));
             assert_eq!(frame.chain, chain, "tick {tick} of every {step}");
             if tick % 7 == 0 {
-                let least = least_clearance_all_pairs(&chain, scene.team()).unwrap();
+                let least = least_clearance_all_pairs(&chain, scene.ensemble.only().unwrap().team()).unwrap();
                 assert_eq!(frame.min_clearance, least.value, "tick {tick} of every {step}");
             }
         }
@@ -107,7 +107,7 @@ fn an_alert_knows_what_it_is_about_and_who_is_nearest_now() {
         let frame = show.frame(tick).clone();
         for alert in &frame.alerts {
             assert_eq!(alert.event, Some(contact), "at {} s", frame.sim_time);
-            let all = least_clearance_all_pairs(&frame.chain, Scene::paper().team()).unwrap();
+            let all = least_clearance_all_pairs(&frame.chain, Scene::paper().ensemble.only().unwrap().team()).unwrap();
             let nearest = alert.nearest.unwrap();
             assert_eq!((nearest.bench_a, nearest.bench_b, nearest.value), (all.bench_a, all.bench_b, all.value));
             assert_eq!(nearest.value, frame.min_clearance);
@@ -133,7 +133,7 @@ fn a_start_after_the_contact_is_in_contact_at_once() {
 fn without_alerts_and_velocities_neither_is_computed() {
     let text = include_str!("../../config/paper.toml").replace("[alerts]", "").replace("approach_", "# approach_");
     let scene = Scene::parse(&text.replace("velocities = true", "velocities = false"), "test", "test").unwrap();
-    let timeline = scene.motion.timeline_without_contact();
+    let timeline = scene.ensemble.timeline_without_contact();
     let mut show = Show::new(&scene, timeline, Playback { start: 412.0, ..Playback::of(&scene) }).unwrap();
     for tick in 0..100 {
         let frame = show.frame(tick);
@@ -165,7 +165,7 @@ fn a_tick_past_the_lock_freezes_the_show_at_it() {
 #[test]
 fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
     let scene = Scene::paper();
-    let unsearched = scene.motion.timeline_without_contact();
+    let unsearched = scene.ensemble.timeline_without_contact();
     let playback = Playback { start: 412.0, rate: 1000.0, ..playback() };
     let mut show = Show::new(&scene, unsearched, playback).unwrap();
     let mut alerts = Vec::new();

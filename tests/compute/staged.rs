@@ -17,10 +17,10 @@ const MOST_STEPS: u64 = 3000;
 
 /// Returns the lines of a certificate.
 fn certificate(text: &str, scene: &Scene) -> String {
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    certify(&scene.motion, &timeline, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
     String::from_utf8(lines).unwrap()
 }
 
@@ -33,14 +33,15 @@ fn check(lines: &str) -> Result<Proved, Refused> {
 fn statuses(text: &str) -> Vec<Status> {
     let scene = Scene::parse(text, "staged", "staged").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let proved = check(&certificate(text, &scene)).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
-    let timeline = scene.motion.timeline(&mut |_| ());
-    let obstacles = scene.motion.ground().obstacles();
+    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let obstacles = scene.ensemble.ground().obstacles();
     let results = &proved.results[4..];
     assert_eq!(results.len(), obstacles.len());
     for (number, (result, obstacle)) in results.iter().zip(obstacles).enumerate() {
         assert_eq!((result.event, result.obstacle), (EventKind::Obstacle, Some(number)));
         let found = timeline.events().iter().find(|timed| {
-            timed.event.kind == Kind::Obstacle && scene.motion.obstacle_of(&timed.event).unwrap().name == obstacle.name
+            timed.event.kind == Kind::Obstacle
+                && scene.ensemble.obstacle_of(&timed.event).unwrap().name == obstacle.name
         });
         match (result.status, found) {
             (Status::Proved, Some(timed)) => {

@@ -70,16 +70,17 @@ fn part<T>(name: &str, on: &mut T, mut prepare: impl FnMut(&mut T, u64), mut cal
 /// Counts all parts. Making tables takes longest under callgrind, so there are as few tables as possible.
 pub fn run() {
     let paper = Scene::paper();
-    println!("{WITH}{}", paper.motion.instructions().name());
-    let Method::Accuracy(accuracy) = paper.motion.method() else { panic!("the paper's scene names a solver") };
-    let (path, team) = (paper.motion.path(), *paper.team());
+    let motion = paper.ensemble.only().unwrap();
+    println!("{WITH}{}", motion.instructions().name());
+    let Method::Accuracy(accuracy) = motion.method() else { panic!("the paper's scene names a solver") };
+    let (path, team) = (motion.path(), *motion.team());
     let table = selection::cheapest(path, team, 1.0, Velocities::Computed, accuracy).unwrap().table;
     let mut portable = table.for_frames().with_instructions(Instructions::Portable).unwrap();
     frame("frame", &mut table.for_frames(), START, team.handles());
     frame("frame, portable", &mut portable, START, team.handles());
     let route = Scene::load("config/procession.toml".as_ref()).unwrap();
-    let mut solver = route.motion.solver(Velocities::Computed).solver;
-    frame("frame on a route, 60 benches", solver.as_mut(), ON_ROUTE, route.team().handles());
+    let mut solver = route.ensemble.only().unwrap().solver(Velocities::Computed).solver;
+    frame("frame on a route, 60 benches", solver.as_mut(), ON_ROUTE, route.ensemble.handles());
     let square = [(-14.0, -14.0), (14.0, -14.0), (14.0, 14.0), (-14.0, 14.0)].map(|(x, y)| Point::new(x, y));
     let wall = [(-9.0, 10.0), (0.0, 12.0), (9.0, 10.0)].map(|(x, y)| Point::new(x, y));
     let shapes = [
@@ -96,7 +97,7 @@ pub fn run() {
     obstacle_clearance("clearance of a star of 16 corners in overlap", overlap, table.for_frames(), team.handles());
     clearance(ClearanceMonitor::new(path, team, &table), table, team.handles());
     // A search for the contact would take long.
-    let timeline = paper.motion.timeline_without_contact();
+    let timeline = paper.ensemble.timeline_without_contact();
     step(&paper, &timeline);
     certificate();
 }
@@ -169,14 +170,14 @@ impl Step {
         let name = format!("test_{}_instructions", std::process::id());
         let config = PublisherConfig {
             name: name.clone(),
-            handles: scene.team().handles(),
+            handles: scene.ensemble.handles(),
             single_precision: None,
             queue: 2,
             subscribers: 1,
             alerts: true,
             cues: 0,
             scene: String::new(),
-            stage: stage(1, 0, [0; 32], &scene.motion, &show),
+            stage: stage(1, 0, [0; 32], &scene.ensemble, &show),
         };
         let publisher = SharedMemoryPublisher::open(&config).unwrap();
         let connection = Subscription::new(&name, Wake::Never).unwrap().connect().unwrap().unwrap();
@@ -248,13 +249,14 @@ fn step(scene: &Scene, timeline: &Timeline) {
 /// pairs.
 fn certificate() {
     let text = SceneText::paper().text.replace("benches = 223 ", "benches = 20 ");
-    let motion = Scene::parse(&text, "paper.toml", "paper").unwrap().motion;
+    let scene = Scene::parse(&text, "paper.toml", "paper").unwrap();
+    let motion = scene.ensemble.only().unwrap();
     assert_eq!(motion.team().benches, 20);
-    let timeline = motion.timeline_without_contact();
+    let timeline = scene.ensemble.timeline_without_contact();
     let mut lines = Vec::new();
     let mut search = |steps: u64| {
         let mut write = |line: &CertificateLine| line.write(&mut lines);
-        certify(&motion, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
+        certify(&scene.ensemble, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
     };
     counted(&mut search, STEPS);
     part_is_over("certificate step, 20 benches", STEPS);

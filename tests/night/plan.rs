@@ -33,7 +33,7 @@ pub struct Stage {
 impl Stage {
     fn of(text: &str) -> Self {
         let scene = Scene::parse(text, "night.toml", "night").expect("a scene");
-        let timeline = scene.motion.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut |_| ());
         let events: Vec<(f64, EventKind)> =
             timeline.events().iter().map(|timed| (timed.time, timed.event.kind)).collect();
         let level = |kind| match kind {

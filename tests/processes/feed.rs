@@ -241,7 +241,7 @@ fn the_newest_frame_is_one_a_poll_and_the_rest_is_counted() {
 fn opened(name: &str, scene: &Scene, cues: usize, stage: StageMessage) -> SharedMemoryPublisher {
     let config = PublisherConfig {
         name: name.to_owned(),
-        handles: scene.team().handles(),
+        handles: scene.ensemble.handles(),
         single_precision: None,
         queue: 64,
         subscribers: 2,
@@ -257,9 +257,9 @@ fn opened(name: &str, scene: &Scene, cues: usize, stage: StageMessage) -> Shared
 #[test]
 fn a_scene_with_more_cues_finds_its_services_open() {
     let scene = Scene::paper();
-    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let name = unique("more_cues");
-    let open = |cues| opened(&name, &scene, cues, stage(cues as u64, 0, [0; 32], &scene.motion, &show));
+    let open = |cues| opened(&name, &scene, cues, stage(cues as u64, 0, [0; 32], &scene.ensemble, &show));
     let _few = open(3);
     let _more = open(40);
 }
@@ -269,9 +269,9 @@ fn a_scene_with_more_cues_finds_its_services_open() {
 #[test]
 fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let scene = Scene::paper();
-    let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let name = unique("beside");
-    let stages = [7, 8].map(|run_id| stage(run_id, 0, [0; 32], &scene.motion, &show));
+    let stages = [7, 8].map(|run_id| stage(run_id, 0, [0; 32], &scene.ensemble, &show));
     let [mut bystander, mut sender] = stages.map(|stage| opened(&name, &scene, 0, stage));
     let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
     let mut runs = Vec::new();
@@ -311,9 +311,9 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
 #[test]
 fn an_alert_follows_the_stage_of_its_run() {
     let scene = Scene::paper();
-    let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
     let name = unique("alert_order");
-    let mut sender = opened(&name, &scene, 0, stage(8, 0, [0; 32], &scene.motion, &show));
+    let mut sender = opened(&name, &scene, 0, stage(8, 0, [0; 32], &scene.ensemble, &show));
     let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
     let mut seen = Vec::new();
     let mut poll = |seen: &mut Vec<&'static str>| {
@@ -346,7 +346,7 @@ fn an_alert_follows_the_stage_of_its_run() {
     assert!(first("stage").unwrap() < first("alert").unwrap(), "{seen:?}");
     // An alert is handed over without a stage that never comes.
     let name = unique("alert_alone");
-    let mut sender = opened(&name, &scene, 0, stage(9, 0, [0; 32], &scene.motion, &show));
+    let mut sender = opened(&name, &scene, 0, stage(9, 0, [0; 32], &scene.ensemble, &show));
     let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
     let mut alerts = 0;
     for sequence in 0.. {

@@ -20,7 +20,7 @@ const PLACED: &str =
 /// The scene without its placement, solved at one time.
 fn home(time: f64) -> Chain {
     let mut chain = Chain::new(224);
-    let motion = Scene::paper().motion.with_method(Method::Newton).unwrap();
+    let motion = Scene::paper().ensemble.only().unwrap().with_method(Method::Newton).unwrap();
     motion.solver(Velocities::Computed).solver.solve(time, &mut chain).unwrap();
     chain
 }

@@ -31,7 +31,7 @@ fn python_reader(transport: &str, modules: &[&str]) {
     let output = Process::start(&mut display).output();
     let lines = json_lines(&output);
     assert!(lines.len() > 50, "{} moments: {}", lines.len(), text(&output.stderr));
-    let motion = Scene::paper().motion.with_method(Method::Newton).unwrap();
+    let motion = Scene::paper().ensemble.only().unwrap().with_method(Method::Newton).unwrap();
     let mut newton = motion.solver(Velocities::Omitted).solver;
     let (mut chain, mut worst, mut between) = (Chain::new(224), 0.0f64, 0);
     for line in &lines {

@@ -306,7 +306,7 @@ fn python_osc_hears_every_alert_and_cue_once_and_in_order() {
 /// Asserts that each countdown ends at the contact, and that the head is at the safe solver's place at the time beside
 /// it.
 fn countdown_and_head_are_true(messages: &[Value]) {
-    let motion = Scene::paper().motion.with_method(Method::Newton).unwrap();
+    let motion = Scene::paper().ensemble.only().unwrap().with_method(Method::Newton).unwrap();
     let (mut newton, mut chain) = (motion.solver(Velocities::Computed).solver, Chain::new(224));
     let contact = 412.473837682115;
     let [times, heads] = ["sim_time", "head"].map(|address| Vec::from_iter(heard(messages, address)));

@@ -12,39 +12,44 @@ use super::lines::{CertificateLine, CertifiedEvent, Status, WIDE};
 use super::search::{
     AROUND, BESIDE, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, Section, first_line,
 };
-use super::{CertifyError, Given, ground};
+use super::{CertifyError, Given, certify_alone, ground};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::model::separation::overlap_centre;
 use bench_dragon_motion::timeline::Timeline;
 use clearance::UpperBetween;
-pub use clearance::{BetweenEnclosure, SeveralClearances, certify_several_clearances};
+pub use clearance::{BetweenEnclosure, EnsembleClearances, certify_clearances};
 use side::{Extent, Refused, Side, sentence};
 
 /// A function that receives each line of a certificate.
 type Write<'w> = &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>;
 
-/// Certifies the events of each dragon of a show, and the first contact of each two. `scene` is the text of the scene.
-/// Each dragon and each pair is certified to the end of its own motion. Each search gives up after `most_steps`.
-/// `progress` receives the share that is done, from 0 to 1.
+/// Certifies the events of each dragon of a show, and the first contact of each two. `timeline` has the events of the
+/// show, `scene` is the text of the scene. Each dragon and each pair is certified to the end of its own motion. Each
+/// search gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
-pub fn certify_several(
+pub fn certify(
     ensemble: &Ensemble,
+    timeline: &Timeline,
     scene: &str,
     most_steps: u64,
     write: Write<'_>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<CertifiedEvent>, CertifyError> {
+    // The format has no line for a dragon without a name.
+    if let Some(motion) = ensemble.only() {
+        return certify_alone(motion, timeline, scene, most_steps, write, progress);
+    }
     first_line(&mut *write, scene)?;
     let dragons = ensemble.dragons();
     let parts = (dragons.len() * (dragons.len() + 1) / 2) as f64;
     let (mut proved, mut sections, mut done) = (Vec::new(), Vec::new(), 0.0);
     for (number, dragon) in dragons.iter().enumerate() {
         write(&CertificateLine::Dragon { dragon: number })?;
-        let timeline = dragon.motion.timeline(&mut |_| ());
+        let timeline = Ensemble::alone(dragon.motion.clone()).timeline(&mut |_| ());
         let section = alone((number, dragon), &timeline, (scene, most_steps), &mut *write, &mut |share| {
             progress((done + share) / parts);
         })?;

@@ -114,43 +114,7 @@ pub struct ClearanceEnclosures {
     pub obstacles: Vec<Option<ObstacleEnclosure>>,
 }
 
-/// Encloses the least clearance of all pairs of boards that share no handle, and the least clearance of each obstacle.
-/// The time is from the start until the show ends at `show_end`. The enclosures are a nanometre wide, unless the search
-/// gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
-pub fn enclose_least_clearance(
-    motion: &Motion,
-    show_end: &TimedEvent,
-    hints: ClearanceHints<'_>,
-    most_steps: u64,
-    progress: &mut dyn FnMut(f64),
-) -> ClearanceEnclosures {
-    Descent::new(chain_of(motion), show_end.event.travelled, most_steps, None).run(motion, show_end, hints, progress)
-}
-
-/// Encloses the least clearances as [`enclose_least_clearance`] does, and writes a certificate. `scene` is the text of
-/// the motion's scene. The certificate of a show that ends with a lock ends a nanometre of travel before the lock.
-///
-/// # Errors
-/// [`CertifyError::Write`]
-pub fn certify_least_clearance(
-    motion: &Motion,
-    show_end: &TimedEvent,
-    hints: ClearanceHints<'_>,
-    scene: &str,
-    most_steps: u64,
-    write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
-) -> Result<ClearanceEnclosures, CertifyError> {
-    certificate::first_line(&mut *write, scene)?;
-    let end = show_end.event.travelled;
-    let mut descent = Descent::new(chain_of(motion), end, most_steps, Some(write));
-    let enclosures = descent.run(motion, show_end, hints, progress);
-    descent.write_result(motion.head_speed())?;
-    Ok(enclosures)
-}
-
-/// Encloses the least clearances of one dragon of a show of several, and writes its section of the certificate, without
-/// its first line.
+/// Encloses the least clearances of a dragon, and writes its section of the certificate, without its first line.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
@@ -217,14 +181,14 @@ pub(super) struct Descent<'a, 'w> {
     beside: Vec<Beside>,
     /// True if the steps have come to the end of the show.
     is_complete: bool,
-    /// The place of the motion in a show of several.
+    /// The place of the motion in the show.
     part: Part,
 }
 
-/// The place of a motion in a show of several.
+/// The place of a motion in a show of dragons with names.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Part {
-    /// The dragon; empty in a show of one.
+    /// The dragon; empty without a name.
     pub dragons: Vec<usize>,
     /// The time of the show, in seconds, during which it stands at its start.
     pub delay: f64,

@@ -29,10 +29,9 @@ mod turn;
 
 use std::io;
 
-pub use between::{BetweenEnclosure, SeveralClearances, certify_several, certify_several_clearances};
+pub use between::{BetweenEnclosure, EnsembleClearances, certify, certify_clearances};
 pub use clearance::{
     ClearanceEnclosure, ClearanceEnclosures, ClearanceHints, MOST_CLEARANCE_STEPS, ObstacleEnclosure, Write,
-    certify_least_clearance, enclose_least_clearance,
 };
 pub use lines::{
     About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedObstacleClearance, CertifiedPitch,
@@ -69,16 +68,16 @@ pub(crate) struct Given<'a> {
     events: &'a [Event],
     most_steps: u64,
     most_spans: usize,
-    /// The number of the dragon and its delay in seconds, in a show of several.
+    /// The number of the dragon and its delay in seconds, if it has a name.
     dragon: Option<(usize, f64)>,
 }
 
-/// Certifies the events of a motion. `scene` is the text of its scene. `write` receives each line of the certificate,
+/// Certifies the events of a dragon without a name. `scene` is the text of its scene. `write` receives each line of the certificate,
 /// `progress` the share of the motion that is done, from 0 to 1. The search gives up after `most_steps`.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
-pub fn certify(
+pub(crate) fn certify_alone(
     motion: &Motion,
     timeline: &Timeline,
     scene: &str,

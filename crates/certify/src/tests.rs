@@ -130,8 +130,8 @@ fn elementary_functions_hold_what_192_bits_find() {
 #[test]
 fn a_certificate_with_too_many_places_says_so() {
     let scene = Scene::paper();
-    let motion = &scene.motion;
-    let timeline = motion.timeline(&mut |_| ());
+    let motion = scene.ensemble.only().unwrap();
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let certified = |most_spans: usize| {
         let given = Given {

@@ -158,7 +158,7 @@ mod tests {
     use bench_dragon_show::scene::Scene;
 
     fn track() -> Track {
-        Track::new(Scene::paper().motion, 0.0, 2.0)
+        Track::new(Scene::paper().ensemble.only().unwrap().clone(), 0.0, 2.0)
     }
 
     #[test]
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_dragon_with_a_delay_is_behind_the_show() {
-        let mut track = Track::new(Scene::paper().motion, 30.0, 2.0);
+        let mut track = Track::new(Scene::paper().ensemble.only().unwrap().clone(), 30.0, 2.0);
         let path = track.motion.path().clone();
         for k in 0..10u64 {
             let place = 100.0 + 0.1 * k as f64;

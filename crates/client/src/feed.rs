@@ -114,17 +114,17 @@ pub enum FeedEvent<'a> {
 /// use bench_dragon_show::convert::stage;
 ///
 /// let scene = Scene::paper();
-/// let mut show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene))?;
+/// let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene))?;
 /// let config = PublisherConfig {
 ///     name: format!("feed_example_{}", std::process::id()),
-///     handles: scene.team().handles(),
+///     handles: scene.ensemble.handles(),
 ///     single_precision: None,
 ///     queue: 4,
 ///     subscribers: 1,
 ///     alerts: true,
 ///     cues: 0,
 ///     scene: String::new(),
-///     stage: stage(1, 0, [0; 32], &scene.motion, &show),
+///     stage: stage(1, 0, [0; 32], &scene.ensemble, &show),
 /// };
 /// let mut publisher = SharedMemoryPublisher::open(&config)?;
 ///

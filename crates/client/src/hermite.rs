@@ -186,7 +186,7 @@ mod tests {
     use super::*;
     use bench_dragon_motion::Method;
     use bench_dragon_motion::solve::{Chain, Velocities};
-    use bench_dragon_show::convert::{OnStage, Stamps, frame_header, handle_pose, stage};
+    use bench_dragon_show::convert::{Stamps, frame_header, handle_pose, stage};
     use bench_dragon_show::scene::{AtEnd, Scene};
     use bench_dragon_show::{Playback, Show};
 
@@ -199,13 +199,14 @@ mod tests {
     /// The paper's scene by the safe solver, which needs no table.
     fn scene() -> Scene {
         let scene = Scene::paper();
-        Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene }
+        let ensemble = scene.ensemble.try_map(|motion| motion.with_method(Method::Newton)).unwrap();
+        Scene { ensemble, ..scene }
     }
 
     /// A reader that has taken the first frames of a show, which ends at the contact.
     fn reader(playback: Playback, frames: u64) -> HermiteReader {
         let scene = scene();
-        reader_of(&mut Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap(), playback, frames)
+        reader_of(&mut Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), playback).unwrap(), playback, frames)
     }
 
     fn reader_of(show: &mut Show, playback: Playback, frames: u64) -> HermiteReader {
@@ -225,7 +226,7 @@ mod tests {
     fn worst(start: f64, rate: f64, seconds: f64) -> (f64, f64) {
         let scene = scene();
         let reader = reader(Playback { start, rate, ..Playback::of(&scene) }, (seconds * rate) as u64 + 2);
-        let mut newton = scene.motion.solver(Velocities::Computed).solver;
+        let mut newton = scene.ensemble.solver(Velocities::Computed);
         let (mut chain, mut handles) = (Chain::new(224), Vec::new());
         let (mut position, mut heading) = (0.0f64, 0.0f64);
         for k in 0..331 {
@@ -297,12 +298,12 @@ mod tests {
 
     #[test]
     fn the_last_handle_of_each_of_two_dragons_has_the_heading_that_the_solver_gives() {
-        let scene = Scene::parse_any(include_str!("../../../config/coil.toml"), "coil.toml", "coil").unwrap();
+        let scene = Scene::parse(include_str!("../../../config/coil.toml"), "coil.toml", "coil").unwrap();
         let playback = Playback { start: 100.0, rate: 10.0, ..Playback::of(&scene) };
-        let mut show = Show::new(&scene, scene.timeline_without_contact(), playback).unwrap();
+        let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
         let mut reader = reader_of(&mut show, playback, 2);
         let (mut chain, mut handles) = (Chain::new(122), Vec::new());
-        scene.solver().solve(100.05, &mut chain).unwrap();
+        scene.ensemble.solver(scene.velocities).solve(100.05, &mut chain).unwrap();
         let mut worst = |reader: &HermiteReader| {
             reader.at(START_NS + 50_000_000, &mut handles).unwrap();
             let error = |(pose, truth): (&HandlePose, &f64)| (pose.heading - truth).sin().abs();
@@ -311,9 +312,9 @@ mod tests {
         // Without the stage, and with the stage of another run, the last handle of gold is turned toward the head of
         // jade.
         assert!(worst(&reader) > 0.1);
-        reader.set_stage(&stage(2, 0, [0; 32], OnStage::from(&scene), &show).stage);
+        reader.set_stage(&stage(2, 0, [0; 32], &scene.ensemble, &show).stage);
         assert!(worst(&reader) > 0.1);
-        reader.set_stage(&stage(1, 0, [0; 32], OnStage::from(&scene), &show).stage);
+        reader.set_stage(&stage(1, 0, [0; 32], &scene.ensemble, &show).stage);
         assert!(worst(&reader) < 1e-7, "{}", worst(&reader));
     }
 

@@ -190,7 +190,7 @@ impl Drawing<'_> {
 impl Drawing<'_> {
     /// Returns the benches of an event in words.
     fn concerned(&self, now: &Happened) -> String {
-        if self.dragons.are_several() {
+        if self.dragons.have_names() {
             let roster = &self.dragons.roster;
             let names =
                 now.benches().map(|bench| roster.bench(bench).replace(" (the head)", "").replace(" (the tail)", ""));

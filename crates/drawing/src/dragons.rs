@@ -1,4 +1,4 @@
-//! The dragons of a picture: one, coloured by speed, or several, each with its own colour and its name.
+//! The dragons of a picture: one without a name, coloured by speed, or each with its own colour and its name.
 
 use super::benches;
 use super::camera::StageBox;
@@ -13,7 +13,7 @@ use bench_dragon_motion::solve::Chain;
 /// The dragons of a picture, in the order of their handles.
 pub struct Dragons<'a> {
     drawn: Vec<Drawn<'a>>,
-    /// The colour of each dragon by day, if there are several.
+    /// The colour of each dragon by day; none for a dragon without a name.
     colours: Vec<&'static str>,
     /// The light of the lanterns of each dragon by night.
     lights: Vec<Light>,
@@ -23,7 +23,7 @@ pub struct Dragons<'a> {
 
 /// A dragon of a picture.
 pub struct Drawn<'a> {
-    /// Its name; empty if it is the only one.
+    /// Its name; empty for a dragon without a name, which is the only one.
     pub name: &'a str,
     /// The number of its first handle.
     pub first: usize,
@@ -32,23 +32,18 @@ pub struct Drawn<'a> {
 }
 
 impl<'a> Dragons<'a> {
-    /// Creates the only dragon of a picture.
-    pub fn one(motion: &'a Motion) -> Self {
-        let drawn = vec![Drawn { name: "", first: 0, motion }];
-        Self { drawn, colours: Vec::new(), lights: vec![Light::fire()], roster: motion.roster() }
-    }
-
-    /// Creates the dragons of a show of several.
-    pub fn several(ensemble: &'a Ensemble) -> Self {
+    /// Creates the dragons of a show.
+    pub fn of(ensemble: &'a Ensemble) -> Self {
         let drawn = |(k, dragon): (usize, &'a Dragon)| Drawn {
             name: &dragon.name,
             first: ensemble.handles_of(k).start,
             motion: &dragon.motion,
         };
         let drawn: Vec<Drawn> = ensemble.dragons().iter().enumerate().map(drawn).collect();
-        let names: Vec<&str> = drawn.iter().map(|of| of.name).collect();
-        let lights =
-            lights_of(&names).into_iter().enumerate().map(|(number, light)| Light::of(number, light)).collect();
+        let names: Vec<&str> = drawn.iter().map(|of| of.name).filter(|name| !name.is_empty()).collect();
+        let of_name = |(number, light)| Light::of(number, light);
+        let lights: Vec<Light> = lights_of(&names).into_iter().enumerate().map(of_name).collect();
+        let lights = if names.is_empty() { vec![Light::fire()] } else { lights };
         Self { colours: colours_of(&names), lights, drawn, roster: ensemble.roster() }
     }
 
@@ -71,9 +66,9 @@ impl<'a> Dragons<'a> {
         self.drawn.iter().map(length).fold(0.0, f64::max)
     }
 
-    /// Returns true if there are several.
-    pub fn are_several(&self) -> bool {
-        self.drawn.len() > 1 || !self.drawn[0].name.is_empty()
+    /// Returns true if the dragons have names.
+    pub fn have_names(&self) -> bool {
+        !self.drawn[0].name.is_empty()
     }
 
     /// Returns the boards of a chain that may have a part in a box, by the numbers of their benches.
@@ -100,13 +95,13 @@ impl<'a> Dragons<'a> {
         benches > 1 && bench == of.first + benches - 1
     }
 
-    /// Returns the name of the element at an end of a dragon: `head`, or `head-gold` if there are several.
+    /// Returns the name of the element at an end of a dragon: `head`, or `head-gold` with a name.
     pub fn end_id(&self, bench: usize) -> String {
         let (end, name) = (if self.is_head(bench) { "head" } else { "tail" }, self.owner(bench).1.name);
         if name.is_empty() { end.to_owned() } else { format!("{end}-{name}") }
     }
 
-    /// Returns the colour of a bench's dragon, if there are several.
+    /// Returns the colour of a bench's dragon, if it has a name.
     pub fn colour(&self, bench: usize) -> Option<&'static str> {
         self.colours.get(self.owner(bench).0).copied()
     }

@@ -210,7 +210,7 @@ impl<'a> Drawing<'a> {
         // The clip path is in sheet units, whatever the units of the group.
         document = document.add(Group::new().set("clip-path", "url(#frame)").add(stage).add(marks));
         if self.look.surroundings == Surroundings::Words {
-            let by_speed = !self.dragons.are_several();
+            let by_speed = !self.dragons.have_names();
             let coloured = by_speed && boards.iter().any(|(bench, _)| chain.speed[*bench].is_finite());
             let contents = sheet::Contents {
                 scale: self.scale.filter(|_| coloured),

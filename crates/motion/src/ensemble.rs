@@ -1,8 +1,8 @@
-//! Several dragons in one show: their motions on the show's clock, and the events of all of them.
+//! The ensemble: the dragons of a show, one or several. Their motions on the show's clock, and the events of all.
 //!
-//! In: named motions with delays, in the order of the scene. Out: one timeline, one chain, one least clearance. Handles
-//! are numbered through: bench i joins handles i and i + 1, so the number of a dragon's last handle is not used as the
-//! number of a bench. Obstacles follow the handles.
+//! In: motions with names and delays, in the order of the scene. Out: one timeline, one chain, one least clearance.
+//! Handles are numbered through: bench i joins handles i and i + 1, so the number of a dragon's last handle is not used
+//! as the number of a bench. Obstacles follow the handles. Only this file makes times and numbers of the show.
 
 use std::ops::Range;
 
@@ -10,8 +10,8 @@ use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
 use crate::clearance::{BetweenMonitor, TabledDragon};
-use crate::contact::LeastClearance;
 use crate::contact::between::{self, Meeting, MovingDragon};
+use crate::contact::{LeastClearance, ObstacleClearance};
 use crate::event::{Budget, Event};
 use crate::ground::{Ground, Obstacle};
 use crate::linkage::NoFollower;
@@ -20,12 +20,12 @@ use crate::singularities::Singularities;
 use crate::solve::table::Instructions;
 use crate::solve::{ChainMut, Solver, Velocities};
 use crate::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
-use crate::{CONTACT_BUDGET, Choice, Motion};
+use crate::{CONTACT_BUDGET, Choice, Method, Motion, MotionEvents};
 
-/// One of several dragons.
+/// A dragon of a show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dragon {
-    /// Its name, unique in the show.
+    /// Its name, unique in the show. A dragon without a name is alone, and its show ends with its motion.
     pub name: String,
     /// The time of the show, in seconds, during which it stands at its start.
     pub delay: f64,
@@ -37,6 +37,9 @@ impl Dragon {
     /// Returns the time of the dragon's own motion at a time of the show, and true if the dragon moves then. The dragon
     /// stands at its start before its delay has passed, and at its path's end after its motion.
     pub fn own_time(&self, show_time: f64) -> (f64, bool) {
+        if self.name.is_empty() {
+            return (show_time, true);
+        }
         let own = show_time - self.delay;
         let end = self.motion.time_at(self.motion.path().length());
         if own < 0.0 {
@@ -51,6 +54,11 @@ impl Dragon {
     /// Returns the metres that its head has travelled at a time of the show.
     pub fn travelled_at(&self, show_time: f64) -> f64 {
         self.motion.travelled_at(self.own_time(show_time).0)
+    }
+
+    /// Returns the words with the dragon's name after them, as in "Solver of gold"; without a name the words alone.
+    pub fn titled(&self, words: &str) -> String {
+        if self.name.is_empty() { words.to_owned() } else { format!("{words} of {}", self.name) }
     }
 }
 
@@ -74,6 +82,26 @@ impl Ensemble {
         Self { dragons, first_handles }
     }
 
+    /// Creates the ensemble of one dragon without a name.
+    pub fn alone(motion: Motion) -> Self {
+        Self::new(vec![Dragon { name: String::new(), delay: 0.0, motion }])
+    }
+
+    /// Returns the motion of a dragon without a name; `None` for dragons with names.
+    pub fn only(&self) -> Option<&Motion> {
+        let [Dragon { name, motion, .. }] = self.dragons.as_slice() else { return None };
+        name.is_empty().then_some(motion)
+    }
+
+    /// Returns the same ensemble with other motions.
+    ///
+    /// # Errors
+    /// The first error of `change`.
+    pub fn try_map<E>(&self, mut change: impl FnMut(&Motion) -> Result<Motion, E>) -> Result<Self, E> {
+        let of = |dragon: &Dragon| Ok(Dragon { motion: change(&dragon.motion)?, ..dragon.clone() });
+        self.dragons.iter().map(of).collect::<Result<_, _>>().map(Self::new)
+    }
+
     /// Returns the same dragons, whose tables are read with these instructions, one set for each dragon, or `None` if
     /// this processor lacks them.
     pub fn with_instructions(&self, sets: &[Instructions]) -> Option<Self> {
@@ -88,6 +116,11 @@ impl Ensemble {
     /// Returns the dragons in the order of the scene.
     pub fn dragons(&self) -> &[Dragon] {
         &self.dragons
+    }
+
+    /// Returns true if every head follows its path exactly: none by the paper's rules.
+    pub fn is_exact(&self) -> bool {
+        self.dragons.iter().all(|dragon| !matches!(dragon.motion.method(), Method::Paper(_)))
     }
 
     /// Returns the number of all handles.
@@ -139,64 +172,74 @@ impl Ensemble {
         self.ground().obstacles().get((number as usize).checked_sub(self.handles())?)
     }
 
-    /// Returns the events of all dragons. `progress` is as in [`Motion::timeline`].
+    /// Returns the events of all dragons, contacts included. `progress` is called at times with the share of the search
+    /// that is done, from 0 to 1.
     pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
-        let share = 0.5 / self.dragons.len() as f64;
+        let (own_share, share) = self.shares();
         let own = |(k, dragon): (usize, &Dragon)| {
-            let timeline = dragon.motion.timeline(&mut |part| progress(share * (k as f64 + part)));
-            self.on_the_shows_clock(k, &timeline)
+            let events = dragon.motion.events(&mut |part| progress(share * (k as f64 + part)));
+            self.on_the_shows_clock(k, events)
         };
         let own: Vec<Timeline> = self.dragons.iter().enumerate().map(own).collect();
         let end = end_of(&own);
-        let mut until = own.iter().filter_map(Timeline::searched_until).fold(f64::INFINITY, f64::min);
-        let contacts = own.iter().filter_map(|timeline| timeline.find(EventKind::Contact));
-        let mut first = contacts.copied().min_by(|a, b| a.time.total_cmp(&b.time));
-        let to = first.map_or(end.time, |contact| contact.time.min(end.time));
-        match self.contact_between(to, &mut |part| progress(0.5 + 0.5 * part)) {
+        let contacts = own.iter().flat_map(|timeline| before(timeline, &end));
+        let mut first = contacts.filter(|timed| timed.event.kind == EventKind::Contact).min_by(by_time).copied();
+        let to = first.map_or(end.time, |contact| contact.time);
+        let until = match self.contact_between(to, &mut |part| progress(own_share + (1.0 - own_share) * part)) {
             Ok((between, reached)) => {
-                until = until.min(reached);
-                first = between.into_iter().chain(first).min_by(|a, b| a.time.total_cmp(&b.time));
+                first = between.as_ref().into_iter().chain(&first).min_by(by_time).copied();
+                reached
             }
             Err(stuck) => {
                 log::warn!("the search for a contact of two dragons stopped at a place without a solution: {stuck}");
-                until = 0.0;
+                0.0
             }
-        }
+        };
         collected(&own, end, first, until)
     }
 
     /// Returns the events without contacts and obstacles, which cost a search.
     pub fn timeline_without_contact(&self) -> Timeline {
-        let own = |(k, dragon): (usize, &Dragon)| self.on_the_shows_clock(k, &dragon.motion.timeline_without_contact());
+        let own = |(k, dragon): (usize, &Dragon)| self.on_the_shows_clock(k, dragon.motion.events_without_contact());
         let own: Vec<Timeline> = self.dragons.iter().enumerate().map(own).collect();
-        let until = own.iter().filter_map(Timeline::searched_until).fold(f64::INFINITY, f64::min);
-        collected(&own, end_of(&own), None, until)
+        collected(&own, end_of(&own), None, f64::INFINITY)
     }
 
-    /// Returns a dragon's own timeline at the times of the show, with the numbers of the show.
-    fn on_the_shows_clock(&self, dragon: usize, timeline: &Timeline) -> Timeline {
-        let Dragon { delay, motion, .. } = &self.dragons[dragon];
+    /// Returns the share of a search that is spent on the dragons alone, and the share of one dragon.
+    fn shares(&self) -> (f64, f64) {
+        let own = if self.dragons.len() > 1 { 0.5 } else { 1.0 };
+        (own, own / self.dragons.len() as f64)
+    }
+
+    /// Returns the timeline of a dragon's own events at the times of the show, with the numbers of the show.
+    fn on_the_shows_clock(&self, dragon: usize, own: MotionEvents) -> Timeline {
+        let Dragon { name, delay, motion } = &self.dragons[dragon];
         let first = self.first_handles[dragon] as u32;
-        let obstacles_from = motion.team().handles() as u32;
-        let numbered = |timed: &TimedEvent| {
-            let Event { kind, travelled, bench_a, bench_b, place } = timed.event;
-            let bench_b = match kind {
-                EventKind::Obstacle => bench_b.map(|number| number - obstacles_from + self.handles() as u32),
-                _ => bench_b.map(|bench| bench + first),
+        let timed = |own: Event| {
+            let bench_b = match own.kind {
+                EventKind::Obstacle => {
+                    own.bench_b.map(|number| number + (self.handles() - motion.team().handles()) as u32)
+                }
+                _ => own.bench_b.map(|bench| bench + first),
             };
-            // The head of the dragon that reaches its path's end.
-            let bench_a = bench_a.map_or((kind == EventKind::PathEnd).then_some(first), |bench| Some(bench + first));
+            // With names, the head of the dragon that reaches its path's end.
+            let head = (own.kind == EventKind::PathEnd && !name.is_empty()).then_some(first);
+            let bench_a = own.bench_a.map_or(head, |bench| Some(bench + first));
             // A dragon that stands on itself or at an obstacle does so from the show's start on.
-            let is_at_start = timed.time == 0.0 && matches!(kind, EventKind::Contact | EventKind::Obstacle);
-            let time = if is_at_start { 0.0 } else { timed.time + delay };
-            TimedEvent { event: Event { kind, travelled, bench_a, bench_b, place }, time }
+            let time = motion.time_of(&own);
+            let is_at_start = time == 0.0 && matches!(own.kind, EventKind::Contact | EventKind::Obstacle);
+            let time = if is_at_start { 0.0 } else { time + delay };
+            TimedEvent { event: Event { bench_a, bench_b, ..own }, time }
         };
-        let events = timeline.events().iter().map(numbered).collect();
-        Timeline::new(events, timeline.searched_until().map(|until| until + delay))
+        let until = own.searched_until.map(|until| motion.time_at(until) + delay);
+        Timeline::new(own.events.into_iter().map(timed).collect(), until)
     }
 
     /// Returns the first contact of boards of two dragons up to a time, and the time up to which the search came.
     fn contact_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Result<(Option<TimedEvent>, f64), NoFollower> {
+        if self.dragons.len() < 2 {
+            return Ok((None, f64::INFINITY));
+        }
         let found = self.singularities();
         let moving = self.moving(&found)?;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
@@ -256,12 +299,21 @@ impl Ensemble {
     }
 
     /// Returns the least clearances of any two boards that share no handle, from the start until the show ends at
-    /// `show_end`. `own` is for boards of one dragon, `between` for boards of two dragons.
-    pub fn least_clearances(&self, show_end: &TimedEvent, progress: &mut dyn FnMut(f64)) -> LeastClearances {
-        let share = 0.5 / self.dragons.len() as f64;
-        let own = |k: usize| self.own_least_clearance(k, show_end, &mut |part| progress(share * (k as f64 + part)));
+    /// `show_end`. `own` is for boards of one dragon, `between` for boards of two dragons. `timeline` is of this
+    /// ensemble.
+    pub fn least_clearances(
+        &self,
+        timeline: &Timeline,
+        show_end: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> LeastClearances {
+        let (own_share, share) = self.shares();
+        let contact = timeline.find(EventKind::Contact);
+        let own =
+            |k: usize| self.own_least_clearance(k, contact, show_end, &mut |part| progress(share * (k as f64 + part)));
         let own = (0..self.dragons.len()).filter_map(own).fold(None, |best, own| Some(nearer(best, own)));
-        let between = self.least_clearance_between(show_end.time, &mut |part| progress(0.5 + 0.5 * part));
+        let between =
+            self.least_clearance_between(show_end.time, &mut |part| progress(own_share + (1.0 - own_share) * part));
         LeastClearances { own, between }
     }
 
@@ -270,22 +322,34 @@ impl Ensemble {
     fn own_least_clearance(
         &self,
         dragon: usize,
+        contact: Option<&TimedEvent>,
         show_end: &TimedEvent,
         progress: &mut dyn FnMut(f64),
     ) -> Option<TimedClearance> {
         let Dragon { delay, motion, .. } = &self.dragons[dragon];
-        let end = self.own_end(&self.dragons[dragon], show_end);
-        let mut own = motion.least_clearance(&motion.timeline_without_contact(), &end, progress)?;
         let first = self.first_handles[dragon] as u32;
-        (own.least.bench_a, own.least.bench_b) = (own.least.bench_a + first, own.least.bench_b + first);
-        own.time += delay;
-        own.searched_until = own.searched_until.map(|until| until + delay);
-        Some(own)
+        // Before the first contact, every clearance is above that at the contact.
+        let of_dragon = |bench: Option<u32>| self.owner(bench? as usize).filter(|(owner, _)| *owner == dragon);
+        let is_own =
+            |timed: &&TimedEvent| [timed.event.bench_a, timed.event.bench_b].map(of_dragon).iter().all(Option::is_some);
+        let from = contact.filter(is_own).map_or(0.0, |contact| contact.event.travelled);
+        let to = self.own_end(dragon, show_end);
+        let found = motion.least_clearance((from, to), progress)?;
+        let LeastClearance { value, travelled, bench_a, bench_b } = found.value?;
+        let time_at = |travelled| motion.time_at(travelled) + delay;
+        Some(TimedClearance {
+            least: LeastClearance { value, travelled, bench_a: bench_a + first, bench_b: bench_b + first },
+            time: time_at(travelled),
+            searched_until: (found.searched_until < to).then(|| time_at(found.searched_until)),
+        })
     }
 
     /// Returns the least clearance of boards of two dragons, from the start to a time; `None` if there are no two, or
     /// the search failed.
     fn least_clearance_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Option<TimedClearance> {
+        if self.dragons.len() < 2 {
+            return None;
+        }
         let found = self.singularities();
         let moving = self.moving(&found).ok()?;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
@@ -323,7 +387,8 @@ impl Ensemble {
         nearer.or(guess).map(|meeting| (meeting.time, meeting.benches))
     }
 
-    /// Returns the least clearance of each obstacle over all dragons, as [`Motion::obstacle_clearances`].
+    /// Returns the least clearance of each obstacle over all dragons from the start until the show ends at `show_end`.
+    /// The list is empty without obstacles.
     pub fn obstacle_clearances(
         &self,
         show_end: &TimedEvent,
@@ -331,16 +396,19 @@ impl Ensemble {
     ) -> Vec<TimedObstacleClearance> {
         let share = 1.0 / self.dragons.len() as f64;
         let mut all: Vec<TimedObstacleClearance> = Vec::new();
-        for (k, dragon) in self.dragons.iter().enumerate() {
-            let end = self.own_end(dragon, show_end);
-            for mut own in dragon.motion.obstacle_clearances(&end, &mut |part| progress(share * (k as f64 + part))) {
-                own.least.bench += self.first_handles[k] as u32;
-                own.time += dragon.delay;
-                own.searched_until = own.searched_until.map(|until| until + dragon.delay);
-                match all.iter_mut().find(|other| other.obstacle == own.obstacle) {
+        for (k, Dragon { delay, motion, .. }) in self.dragons.iter().enumerate() {
+            let to = self.own_end(k, show_end);
+            let (least, reached) = motion.obstacle_clearances(to, &mut |part| progress(share * (k as f64 + part)));
+            let time_at = |travelled| motion.time_at(travelled) + delay;
+            let searched_until = (reached < to).then(|| time_at(reached));
+            for (obstacle, least) in least.into_iter().enumerate() {
+                let Some(ObstacleClearance { value, travelled, bench }) = least else { continue };
+                let least = ObstacleClearance { value, travelled, bench: bench + self.first_handles[k] as u32 };
+                let own = TimedObstacleClearance { obstacle, least, time: time_at(travelled), searched_until };
+                match all.iter_mut().find(|other| other.obstacle == obstacle) {
                     Some(other) => {
-                        let until = earlier(other.searched_until, own.searched_until);
-                        if own.least.value < other.least.value {
+                        let until = earlier(other.searched_until, searched_until);
+                        if value < other.least.value {
                             *other = own;
                         }
                         other.searched_until = until;
@@ -352,37 +420,43 @@ impl Ensemble {
         all
     }
 
-    /// Returns the end of the show as an event of one dragon's own motion.
-    fn own_end(&self, dragon: &Dragon, show_end: &TimedEvent) -> TimedEvent {
-        let time = dragon.own_time(show_end.time).0;
-        TimedEvent { event: Event { travelled: dragon.motion.travelled_at(time), ..show_end.event }, time }
+    /// Returns the metres that a dragon's head has travelled when the show ends.
+    fn own_end(&self, dragon: usize, show_end: &TimedEvent) -> f64 {
+        match self.only() {
+            // Without the rounding of the time.
+            Some(_) => show_end.event.travelled,
+            None => self.dragons[dragon].travelled_at(show_end.time),
+        }
     }
 
-    /// Makes the monitor of the live clearance of different dragons. `choices` has the solver of each dragon's frames,
-    /// in its path's own coordinates.
-    pub fn between_monitor(&self, choices: &[Choice]) -> BetweenMonitor {
+    /// Makes the monitor of the live clearance of different dragons; `None` if there is one dragon. `choices` has the
+    /// solver of each dragon's frames, in its path's own coordinates.
+    pub fn between_monitor(&self, choices: &[Choice]) -> Option<BetweenMonitor> {
+        if self.dragons.len() < 2 {
+            return None;
+        }
         let teams: Vec<Team> = self.dragons.iter().map(|dragon| *dragon.motion.team()).collect();
         let monitor = BetweenMonitor::new(&teams, self.link_tolerance().max(1e-9));
         let mut dragons = Vec::new();
         for (Dragon { motion, .. }, choice) in self.dragons.iter().zip(choices) {
-            let Some(table) = &choice.table else { return monitor };
+            let Some(table) = &choice.table else { return Some(monitor) };
             let (team, path, placement) = (*motion.team(), motion.path(), *motion.placement());
             dragons.push(TabledDragon { team, path, placement, table, head_speed: motion.head_speed() });
         }
         let end = self.timeline_without_contact().end().time;
-        monitor.with_table(&dragons, end, &|dragon, time| self.dragons[dragon].travelled_at(time))
+        Some(monitor.with_table(&dragons, end, &|dragon, time| self.dragons[dragon].travelled_at(time)))
     }
 
     /// Makes a solver of all dragons, for the show's time. Its chains are placed on the stage.
-    pub fn solver(&self, velocities: Velocities) -> EnsembleSolver {
+    pub fn solver(&self, velocities: Velocities) -> Box<dyn Solver> {
         let dancer = |(k, dragon): (usize, &Dragon)| {
             (dragon.clone(), dragon.motion.solver(velocities).solver, self.handles_of(k))
         };
-        EnsembleSolver { dancers: self.dragons.iter().enumerate().map(dancer).collect() }
+        Box::new(EnsembleSolver { dancers: self.dragons.iter().enumerate().map(dancer).collect() })
     }
 }
 
-/// The least clearances of a show of several dragons.
+/// The least clearances of a show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastClearances {
     /// The least clearance of two boards of one dragon; `None` if there are no two, or the search failed.
@@ -399,13 +473,13 @@ impl LeastClearances {
 }
 
 /// The solver of all dragons of a show.
-pub struct EnsembleSolver {
+struct EnsembleSolver {
     dancers: Vec<(Dragon, Box<dyn Solver>, Range<usize>)>,
 }
 
 impl Solver for EnsembleSolver {
     fn name(&self) -> &'static str {
-        "several"
+        "ensemble"
     }
 
     fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
@@ -434,18 +508,26 @@ pub fn pairs(count: usize) -> impl Iterator<Item = [usize; 2]> {
     (0..count).flat_map(move |a| (a + 1..count).map(move |b| [a, b]))
 }
 
-/// Returns the event with which a show of several ends: the first lock of any, or the last end of a path.
+/// Returns the event with which a show ends: the first lock of any dragon, or the last end of a path.
 fn end_of(own: &[Timeline]) -> TimedEvent {
-    let ends = || own.iter().map(|timeline| *timeline.end());
-    let lock = ends().filter(|end| end.event.kind == EventKind::Lock).min_by(|a, b| a.time.total_cmp(&b.time));
+    let ends = || own.iter().map(Timeline::end);
+    let lock = ends().filter(|end| end.event.kind == EventKind::Lock).min_by(by_time);
     // There is a dragon, and each has an end.
-    lock.or_else(|| ends().max_by(|a, b| a.time.total_cmp(&b.time))).expect("a show has a dragon")
+    *lock.or_else(|| ends().max_by(by_time)).expect("a show has a dragon")
 }
 
-/// Joins the timelines of all dragons, given the first contact.
+/// Returns the events of a dragon up to the end of the show. If the dragon ends the show, these are all its events: the
+/// time of a lock can be rounded to before an event at the same place.
+fn before<'a>(own: &'a Timeline, end: &TimedEvent) -> impl Iterator<Item = &'a TimedEvent> {
+    let (ends_show, end) = (own.end() == end, end.time);
+    own.events().iter().filter(move |timed| ends_show || timed.time <= end)
+}
+
+/// Joins the timelines of all dragons, given the first contact, and the time up to which the contacts of two are known.
 fn collected(own: &[Timeline], end: TimedEvent, contact: Option<TimedEvent>, until: f64) -> Timeline {
+    let until = own.iter().filter_map(Timeline::searched_until).fold(until, f64::min);
     let (mut events, mut standing): (Vec<TimedEvent>, Vec<TimedEvent>) = (contact.into_iter().collect(), Vec::new());
-    for timed in own.iter().flat_map(Timeline::events).filter(|timed| timed.time <= end.time) {
+    for timed in own.iter().flat_map(|timeline| before(timeline, &end)) {
         match timed.event.kind {
             EventKind::Contact | EventKind::Lock => {}
             EventKind::PathEnd if *timed != end => standing.push(*timed),
@@ -463,9 +545,13 @@ fn collected(own: &[Timeline], end: TimedEvent, contact: Option<TimedEvent>, unt
             }
         }
     }
-    events.retain(|timed| timed.time <= end.time);
     events.push(end);
     Timeline::new(events, (until < end.time).then_some(until)).with_standing(standing)
+}
+
+/// Compares times.
+fn by_time(one: &&TimedEvent, other: &&TimedEvent) -> std::cmp::Ordering {
+    one.time.total_cmp(&other.time)
 }
 
 /// Compares clearances.

@@ -12,8 +12,7 @@ use crate::model::Point;
 /// use bench_dragon_messages::state::EventKind;
 /// use bench_dragon_show::scene::Scene;
 ///
-/// let motion = Scene::paper().motion;
-/// let timeline = motion.timeline_without_contact();
+/// let timeline = Scene::paper().ensemble.timeline_without_contact();
 /// for timed in timeline.events() {
 ///     println!("{}: {} s, after {} m", timed.event.kind.name(), timed.time, timed.event.travelled);
 /// }

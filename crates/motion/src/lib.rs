@@ -17,7 +17,6 @@ pub mod solve;
 pub mod sweep;
 pub mod timeline;
 
-use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
 use crate::model::board::Board;
@@ -32,12 +31,11 @@ use crate::solve::table::{FollowerTable, Instructions};
 use crate::solve::{Solver, Velocities};
 
 use clearance::{ClearanceMonitor, ObstacleMonitor};
-use contact::{ConservativeAdvancement, LeastClearance, Touch};
+use contact::{ConservativeAdvancement, Found, LeastClearance, ObstacleClearance, Touch};
 use event::{Budget, Event};
-use ground::{Ground, Obstacle};
+use ground::Ground;
 use placement::{Placed, Placement};
 use singularities::Singularities;
-use timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
 
 /// The choice of the solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,12 +89,13 @@ pub enum MotionError {
 /// use bench_dragon_motion::model::description::PathDescription;
 /// use bench_dragon_motion::model::team::Team;
 /// use bench_dragon_messages::state::EventKind;
+/// use bench_dragon_motion::ensemble::Ensemble;
 /// use bench_dragon_motion::{Method, Motion};
 ///
 /// let team = Team { benches: 20, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
 /// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
 /// let motion = Motion::new(path, team, 1.0, Method::Newton)?;
-/// let timeline = motion.timeline(&mut |_| ());
+/// let timeline = Ensemble::alone(motion).timeline(&mut |_| ());
 /// let contact = timeline.find(EventKind::Contact).unwrap();
 /// assert!((contact.time - 412.473_837_682).abs() < 1e-9);
 /// assert_eq!((contact.event.bench_a, contact.event.bench_b), (Some(0), Some(8)));
@@ -114,6 +113,15 @@ pub struct Motion {
     placement: Placement,
     /// In stage coordinates.
     ground: Ground,
+}
+
+/// The events of a motion, in no order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionEvents {
+    /// The events, at places of the head. The obstacles' numbers follow the motion's own handles.
+    pub events: Vec<Event>,
+    /// The metres of the head's travel up to which the events are complete, if a search gave up before the end.
+    pub searched_until: Option<f64>,
 }
 
 /// Units of work after which the search for stall and lock gives up: about ten seconds.
@@ -373,7 +381,7 @@ impl Motion {
 
     /// Returns all events, contact included. `progress` is called at times with the share of the search that is done,
     /// from 0 to 1.
-    pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
+    pub fn events(&self, progress: &mut dyn FnMut(f64)) -> MotionEvents {
         let found = self.singularities(&mut |share| progress(0.1 * share));
         let end = self.end(&found);
         let mut searched_until = found.searched_until;
@@ -397,7 +405,7 @@ impl Motion {
             searched_until = searched_until.min(reached);
             events.extend(touches);
         }
-        self.timed(events, searched_until)
+        self.placed_events(events, searched_until)
     }
 
     /// Returns the first touch of each obstacle up to a place of the head, and the place up to which the search came.
@@ -417,84 +425,44 @@ impl Motion {
     }
 
     fn touch_event(&self, Touch { obstacle, travelled, bench, place }: Touch) -> Event {
-        let bench_b = Some(self.obstacle_number(obstacle));
+        let bench_b = Some((self.team.handles() + obstacle) as u32);
         Event { kind: EventKind::Obstacle, travelled, bench_a: Some(bench), bench_b, place: Some(place) }
     }
 
-    /// Returns the number that stands for an obstacle of the ground where a second bench would: obstacles follow the
-    /// handles.
-    pub fn obstacle_number(&self, obstacle: usize) -> u32 {
-        (self.team.handles() + obstacle) as u32
-    }
-
-    /// Returns the events without the contact, which costs a search.
-    pub fn timeline_without_contact(&self) -> Timeline {
+    /// Returns the events without contacts and obstacles, which cost a search.
+    pub fn events_without_contact(&self) -> MotionEvents {
         let found = self.singularities(&mut |_| ());
         let end = self.end(&found);
-        self.timed(found.stall.into_iter().chain([end]).collect(), found.searched_until)
+        self.placed_events(found.stall.into_iter().chain([end]).collect(), found.searched_until)
     }
 
-    /// Returns the least clearance from the start until the show ends at `show_end`. For fewer than three benches,
-    /// returns `None`.
-    /// `progress` is called as by [`Motion::timeline`].
+    /// Returns the least clearance of two boards that share no handle, from one place of the head to another. Returns
+    /// `None` for fewer than three benches, and if a place inside the motion has no solution. `progress` is called as
+    /// by [`Motion::events`].
     pub fn least_clearance(
         &self,
-        timeline: &Timeline,
-        show_end: &TimedEvent,
+        (from, to): (f64, f64),
         progress: &mut dyn FnMut(f64),
-    ) -> Option<TimedClearance> {
+    ) -> Option<Found<LeastClearance>> {
         if self.team.benches < 3 {
             return None;
         }
         let found = self.singularities(&mut |_| ());
-        // Before the first contact, every clearance is above that at the contact.
-        let from = timeline.find(EventKind::Contact).map_or(0.0, |contact| contact.event.travelled);
-        let to = show_end.event.travelled;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
-        let least = self.advancement(&found).least_clearance(from, to.max(from), &mut budget).ok()?;
-        let LeastClearance { travelled, .. } = least.value?;
-        Some(TimedClearance {
-            least: least.value?,
-            time: self.time_at(travelled),
-            searched_until: (least.searched_until < to).then(|| self.time_at(least.searched_until)),
-        })
+        self.advancement(&found).least_clearance(from, to.max(from), &mut budget).ok()
     }
 
-    /// Returns the least clearance of each obstacle from the start until the show ends at `show_end`. `progress` is
-    /// called as by [`Motion::timeline`]. The list is empty without obstacles, and if a place inside the motion has no
-    /// solution.
-    pub fn obstacle_clearances(
-        &self,
-        show_end: &TimedEvent,
-        progress: &mut dyn FnMut(f64),
-    ) -> Vec<TimedObstacleClearance> {
+    /// Returns the least clearance of each obstacle from the start to a place of the head. `progress` is called as by
+    /// [`Motion::events`]. Returns the clearances in the order of the obstacles, and the place up to which the search
+    /// came. The list is empty without obstacles, and if a place inside the motion has no solution.
+    pub fn obstacle_clearances(&self, to: f64, progress: &mut dyn FnMut(f64)) -> (Vec<Option<ObstacleClearance>>, f64) {
         if self.ground.is_empty() {
-            return Vec::new();
+            return (Vec::new(), to);
         }
         let found = self.singularities(&mut |_| ());
-        let to = show_end.event.travelled;
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
         let ground = self.ground.in_own_frame(&self.placement);
-        let Ok((least, reached)) = self.advancement(&found).obstacle_clearances(&ground, 0.0, to, &mut budget) else {
-            return Vec::new();
-        };
-        let searched_until = (reached < to).then(|| self.time_at(reached));
-        let timed = least.into_iter().enumerate().filter_map(|(obstacle, least)| {
-            let least = least?;
-            Some(TimedObstacleClearance { obstacle, least, time: self.time_at(least.travelled), searched_until })
-        });
-        timed.collect()
-    }
-
-    /// Returns the names of the benches and obstacles, for people.
-    pub fn roster(&self) -> Roster {
-        Roster::new(vec![(String::new(), self.team().benches as u32)], self.ground().names())
-    }
-
-    /// Returns the obstacle that an event of this motion reaches; `None` for other kinds.
-    pub fn obstacle_of(&self, event: &Event) -> Option<&Obstacle> {
-        let number = event.bench_b.filter(|_| event.kind == EventKind::Obstacle)?;
-        self.ground.obstacles().get((number as usize).checked_sub(self.team.handles())?)
+        self.advancement(&found).obstacle_clearances(&ground, 0.0, to, &mut budget).unwrap_or((Vec::new(), to))
     }
 
     /// Searches for stall, lock and the turns of the handles.
@@ -516,20 +484,17 @@ impl Motion {
 
     /// Returns the time of an event. The time of a lock, multiplied by the speed, is never past the lock: there handles
     /// would have jumped.
-    fn time_of(&self, event: &Event) -> f64 {
+    pub fn time_of(&self, event: &Event) -> f64 {
         let time = self.time_at(event.travelled);
         let is_past = event.kind == EventKind::Lock && self.travelled_at(time) > event.travelled;
         if is_past { time.next_down() } else { time }
     }
 
-    /// Returns the events, placed on the stage, with their times, and the time up to which they are complete.
-    fn timed(&self, events: Vec<Event>, searched_until: f64) -> Timeline {
+    /// Returns the events, placed on the stage, and the place of the head up to which they are complete.
+    fn placed_events(&self, events: Vec<Event>, searched_until: f64) -> MotionEvents {
         let end = events.iter().fold(0.0, |end: f64, event| end.max(event.travelled));
-        let timed = events.into_iter().map(|event| {
-            let place = event.place.map(|place| self.placement.point(place));
-            TimedEvent { event: Event { place, ..event }, time: self.time_of(&event) }
-        });
-        let timed = timed.collect();
-        Timeline::new(timed, (searched_until < end).then(|| self.time_at(searched_until)))
+        let placed = |event: Event| Event { place: event.place.map(|place| self.placement.point(place)), ..event };
+        let events = events.into_iter().map(placed).collect();
+        MotionEvents { events, searched_until: (searched_until < end).then_some(searched_until) }
     }
 }

@@ -207,7 +207,7 @@ impl Checker {
             return Err(format!("a certificate of format {format}, expected {FORMAT}"));
         }
         let in_scene = |problem: String| format!("the scene: {problem}");
-        let mut scenes = Scene::read_several(&text).map_err(in_scene)?;
+        let mut scenes = Scene::read_ensemble(&text).map_err(in_scene)?;
         let alone = if scenes.is_empty() { None } else { Some(Vec::new()) };
         if alone.is_none() {
             scenes.push(Scene::read(&text).map_err(in_scene)?);
@@ -294,7 +294,7 @@ impl Checker {
     }
 
     /// Handles the lines of a scene of several dragons. Returns false for another line.
-    fn add_of_several(&mut self, line: &ParsedLine) -> Result<bool, String> {
+    fn add_of_ensemble(&mut self, line: &ParsedLine) -> Result<bool, String> {
         let has_result = self.between.is_some() && self.results() > self.before;
         let Self { about, scenes, alone, between, proved, .. } = self;
         if has_result && !matches!(line, ParsedLine::Dragon { .. } | ParsedLine::Pair { .. }) {
@@ -390,7 +390,7 @@ impl Checker {
         if question.is_some_and(|question| question != self.about) {
             return Err("it belongs to another question".to_owned());
         }
-        if self.add_of_several(&line)? {
+        if self.add_of_ensemble(&line)? {
             return Ok(());
         }
         let section = self.alone.as_ref().map(Vec::len);

@@ -42,9 +42,9 @@ struct Text {
     stage: Option<StageText>,
 }
 
-/// The dragons of a scene of several.
+/// The dragons of a scene with `[[dragons]]`.
 #[derive(Deserialize)]
-struct SeveralText {
+struct EnsembleText {
     #[serde(default)]
     dragons: Vec<DragonText>,
     team: Option<IgnoredAny>,
@@ -110,12 +110,12 @@ impl Scene {
         Self::of(DragonText { name: String::new(), delay: 0.0, team, path, placement, motion }, stage.as_ref())
     }
 
-    /// Reads the dragons of a scene of several; an empty list if it is a scene of one.
+    /// Reads the dragons of a scene with `[[dragons]]`; an empty list for a scene with `[team]`.
     ///
     /// # Errors
     /// A sentence for a text that is not a scene.
-    pub fn read_several(text: &str) -> Result<Vec<Self>, String> {
-        let SeveralText { dragons, team, stage } = parsed(text)?;
+    pub fn read_ensemble(text: &str) -> Result<Vec<Self>, String> {
+        let EnsembleText { dragons, team, stage } = parsed(text)?;
         if dragons.len() > MOST_DRAGONS || !dragons.is_empty() && team.is_some() {
             return Err("expected [team], or from 1 to 16 [[dragons]]".to_owned());
         }

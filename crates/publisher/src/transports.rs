@@ -39,7 +39,7 @@ impl<'a> TransportConfig<'a> {
     pub fn of(name: &'a str, scene: &'a Scene, stage: &'a StageMessage) -> Self {
         Self {
             name,
-            handles: scene.handles(),
+            handles: scene.ensemble.handles(),
             alerts: scene.alerts.is_some(),
             cues: scene.cues.len(),
             single_precision: scene.single_precision,

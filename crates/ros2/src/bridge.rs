@@ -364,7 +364,7 @@ impl ShowScene {
         if text.is_empty() {
             return Self::unknown(run_id);
         }
-        match Scene::parse_any(text, "the scene of the show", "scene") {
+        match Scene::parse(text, "the scene of the show", "scene") {
             Ok(scene) => Self { run_id, alerts: scene.alerts.is_some(), settings: scene.ros2.unwrap_or_default() },
             Err(error) => {
                 log::warn!("{error}: ROS 2 gets the default topics");

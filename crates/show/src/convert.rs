@@ -2,10 +2,8 @@
 //! that a new field cannot be lost.
 
 use crate::alerts::Alert;
-use crate::scene::Scene;
 use crate::{Frame, Outcome, ReachedCue, Show};
-use bench_dragon_messages::state::{EventKind, FrameState};
-use bench_dragon_motion::Motion;
+use bench_dragon_messages::state::FrameState;
 use bench_dragon_motion::clearance::PairClearance;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::event::Event;
@@ -230,49 +228,19 @@ pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
     ControlResponse { id, tick, sim_time, time_scale, code, playback, cue, reserved: 0 }
 }
 
-/// The dragons on a stage.
-pub enum OnStage<'a> {
-    /// The only dragon of a show.
-    One(&'a Motion),
-    /// Several.
-    Several(&'a Ensemble),
-}
-
-impl<'a> From<&'a Motion> for OnStage<'a> {
-    fn from(motion: &'a Motion) -> Self {
-        Self::One(motion)
-    }
-}
-
-impl<'a> From<&'a Scene> for OnStage<'a> {
-    fn from(scene: &'a Scene) -> Self {
-        scene.ensemble.as_ref().map_or(Self::One(&scene.motion), Self::Several)
-    }
-}
-
-/// Returns the stage of a motion, or of a scene's dragons, with the events and cues of its show. `scene_hash` is BLAKE3
-/// of the scene's text, or zeros without a text.
-pub fn stage<'a>(
+/// Returns the stage of the dragons, with the events and cues of their show. `scene_hash` is BLAKE3 of the scene's text,
+/// or zeros without a text.
+pub fn stage(
     run_id: u64,
     stamp_ns: u64,
     scene_hash: [u8; SCENE_HASH_BYTES],
-    of: impl Into<OnStage<'a>>,
+    ensemble: &Ensemble,
     show: &Show,
 ) -> StageMessage {
     let mut segments = Vec::new();
-    let of = of.into();
-    let (dragons, events, ground): (Vec<StageDragon>, _, _) = match of {
-        OnStage::One(motion) => {
-            (vec![stage_dragon(motion, ("", 0), &mut segments)], first_events(show), motion.ground())
-        }
-        OnStage::Several(ensemble) => {
-            let of = |(k, dragon): (usize, &Dragon)| {
-                let first = ensemble.handles_of(k).start as u32;
-                stage_dragon(&dragon.motion, (&dragon.name, first), &mut segments)
-            };
-            (ensemble.dragons().iter().enumerate().map(of).collect(), show.timeline().all(), ensemble.ground())
-        }
-    };
+    let of = |(k, dragon): (usize, &Dragon)| stage_dragon(dragon, ensemble.handles_of(k).start as u32, &mut segments);
+    let dragons: Vec<StageDragon> = ensemble.dragons().iter().enumerate().map(of).collect();
+    let ground = ensemble.ground();
     let obstacles = ground.obstacles().iter().map(|obstacle| stage_obstacle(obstacle, &mut segments));
     let stage = Stage {
         run_id,
@@ -283,14 +251,18 @@ pub fn stage<'a>(
         scene_hash,
         dragons: List::of(dragons),
         obstacles: List::of(obstacles),
-        events: List::of(events.iter().map(stage_event)),
+        events: List::of(show.timeline().all().iter().map(stage_event)),
         cue_list: List::of(show.cues().iter().map(stage_cue)),
     };
     StageMessage { stage, segments }
 }
 
-/// Returns a dragon with its name and the number of its first handle, and appends the segments of its path.
-fn stage_dragon(motion: &Motion, (name, first_handle): (&str, u32), segments: &mut Vec<StageSegment>) -> StageDragon {
+/// Returns a dragon with the number of its first handle, and appends the segments of its path.
+fn stage_dragon(
+    Dragon { name, motion, .. }: &Dragon,
+    first_handle: u32,
+    segments: &mut Vec<StageSegment>,
+) -> StageDragon {
     let Team { benches, head_length, body_length, width, hole_inset } = *motion.team();
     let (mut pitch, mut start_turn) = (f64::NAN, f64::NAN);
     let first_segment = segments.len() as u32;
@@ -357,16 +329,6 @@ fn side(from: Point, to: Point) -> StageSegment {
     stage_segment(&SegmentOutline { kind: OutlineKind::Line, start: from, heading, length })
 }
 
-/// Returns the first event of each kind, and the first of each obstacle.
-fn first_events(show: &Show) -> Vec<TimedEvent> {
-    let all = show.timeline().events();
-    let same = |one: &Event, other: &Event| {
-        one.kind == other.kind && (one.kind != EventKind::Obstacle || one.bench_b == other.bench_b)
-    };
-    let is_first = |at: usize| !all[..at].iter().any(|before| same(&before.event, &all[at].event));
-    (0..all.len()).filter(|at| is_first(*at)).map(|at| all[at]).collect()
-}
-
 fn stage_event(timed: &TimedEvent) -> StageEvent {
     let TimedEvent { time, event: Event { kind, travelled: _, bench_a, bench_b, place: _ } } = *timed;
     let [bench_a, bench_b] = [bench_a, bench_b].map(|bench| bench.unwrap_or(NO_BENCH));
@@ -393,7 +355,7 @@ pub fn stage_segment(outline: &SegmentOutline) -> StageSegment {
 
 #[cfg(test)]
 mod tests {
-    use bench_dragon_messages::state::Level;
+    use bench_dragon_messages::state::{EventKind, Level};
 
     use super::*;
 

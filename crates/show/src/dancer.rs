@@ -151,10 +151,10 @@ mod tests {
     #[test]
     fn a_frame_without_a_solution_has_the_latest_solution() {
         let scene = Scene::paper();
-        let choice = Dancer::choice(&scene, &scene.motion);
-        let whole = Dancer::new(&scene, &scene.motion, choice);
+        let motion = scene.ensemble.only().unwrap();
+        let whole = Dancer::new(&scene, motion, Dancer::choice(&scene, motion));
         let mut dancer = Dancer { solver: Box::new(EndsAtTen), clearance: None, obstacles: None, ..whole };
-        let mut chain = Chain::new(scene.team().handles());
+        let mut chain = Chain::new(scene.ensemble.handles());
         assert!(dancer.solve(3.0, true, &mut chain.all_mut()).is_ok());
         for time in [20.0, 21.0] {
             assert!(dancer.solve(time, true, &mut chain.all_mut()).is_err());

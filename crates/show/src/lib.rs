@@ -7,9 +7,9 @@ pub mod alerts;
 pub mod clock;
 pub mod convert;
 mod dancer;
+mod dancers;
 mod playback;
 pub mod scene;
-mod several;
 pub mod table;
 #[cfg(test)]
 mod tests;
@@ -19,16 +19,14 @@ use std::sync::Arc;
 use crate::scene::cue::CueAction;
 use crate::scene::{OnContact, Scene};
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::Method;
 use bench_dragon_motion::clearance::PairClearance;
 use bench_dragon_motion::event::Event;
-use bench_dragon_motion::linkage::NoFollower;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::{TimedEvent, Timeline};
 
+use dancer::Closest;
 pub use dancer::solve_at_or_just_before;
-use dancer::{Closest, Dancer};
-use several::Several;
+use dancers::Dancers;
 
 use alerts::{Alert, LevelTracker};
 use bench_dragon_messages::control::{COMMANDS_PER_FRAME, Code, Command, CommandRecord};
@@ -128,41 +126,10 @@ pub struct Outcome {
     pub cue: u32,
 }
 
-/// The dragons in play: the dragon of a scene with `[team]`, or the dragons of a scene with `[[dragons]]`.
-enum Cast {
-    One(Box<Dancer>),
-    Several(Box<Several>),
-}
-
-impl Cast {
-    fn new(scene: &Scene) -> Self {
-        match &scene.ensemble {
-            Some(ensemble) => Self::Several(Box::new(Several::new(scene, ensemble))),
-            None => Self::One(Box::new(Dancer::new(scene, &scene.motion, Dancer::choice(scene, &scene.motion)))),
-        }
-    }
-
-    /// Returns the greatest overlap in metres that rounding explains before a contact.
-    fn overlap_tolerance(&self, scene: &Scene) -> f64 {
-        let (longest_link, error) = match self {
-            Self::One(dancer) => (scene.team().longest_link(), dancer.clearance_error),
-            Self::Several(several) => (several.longest_link(), several.clearance_error()),
-        };
-        ROUNDING_OVERLAP * longest_link + error
-    }
-
-    fn solve(&mut self, sim_time: f64, moves: bool, chain: &mut Chain) -> Result<Closest, NoFollower> {
-        match self {
-            Self::One(dancer) => dancer.solve(sim_time, moves, &mut chain.all_mut()),
-            Self::Several(several) => several.solve(sim_time, moves, chain),
-        }
-    }
-}
-
 /// A scene in play.
 pub struct Show {
     clock: ShowClock,
-    cast: Cast,
+    dancers: Dancers,
     solver_reason: String,
     timeline: Timeline,
     level: Option<LevelTracker>,
@@ -203,25 +170,21 @@ impl Show {
         let stops = scene.alerts.is_some() && playback.on_contact == OnContact::Stop;
         let freeze_time = timeline.show_end(stops).time;
         let level = scene.alerts.map(|rules| LevelTracker::new(rules, playback.rate));
-        let cast = Cast::new(scene);
-        let solver_reason = match &cast {
-            Cast::One(dancer) => dancer.reason.clone(),
-            Cast::Several(several) => several.reason(),
-        };
-        let exact = !matches!(scene.motion.method(), Method::Paper(_));
+        let dancers = Dancers::new(scene);
+        let exact = scene.ensemble.is_exact();
         let (cues, missing_cues) = timed_cues(scene, &timeline);
         let cue_times = cues.iter().map(|cue| CueTime { time: cue.time, pauses: cue.pauses }).collect();
-        let mut frame = Frame { cues: Vec::with_capacity(2 * cues.len()), ..Frame::new(scene.handles()) };
+        let mut frame = Frame { cues: Vec::with_capacity(2 * cues.len()), ..Frame::new(scene.ensemble.handles()) };
         // Each event announces at most one alert.
         frame.alerts.reserve(timeline.events().len() + 1);
         Ok(Self {
             clock: ShowClock::new(&playback, freeze_time, cue_times),
-            overlap_tolerance: exact.then(|| cast.overlap_tolerance(scene)),
-            cast,
-            solver_reason,
+            overlap_tolerance: exact.then(|| ROUNDING_OVERLAP * dancers.longest_link() + dancers.clearance_error()),
+            solver_reason: dancers.reason(),
+            dancers,
             timeline,
             level,
-            has_obstacles: !scene.ground().is_empty(),
+            has_obstacles: !scene.ensemble.ground().is_empty(),
             solved: None,
             closest: Closest { boards: None, any: None },
             cues,
@@ -259,10 +222,7 @@ impl Show {
 
     /// Returns the number of pairs of boards tested so far: 0 for a scene without alerts.
     pub fn pairs_tested(&self) -> u64 {
-        match &self.cast {
-            Cast::One(dancer) => dancer.pairs_tested(),
-            Cast::Several(several) => several.pairs_tested(),
-        }
+        self.dancers.pairs_tested()
     }
 
     /// Executes a command at the beginning of the period `tick`, before its frame. Returns `None` for a step:
@@ -340,7 +300,7 @@ impl Show {
             return;
         }
         self.solved = Some((sim_time, moves));
-        match self.cast.solve(sim_time, moves, &mut self.frame.chain) {
+        match self.dancers.solve(sim_time, moves, &mut self.frame.chain) {
             Ok(closest) => {
                 self.closest = closest;
                 self.frame.min_clearance = closest.any.map_or(f64::NAN, |least| least.value);
@@ -394,7 +354,7 @@ impl Show {
 pub fn timed_cues(scene: &Scene, timeline: &Timeline) -> (Vec<ReachedCue>, Vec<String>) {
     let (mut cues, mut missing) = (Vec::new(), Vec::new());
     for cue in &scene.cues {
-        match cue.time(&scene.motion, timeline) {
+        match cue.time(&scene.ensemble, timeline) {
             Some(time) => {
                 let pauses = cue.then == CueAction::Pause;
                 cues.push(ReachedCue { number: 0, time, pauses, name: cue.name.as_str().into() });

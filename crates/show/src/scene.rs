@@ -11,13 +11,12 @@ pub mod path;
 mod piece;
 pub mod precision;
 pub mod ros2;
+mod source;
 pub(crate) mod stage;
 mod team;
 mod text;
 
-use std::cell::RefCell;
 use std::path::Path as FilePath;
-use std::rc::Rc;
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -25,25 +24,20 @@ use toml::Spanned;
 pub use self::accepted::Accepted;
 use self::cue::{Cue, RawCue};
 pub use self::dragons::{MOST_DRAGON_NAME, MOST_DRAGONS};
-use self::dragons::{Probe, RawSeveral};
+use self::dragons::{Probe, RawEnsemble};
 use self::path::RawPath;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::ros2::RawRos2;
+use self::source::Source;
 use self::stage::RawStage;
 use self::team::RawTeam;
 pub use self::text::{SceneText, printable};
-use bench_dragon_messages::Roster;
 use bench_dragon_motion::ensemble::Ensemble;
-use bench_dragon_motion::event::Event;
-use bench_dragon_motion::ground::{Ground, Obstacle};
-use bench_dragon_motion::model::Vector;
 use bench_dragon_motion::model::description::PathDescription;
-use bench_dragon_motion::model::team::Team;
 use bench_dragon_motion::placement::Placement;
+use bench_dragon_motion::solve::Velocities;
 use bench_dragon_motion::solve::paper::PaperRules;
-use bench_dragon_motion::solve::{Solver, Velocities};
-use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_motion::{Method, Motion, MotionError};
 use bench_dragon_ros2_messages::settings::Ros2Settings;
 
@@ -100,7 +94,7 @@ pub struct AlertRules {
     pub approach_clearance: f64,
 }
 
-/// A scene: its motion, its accuracy, and how it is published.
+/// A scene: its dragons, and how they are published.
 ///
 /// # Examples
 ///
@@ -109,7 +103,7 @@ pub struct AlertRules {
 ///
 /// let twenty = SceneText::paper().text.replace("benches = 223", "benches = 20");
 /// let scene = Scene::parse(&twenty, "twenty.toml", "twenty")?;
-/// assert_eq!(scene.team().handles(), 21);
+/// assert_eq!(scene.ensemble.handles(), 21);
 /// // An error names file, line and field.
 /// let wrong = twenty.replace("pitch = 0.55", "pitch = 0");
 /// let error = Scene::parse(&wrong, "wrong.toml", "wrong").unwrap_err().to_string();
@@ -120,18 +114,15 @@ pub struct AlertRules {
 pub struct Scene {
     /// The scene's name; by default the stem of its file.
     pub name: String,
-    /// The team on its path, with the accuracy. With several dragons, the motion of the first alone: only code that
-    /// looks at `ensemble` first may use this field.
-    pub motion: Motion,
-    /// The dragons of a scene with `[[dragons]]`; `None` for a scene with `[team]`.
-    pub ensemble: Option<Ensemble>,
-    /// The sizes of benches that the text leaves to their defaults, as in `width = 0.3`; of several dragons each with
-    /// its dragon's name before it.
+    /// The dragons: the one of `[team]`, or those of `[[dragons]]`.
+    pub ensemble: Ensemble,
+    /// The sizes of benches that the text leaves to their defaults, as in `width = 0.3`; of dragons with names each
+    /// with the name before it.
     pub team_defaults: Vec<String>,
     /// Sentences on numbers that are accepted and hardly meant, such as millimetres; each names its file and line.
     pub doubts: Vec<String>,
-    /// The placement of the path's coordinates on the stage, if the scene states one. The motion's own placement
-    /// contains this one.
+    /// The placement that `[placement]` states for the dragon of `[team]`, or none; the motion's own placement contains
+    /// it. `None` for `[[dragons]]`.
     pub placement: Option<Placement>,
     /// The reaction to a contact.
     pub on_contact: OnContact,
@@ -172,97 +163,15 @@ impl Scene {
         SceneText::load(file)?.parse()
     }
 
-    /// Reads a scene of one dragon from TOML text. `file` is the file's name in errors, `stem` the scene's name if the
-    /// text gives none.
-    ///
-    /// # Errors
-    /// One sentence that names the file, the line, the field and the expected value. A scene of several dragons is
-    /// refused.
-    pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
-        let source = Source::new(text, file);
-        match several(text) {
-            Some(dragons) => Err(source.field_error(
-                &dragons,
-                "the scene has several dragons, which this command does not take, expected one dragon in [team] and \
-                 [path]",
-            )),
-            None => source.scene::<RawScene>(|raw| raw.validated(&source, stem)),
-        }
-    }
-
-    /// Reads a scene of one dragon or of several, as [`Scene::parse`].
+    /// Reads a scene from TOML text. `file` is the file's name in errors, `stem` the scene's name if the text gives none.
     ///
     /// # Errors
     /// One sentence that names the file, the line, the field and the expected value.
-    pub fn parse_any(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
+    pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
         let source = Source::new(text, file);
-        match several(text) {
-            Some(_) => source.scene::<RawSeveral>(|raw| raw.validated(&source, stem)),
+        match dragons_in(text) {
+            Some(_) => source.scene::<RawEnsemble>(|raw| raw.validated(&source, stem)),
             None => source.scene::<RawScene>(|raw| raw.validated(&source, stem)),
-        }
-    }
-
-    /// Returns the team of a scene of one dragon.
-    pub fn team(&self) -> &Team {
-        self.motion.team()
-    }
-
-    /// Returns the number of benches of all dragons.
-    pub fn benches(&self) -> usize {
-        self.ensemble.as_ref().map_or(self.motion.team().benches, Ensemble::benches)
-    }
-
-    /// Returns the number of handles of a frame: the handles of all dragons.
-    pub fn handles(&self) -> usize {
-        self.ensemble.as_ref().map_or(self.motion.team().handles(), Ensemble::handles)
-    }
-
-    /// Returns the greatest error of a link in a frame besides rounding, metres, as [`Motion::link_tolerance`].
-    pub fn link_tolerance(&self) -> f64 {
-        self.ensemble.as_ref().map_or_else(|| self.motion.link_tolerance(), Ensemble::link_tolerance)
-    }
-
-    /// Returns the obstacles, in stage coordinates.
-    pub fn ground(&self) -> &Ground {
-        self.ensemble.as_ref().map_or(self.motion.ground(), Ensemble::ground)
-    }
-
-    /// Returns the obstacle that an event reaches; `None` for other kinds.
-    pub fn obstacle_of(&self, event: &Event) -> Option<&Obstacle> {
-        self.ensemble.as_ref().map_or_else(|| self.motion.obstacle_of(event), |all| all.obstacle_of(event))
-    }
-
-    /// Returns the names of the benches and obstacles, for people.
-    pub fn roster(&self) -> Roster {
-        self.ensemble.as_ref().map_or_else(|| self.motion.roster(), Ensemble::roster)
-    }
-
-    /// Returns a bench's name for people, counted from 1 within its dragon.
-    pub fn bench_name(&self, bench: u32) -> String {
-        self.roster().bench(bench)
-    }
-
-    /// Returns all events of the scene, as [`Motion::timeline`].
-    pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
-        match &self.ensemble {
-            Some(ensemble) => ensemble.timeline(progress),
-            None => self.motion.timeline(progress),
-        }
-    }
-
-    /// Returns the events of the scene without those that cost a search.
-    pub fn timeline_without_contact(&self) -> Timeline {
-        match &self.ensemble {
-            Some(ensemble) => ensemble.timeline_without_contact(),
-            None => self.motion.timeline_without_contact(),
-        }
-    }
-
-    /// Returns the scene's solver; its chains are placed on the stage and hold all dragons.
-    pub fn solver(&self) -> Box<dyn Solver> {
-        match &self.ensemble {
-            Some(ensemble) => Box::new(ensemble.solver(self.velocities)),
-            None => self.motion.solver(self.velocities).solver,
         }
     }
 
@@ -272,114 +181,11 @@ impl Scene {
     }
 }
 
-/// Returns the place of `[[dragons]]` in a text, if it has several dragons. A text that is not TOML has none, so its
-/// errors are those of a scene of one dragon.
-fn several(text: &str) -> Option<Spanned<serde::de::IgnoredAny>> {
-    // Most scenes have one dragon, and are read once.
+/// Returns the place of `[[dragons]]` in a text, if it has that table. A text that is not TOML has none, so its errors
+/// are those of a scene with `[team]`.
+fn dragons_in(text: &str) -> Option<Spanned<serde::de::IgnoredAny>> {
+    // Most scenes have `[team]`, and are read once.
     text.contains("dragons").then(|| toml::from_str::<Probe>(text).ok()?.dragons).flatten()
-}
-
-/// The text being read, for line numbers.
-#[derive(Clone)]
-struct Source<'a> {
-    text: &'a str,
-    file: &'a str,
-    /// The dragon whose tables are checked, if there are several.
-    dragon: Option<&'a str>,
-    /// The sentences of [`Scene::doubts`].
-    doubts: Rc<RefCell<Vec<String>>>,
-}
-
-impl<'a> Source<'a> {
-    fn new(text: &'a str, file: &'a str) -> Self {
-        Self { text, file, dragon: None, doubts: Rc::default() }
-    }
-
-    /// Reads and checks a scene. An error that follows doubts may come from the first of them.
-    fn scene<T: for<'de> Deserialize<'de>>(
-        &self,
-        validated: impl FnOnce(T) -> Result<Scene, SceneError>,
-    ) -> Result<Scene, SceneError> {
-        let result = validated(self.read()?);
-        let doubts = self.doubts.take();
-        match (result, doubts.first()) {
-            (Ok(scene), _) => Ok(Scene { doubts, ..scene }),
-            (Err(SceneError(sentence)), Some(doubt)) => Err(SceneError(format!("{sentence} ({doubt})"))),
-            (Err(error), None) => Err(error),
-        }
-    }
-
-    /// Notes that a number is accepted, and hardly meant.
-    fn doubt<T>(&self, value: &Spanned<T>, sentence: &str) {
-        let SceneError(sentence) = self.field_error(value, sentence);
-        self.doubts.borrow_mut().push(sentence);
-    }
-
-    fn read<T: for<'de> Deserialize<'de>>(&self) -> Result<T, SceneError> {
-        let deserializer = toml::Deserializer::parse(self.text).map_err(|error| self.toml_error(&error, ""))?;
-        serde_path_to_error::deserialize(deserializer)
-            .map_err(|error| self.toml_error(error.inner(), &error.path().to_string()))
-    }
-
-    fn line(&self, offset: usize) -> usize {
-        self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
-    }
-
-    /// Converts an error of the TOML reader into one sentence.
-    fn toml_error(&self, error: &toml::de::Error, field: &str) -> SceneError {
-        let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
-        // `Spanned` values are wrapped in a field that no user wrote.
-        let field = field.replace(".$__serde_spanned_private_value", "");
-        let line = error.span().map(|span| self.line(span.start));
-        let line = line.and_then(|line| self.text.lines().nth(line - 1)).unwrap_or_default();
-        if let Some(sentence) = mend::sentence(error.message(), &field, line) {
-            return SceneError(format!("{}{place}: {sentence}", self.file));
-        }
-        let field = if field.is_empty() || field == "." { String::new() } else { format!("{field}: ") };
-        let message = error.message().trim().replace('\n', ", ");
-        let message =
-            message.replace("expected i64", "expected an integer").replace("expected f64", "expected a number");
-        SceneError(format!("{}{place}: {field}{message}", self.file))
-    }
-
-    fn field_error<T>(&self, value: &Spanned<T>, sentence: &str) -> SceneError {
-        self.field_error_at(value.span().start, sentence)
-    }
-
-    fn field_error_at(&self, offset: usize, sentence: &str) -> SceneError {
-        let whose = self.dragon.map_or(String::new(), |dragon| format!("dragon \"{dragon}\": "));
-        SceneError(format!("{}, line {}: {whose}{sentence}", self.file, self.line(offset)))
-    }
-
-    /// Returns a name without control characters, since it is printed unchanged.
-    fn printable(&self, field: &str, value: &Spanned<String>) -> Result<String, SceneError> {
-        let name = value.get_ref();
-        if name.chars().any(char::is_control) {
-            let sentence = format!("{field} has a control character in it, expected text of one line");
-            return Err(self.field_error(value, &sentence));
-        }
-        Ok(name.clone())
-    }
-
-    fn check(&self, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
-        accepted.check(field, *value.get_ref()).map_err(|sentence| self.field_error(value, &sentence))
-    }
-
-    /// Returns a place of the stage; by default the origin.
-    fn place(&self, field: &str, value: Option<&Spanned<[f64; 2]>>) -> Result<Vector, SceneError> {
-        let Some(given) = value else { return Ok(Vector::zeros()) };
-        for number in given.get_ref() {
-            let checked = Accepted::PLACE.check(field, *number);
-            checked.map_err(|sentence| self.field_error(given, &sentence))?;
-        }
-        Ok(Vector::from(*given.get_ref()))
-    }
-
-    fn check_count(&self, field: &str, value: &Spanned<i64>, accepted: Accepted) -> Result<usize, SceneError> {
-        let number =
-            accepted.check(field, *value.get_ref() as f64).map_err(|sentence| self.field_error(value, &sentence))?;
-        Ok(number as usize)
-    }
 }
 
 #[derive(Deserialize)]
@@ -419,7 +225,7 @@ struct RawMotion {
     end_hold: Option<Spanned<f64>>,
 }
 
-/// The fields of `[motion]` that a show has once, also with several dragons.
+/// The fields of `[motion]` that a show has once, also with `[[dragons]]`.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawEnds {
@@ -428,7 +234,7 @@ struct RawEnds {
     end_hold: Option<Spanned<f64>>,
 }
 
-/// The tables that a scene has once, also with several dragons.
+/// The tables that a scene has once, also with `[[dragons]]`.
 struct SharedTables {
     name: Option<Spanned<String>>,
     alerts: Option<RawAlerts>,
@@ -474,7 +280,9 @@ impl RawScene {
             None => checked,
         };
         let shared = SharedTables { name, alerts, cues, publish, ends: motion.ends() };
-        Ok(Scene { team_defaults: team.defaults(), ..shared.validated(source, stem, checked, placement)? })
+        let scene = shared.validated(source, stem, Ensemble::alone(checked))?;
+        let placement = Some(placement.unwrap_or(Placement::IDENTITY));
+        Ok(Scene { team_defaults: team.defaults(), placement, ..scene })
     }
 }
 
@@ -509,14 +317,8 @@ fn motion_of(
 }
 
 impl SharedTables {
-    /// Checks the tables. Returns the scene of a motion.
-    fn validated(
-        &self,
-        source: &Source,
-        stem: &str,
-        motion: Motion,
-        placement: Option<Placement>,
-    ) -> Result<Scene, SceneError> {
+    /// Checks the tables. Returns the scene of an ensemble.
+    fn validated(&self, source: &Source, stem: &str, ensemble: Ensemble) -> Result<Scene, SceneError> {
         let name = match &self.name {
             None => stem.to_owned(),
             Some(name) if name.get_ref().trim().is_empty() => {
@@ -535,11 +337,10 @@ impl SharedTables {
         let RawEnds { on_contact, at_end, end_hold } = &self.ends;
         Ok(Scene {
             name,
-            motion,
-            ensemble: None,
+            ensemble,
             team_defaults: Vec::new(),
             doubts: Vec::new(),
-            placement,
+            placement: None,
             on_contact: on_contact.unwrap_or(OnContact::Stop),
             at_end: at_end.unwrap_or(AtEnd::Hold),
             end_hold: end_hold

@@ -11,10 +11,11 @@ fn show(extra: &str, change: impl FnOnce(&mut Playback)) -> Show {
     let text = format!("{}\n{extra}", include_str!("../../../config/paper.toml"));
     let scene = Scene::parse(&text, "test", "test").unwrap();
     // The safe solver needs no table: an unoptimised build would spend seconds on it.
-    let scene = Scene { motion: scene.motion.with_method(Method::Newton).unwrap(), ..scene };
+    let ensemble = scene.ensemble.try_map(|motion| motion.with_method(Method::Newton)).unwrap();
+    let scene = Scene { ensemble, ..scene };
     let mut playback = Playback { rate: RATE, ..Playback::of(&scene) };
     change(&mut playback);
-    let timeline = scene.motion.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut |_| ());
     Show::new(&scene, timeline, playback).unwrap()
 }
 

@@ -3,24 +3,25 @@
 
 use std::time::Instant;
 
-use super::{Candidate, ContactErrors, WARM_UP_FRAMES};
+use super::{Candidate, ContactErrors, Subject, WARM_UP_FRAMES};
 use bench_dragon_motion::solve::newton::Newton;
 use bench_dragon_motion::solve::paper::{Paper, PaperRules};
 use bench_dragon_motion::solve::selection;
 use bench_dragon_motion::solve::table::{FollowerTable, Instructions};
-use bench_dragon_show::scene::Scene;
 
 /// The requested accuracies, in metres. The last selects the most exact table.
 const REQUESTED_ACCURACIES: [f64; 5] = [1e-4, 1e-6, 1e-7, 1e-9, 1e-18];
 
-/// Returns all candidates for a scene, the most exact table on the fastest instructions first.
-pub(super) fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
-    let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
+/// Returns all candidates for a dragon, the most exact table on the fastest instructions first.
+pub(super) fn candidates(subject: &Subject, contact: Option<ContactErrors>) -> Vec<Candidate> {
+    let (path, team, head_speed) = (subject.motion.path(), *subject.motion.team(), subject.motion.head_speed());
     let exact_contact = contact.map(|errors| errors.exact);
     let mut candidates = Vec::new();
     for accuracy in REQUESTED_ACCURACIES.into_iter().rev() {
         // A large team may only have memory for the tables of lower accuracies.
-        let Some(selection) = selection::cheapest(path, team, head_speed, scene.velocities, accuracy) else { continue };
+        let Some(selection) = selection::cheapest(path, team, head_speed, subject.velocities, accuracy) else {
+            continue;
+        };
         let (table, make_s) = (selection.table.for_frames(), selection.made_in.as_secs_f64());
         let requested = if accuracy < REQUESTED_ACCURACIES[REQUESTED_ACCURACIES.len() - 2] {
             "best".to_owned()
@@ -43,7 +44,7 @@ pub(super) fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<C
         }));
     }
     let began = Instant::now();
-    let newton = Newton::new(path.clone(), team, head_speed, scene.velocities);
+    let newton = Newton::new(path.clone(), team, head_speed, subject.velocities);
     candidates.push(Candidate {
         name: "newton".to_owned(),
         warm_up_frames: WARM_UP_FRAMES,
@@ -54,13 +55,13 @@ pub(super) fn candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<C
         make_s: began.elapsed().as_secs_f64(),
         solver: Box::new(newton),
     });
-    candidates.extend(paper_candidates(scene, contact));
+    candidates.extend(paper_candidates(subject, contact));
     candidates
 }
 
 /// Returns the paper's solver with its own numbers and with others, on a spiral.
-fn paper_candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candidate> {
-    let (path, team, head_speed) = (scene.motion.path(), *scene.team(), scene.motion.head_speed());
+fn paper_candidates(subject: &Subject, contact: Option<ContactErrors>) -> Vec<Candidate> {
+    let (path, team, head_speed) = (subject.motion.path(), *subject.motion.team(), subject.motion.head_speed());
     let Some((spiral, start)) = path.as_spiral() else { return Vec::new() };
     // Euler steps of one show. The finest steps would take minutes if there are too many.
     let steps_to_end = |time_step: f64| path.length() / head_speed / time_step;
@@ -81,7 +82,7 @@ fn paper_candidates(scene: &Scene, contact: Option<ContactErrors>) -> Vec<Candid
     }
     let candidate = |(name, rules)| {
         let began = Instant::now();
-        let solver = Paper::new(*spiral, start.high, team, head_speed, scene.velocities, rules);
+        let solver = Paper::new(*spiral, start.high, team, head_speed, subject.velocities, rules);
         let memory_bytes = size_of::<Paper>() + 3 * 8 * team.handles();
         Candidate {
             name,

@@ -1,13 +1,13 @@
 //! The error at the time of display against bytes per second: the gain of a higher publishing rate, for readers that
 //! hold, and for readers with linear or Hermite interpolation.
 //!
-//! In: a scene, its timeline, a display. Out: one [`DisplayMeasurement`] per reader, rate and precision. The stream is
+//! In: a dragon, its timeline, a display. Out: one [`DisplayMeasurement`] per reader, rate and precision. The stream is
 //! simulated: every frame arrives at its deadline, so transport adds neither delay nor jitter. No clock is read, so the
-//! same scene gives the same errors.
+//! same dragon gives the same errors.
 
 use serde::Serialize;
 
-use super::{pareto_front, worse};
+use super::{Subject, pareto_front, worse};
 use bench_dragon_client::hermite::HermiteReader;
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{FrameHeader, HandlePose};
@@ -15,7 +15,6 @@ use bench_dragon_motion::Method;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::convert::handle_pose;
-use bench_dragon_show::scene::Scene;
 use bench_dragon_show::solve_at_or_just_before;
 
 /// The publishing rates, hertz.
@@ -119,22 +118,22 @@ pub struct DisplayMeasurement {
     pub on_front: bool,
 }
 
-/// Measures every reader at every rate on `scene`. `progress` receives the share of the work that is done, from 0 to 1.
+/// Measures every reader at every rate on `subject`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A sentence for a scene without a solution at a sample before its end.
+/// A sentence for a dragon without a solution at a sample before its end.
 pub fn measure(
-    scene: &Scene,
+    subject: &Subject,
     timeline: &Timeline,
     display: Display,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<DisplayMeasurement>, String> {
-    let end = last_frame_time(timeline.show_end(scene.stops_at_contact()).time);
-    let truth = truth(scene, &display_times(end, display.rate))?;
-    let noise = noise(scene, &truth);
+    let end = last_frame_time(timeline.show_end(subject.stops_at_contact).time);
+    let truth = truth(subject, &display_times(end, display.rate))?;
+    let noise = noise(subject, &truth);
     let mut measurements = Vec::new();
     for (index, rate) in RATES.into_iter().enumerate() {
-        let mut stream = Stream::new(scene, rate, end);
+        let mut stream = Stream::new(subject, rate, end);
         for reader in Reader::ALL {
             let period = 1.0 / rate;
             let delay = display.delay.unwrap_or(if reader == Reader::Hold { 0.0 } else { period });
@@ -146,7 +145,7 @@ pub fn measure(
                 display_rate_hz: display.rate,
                 delay_s: delay,
                 max_position_error: error,
-                bytes_per_second: precision.frame_bytes(scene.team().handles()) * rate,
+                bytes_per_second: precision.frame_bytes(subject.motion.team().handles()) * rate,
                 precision,
                 cpu_share: 1e-9 * display.frame_ns * rate,
                 on_front: false,
@@ -195,11 +194,11 @@ struct DisplaySample {
 }
 
 /// Returns the safe solver's chains. The chains always have velocities, which correct for the rounding of the clock.
-fn truth(scene: &Scene, times: &[f64]) -> Result<Vec<DisplaySample>, String> {
-    let exact = scene.motion.with_method(Method::Newton).map_err(|error| error.to_string())?;
+fn truth(subject: &Subject, times: &[f64]) -> Result<Vec<DisplaySample>, String> {
+    let exact = subject.motion.with_method(Method::Newton).map_err(|error| error.to_string())?;
     let mut solver = exact.solver(Velocities::Computed).solver;
     let solved = times.iter().map(|&time| {
-        let mut chain = Chain::new(scene.team().handles());
+        let mut chain = Chain::new(subject.motion.team().handles());
         solve(solver.as_mut(), time, &mut chain)?;
         Ok(DisplaySample { time, chain })
     });
@@ -211,8 +210,8 @@ fn solve(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), St
 }
 
 /// Returns the metres below which errors are rounding, as [`super::Measurement::noise`].
-fn noise(scene: &Scene, truth: &[DisplaySample]) -> f64 {
-    let head_speed = scene.motion.head_speed();
+fn noise(subject: &Subject, truth: &[DisplaySample]) -> f64 {
+    let head_speed = subject.motion.head_speed();
     let of_sample = |DisplaySample { time, chain }: &DisplaySample| {
         let of_handle = |handle: usize| {
             let reach = chain.x[handle].hypot(chain.y[handle]) + head_speed * time;
@@ -242,9 +241,9 @@ struct Stream {
 }
 
 impl Stream {
-    fn new(scene: &Scene, rate: f64, end: f64) -> Self {
-        let solver = scene.motion.solver(scene.velocities).solver;
-        Self { solver, rate, end, chain: Chain::new(scene.team().handles()), latest: [None, None] }
+    fn new(subject: &Subject, rate: f64, end: f64) -> Self {
+        let solver = subject.motion.solver(subject.velocities).solver;
+        Self { solver, rate, end, chain: Chain::new(subject.motion.team().handles()), latest: [None, None] }
     }
 
     /// Returns the greatest error of a reader over all samples, in both precisions, in metres.

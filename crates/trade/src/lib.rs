@@ -1,6 +1,6 @@
-//! Accuracy against cost: measures every solver on one scene and this machine, against the high-precision reference.
+//! Accuracy against cost: measures every solver on one dragon and this machine, against the high-precision reference.
 //!
-//! In: a scene and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them, with
+//! In: a dragon and its timeline. Out: one [`Measurement`] per solver. The `trade` command prints and draws them, with
 //! the results of [`display`]: the error at the time of display against bytes per second.
 
 mod candidates;
@@ -12,7 +12,6 @@ use std::time::Instant;
 use serde::Serialize;
 
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::Method;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::separation_board_board;
@@ -20,7 +19,7 @@ use bench_dragon_motion::solve::paper::PaperRules;
 use bench_dragon_motion::solve::reference::{Reference, ReferenceHandle};
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::Timeline;
-use bench_dragon_show::scene::Scene;
+use bench_dragon_motion::{Method, Motion};
 
 /// The number of samples of the error, spread evenly over the motion before its last second.
 pub const SPREAD_SAMPLES: usize = 200;
@@ -66,7 +65,7 @@ pub struct Measurement {
     pub bytes_per_handle: Option<f64>,
     /// The time to make the solver, once, including its measurements, in seconds.
     pub make_s: f64,
-    /// The cost of collision search on this scene; only with the first solver.
+    /// The cost of collision search; only with the first solver.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub collision: Vec<CollisionMeasurement>,
     /// True if no other solver is both faster and more exact. Errors below the noise are equal.
@@ -99,44 +98,61 @@ struct Candidate {
     make_s: f64,
 }
 
+/// A dragon, measured alone in its own time.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// Its motion.
+    pub motion: Motion,
+    /// The velocities: computed or not.
+    pub velocities: Velocities,
+    /// The rate, in frames per second.
+    pub rate: f64,
+    /// True if its show stops at a contact.
+    pub stops_at_contact: bool,
+}
+
 /// The true positions at one time.
 struct ReferenceSample {
     time: f64,
     handles: Vec<ReferenceHandle>,
 }
 
-/// Measures every solver on `scene`. `progress` receives the share of the work that is done, from 0 to 1.
+/// Measures every solver on `subject`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
 /// A sentence if the reference has no solution.
-pub fn measure(scene: &Scene, timeline: &Timeline, progress: &mut dyn FnMut(f64)) -> Result<Vec<Measurement>, String> {
+pub fn measure(
+    subject: &Subject,
+    timeline: &Timeline,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Measurement>, String> {
     let end = timeline.end().time;
-    let samples = truth(scene, end, &mut |share| progress(0.5 * share))?;
-    let contact = contact_errors(scene, timeline)?;
-    let noise = noise(scene, &samples);
-    let candidates = candidates::candidates(scene, contact);
+    let samples = truth(subject, end, &mut |share| progress(0.5 * share))?;
+    let contact = contact_errors(subject, timeline)?;
+    let noise = noise(subject, &samples);
+    let candidates = candidates::candidates(subject, contact);
     let count = candidates.len() as f64;
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {
-        measurements.push(measured(scene, candidate, &samples, noise, end));
+        measurements.push(measured(subject, candidate, &samples, noise, end));
         progress(0.5 + 0.5 * (index + 1) as f64 / count);
     }
     mark_pareto_front(&mut measurements);
     if let Some(first) = measurements.first_mut() {
-        first.collision = collision::measure(scene, timeline, first.contact_time_error, first.frame_ns);
+        first.collision = collision::measure(subject, timeline, first.contact_time_error, first.frame_ns);
     }
     Ok(measurements)
 }
 
-/// Returns the high-precision reference of a scene.
-fn reference(scene: &Scene) -> Result<Reference, String> {
-    let motion = &scene.motion;
+/// Returns the high-precision reference of a dragon.
+fn reference(subject: &Subject) -> Result<Reference, String> {
+    let motion = &subject.motion;
     Reference::new(*motion.team(), motion.description(), motion.head_speed())
 }
 
 /// Returns the reference at all samples. At the lock itself the solution is lost in rounding, so the last sample is a
 /// thousandth of a second earlier.
-fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
+fn truth(subject: &Subject, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
     let last_second = 1f64.min(0.5 * end);
     let spread = (0..SPREAD_SAMPLES).map(|k| (end - last_second) * k as f64 / SPREAD_SAMPLES as f64);
     let last = (0..LAST_SECOND_SAMPLES)
@@ -144,15 +160,15 @@ fn truth(scene: &Scene, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<R
     let times: Vec<f64> = spread.chain(last).collect();
     let (first, second) = times.split_at(times.len() / 2);
     std::thread::scope(|scope| {
-        let second = scope.spawn(|| samples(scene, second, &mut |_| ()));
-        let mut all = samples(scene, first, progress)?;
+        let second = scope.spawn(|| samples(subject, second, &mut |_| ()));
+        let mut all = samples(subject, first, progress)?;
         all.extend(second.join().map_err(|_| "the reference's second thread panicked".to_owned())??);
         Ok(all)
     })
 }
 
-fn samples(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
-    let mut reference = reference(scene)?;
+fn samples(subject: &Subject, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
+    let mut reference = reference(subject)?;
     let mut samples = Vec::with_capacity(times.len());
     for &time in times {
         let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
@@ -163,8 +179,8 @@ fn samples(scene: &Scene, times: &[f64], progress: &mut dyn FnMut(f64)) -> Resul
 }
 
 /// Returns an upper bound of the rounding of a pose: see [`Measurement::noise`].
-fn noise(scene: &Scene, samples: &[ReferenceSample]) -> f64 {
-    let speed = scene.motion.head_speed();
+fn noise(subject: &Subject, samples: &[ReferenceSample]) -> f64 {
+    let speed = subject.motion.head_speed();
     let of_handle = |time: f64, handle: &ReferenceHandle| {
         let reach = handle.x.high.hypot(handle.y.high) + speed * time;
         8.0 * f64::EPSILON * reach * (handle.speed / speed).abs().max(1.0)
@@ -182,34 +198,40 @@ struct ContactErrors {
 
 /// Returns the errors of the contact's time. The exact motion's error is the gap of the two boards in the reference at
 /// that time, divided by the closing speed. Returns `None` without a contact, or if the contact is at the very start.
-fn contact_errors(scene: &Scene, timeline: &Timeline) -> Result<Option<ContactErrors>, String> {
+fn contact_errors(subject: &Subject, timeline: &Timeline) -> Result<Option<ContactErrors>, String> {
     let Some(contact) = timeline.find(EventKind::Contact) else { return Ok(None) };
     let (Some(a), Some(b)) = (contact.event.bench_a, contact.event.bench_b) else { return Ok(None) };
-    let time = contact.event.travelled / scene.motion.head_speed();
+    let time = contact.event.travelled / subject.motion.head_speed();
     if time == 0.0 {
         return Ok(None);
     }
-    let mut reference = reference(scene)?;
+    let mut reference = reference(subject)?;
     let mut gap = |time: f64| {
         let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
         let board = |bench: u32| {
             let point = |handle: usize| Point::new(handles[handle].x.high, handles[handle].y.high);
             let (front, rear) = (point(bench as usize), point(bench as usize + 1));
-            Board::from_handles(front, rear, scene.team().hole_inset, scene.team().width)
+            Board::from_handles(front, rear, subject.motion.team().hole_inset, subject.motion.team().width)
         };
         Ok::<f64, String>(separation_board_board(&board(a), &board(b)))
     };
     let interval = 1e-7 * time;
     let closing = (gap(time - interval)? - gap(time)?) / interval;
     let exact = (gap(time)? / closing).abs();
-    let of_paper = scene.motion.with_method(Method::Paper(PaperRules::default()));
+    let of_paper = subject.motion.with_method(Method::Paper(PaperRules::default()));
     let paper = of_paper.map_or(f64::NAN, |motion| (motion.time_at(contact.event.travelled) - time).abs());
     Ok(Some(ContactErrors { exact, paper }))
 }
 
-fn measured(scene: &Scene, mut candidate: Candidate, samples: &[ReferenceSample], noise: f64, end: f64) -> Measurement {
-    let errors = errors(scene, &mut candidate, samples);
-    let mut times = frame_times(scene, candidate.solver.as_mut(), end);
+fn measured(
+    subject: &Subject,
+    mut candidate: Candidate,
+    samples: &[ReferenceSample],
+    noise: f64,
+    end: f64,
+) -> Measurement {
+    let errors = errors(subject, &mut candidate, samples);
+    let mut times = frame_times(subject, candidate.solver.as_mut(), end);
     times.sort_unstable();
     let quantile = |share| quantile(&times, share);
     Measurement {
@@ -221,7 +243,7 @@ fn measured(scene: &Scene, mut candidate: Candidate, samples: &[ReferenceSample]
         frames_timed: times.len(),
         max_position_error: errors.position,
         noise,
-        max_speed_error: (scene.velocities == Velocities::Computed).then_some(errors.speed),
+        max_speed_error: (subject.velocities == Velocities::Computed).then_some(errors.speed),
         contact_time_error: candidate.contact_time_error,
         max_link_error: errors.link,
         memory_bytes: candidate.memory_bytes,
@@ -237,11 +259,11 @@ fn quantile(times: &[u64], share: f64) -> f64 {
     times.get((share * times.len() as f64) as usize).map_or(f64::NAN, |ns| *ns as f64)
 }
 
-/// Returns the nanoseconds per frame of the solver chosen for `scene`, the median over the show, as
+/// Returns the nanoseconds per frame of the solver chosen for `subject`, the median over the show, as
 /// [`Measurement::frame_ns`].
-pub fn publisher_frame_ns(scene: &Scene, timeline: &Timeline) -> f64 {
-    let mut solver = scene.motion.solver(scene.velocities).solver;
-    let mut times = frame_times(scene, solver.as_mut(), timeline.end().time);
+pub fn publisher_frame_ns(subject: &Subject, timeline: &Timeline) -> f64 {
+    let mut solver = subject.motion.solver(subject.velocities).solver;
+    let mut times = frame_times(subject, solver.as_mut(), timeline.end().time);
     times.sort_unstable();
     quantile(&times, 0.5)
 }
@@ -253,12 +275,12 @@ struct Errors {
     link: f64,
 }
 
-fn errors(scene: &Scene, candidate: &mut Candidate, samples: &[ReferenceSample]) -> Errors {
-    let mut chain = Chain::new(scene.team().handles());
+fn errors(subject: &Subject, candidate: &mut Candidate, samples: &[ReferenceSample]) -> Errors {
+    let mut chain = Chain::new(subject.motion.team().handles());
     let mut worst = Errors::default();
     for sample in samples {
         for frame in (0..=candidate.warm_up_frames).rev() {
-            let time = (sample.time - frame as f64 / scene.rate).max(0.0);
+            let time = (sample.time - frame as f64 / subject.rate).max(0.0);
             // The paper's solver is ahead of the truth, so it locks a little earlier. All samples from there on are
             // left out.
             if candidate.solver.solve(time, &mut chain).is_err() {
@@ -270,9 +292,9 @@ fn errors(scene: &Scene, candidate: &mut Candidate, samples: &[ReferenceSample])
             worst.position = worse(worst.position, error);
             worst.speed = worse(worst.speed, ((chain.speed[i] - truth.speed) / truth.speed).abs());
         }
-        for bench in 0..scene.team().benches {
+        for bench in 0..subject.motion.team().benches {
             let (dx, dy) = (chain.x[bench + 1] - chain.x[bench], chain.y[bench + 1] - chain.y[bench]);
-            worst.link = worse(worst.link, (dx.hypot(dy) - scene.team().link(bench)).abs());
+            worst.link = worse(worst.link, (dx.hypot(dy) - subject.motion.team().link(bench)).abs());
         }
     }
     worst
@@ -285,14 +307,14 @@ fn worse(one: f64, other: f64) -> f64 {
 
 /// Returns the nanoseconds of each frame. If there are too many frames, or the solver is too slow for all, runs of
 /// frames evenly over the show are timed.
-fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
+fn frame_times(subject: &Subject, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
     const RUN: usize = 50;
-    let mut chain = Chain::new(scene.team().handles());
-    let frames = (end * scene.rate) as usize;
+    let mut chain = Chain::new(subject.motion.team().handles());
+    let frames = (end * subject.rate) as usize;
     let began = Instant::now();
     let _ = solver.solve(0.0, &mut chain);
     for frame in 1..=20 {
-        let _ = solver.solve(frame as f64 / scene.rate, &mut chain);
+        let _ = solver.solve(frame as f64 / subject.rate, &mut chain);
     }
     let each = began.elapsed().as_secs_f64() / 21.0;
     let wanted = TIMED_FRAMES.min((TIMING_LIMIT / each) as usize).clamp(RUN, frames.max(RUN));
@@ -302,7 +324,7 @@ fn frame_times(scene: &Scene, solver: &mut dyn Solver, end: f64) -> Vec<u64> {
     for run in 0..runs {
         let first = frames.saturating_sub(RUN) * run / runs.max(2).saturating_sub(1);
         for k in 0..RUN + 3 {
-            let time = (first + k) as f64 / scene.rate;
+            let time = (first + k) as f64 / subject.rate;
             let begun = Instant::now();
             let solved = time <= end && solver.solve(time, &mut chain).is_ok();
             let nanoseconds = (begun.elapsed().as_nanos() as u64).saturating_sub(clock);

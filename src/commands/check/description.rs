@@ -1,6 +1,6 @@
 //! The report of `check` on a scene without its motion: teams, paths, placements, solvers, alerts and outputs.
 
-use bench_dragon::motion::ensemble::{Dragon, Ensemble};
+use bench_dragon::motion::ensemble::Dragon;
 use bench_dragon::motion::model::segment::SegmentOutline;
 use bench_dragon::motion::placement::Placement;
 use bench_dragon::motion::solve::Velocities;
@@ -16,28 +16,28 @@ pub(super) fn describe(scene: &Scene, warnings: &[String], output: &mut Output) 
     warnings.iter().try_for_each(|warning| output.line(&format!("  Warning: {warning}")))?;
     dragons(scene, output)?;
     if !scene.team_defaults.is_empty() {
-        let separator = if scene.ensemble.is_some() { "; " } else { ", " };
+        let separator = if scene.ensemble.only().is_some() { ", " } else { "; " };
         output.line(&format!("  By default, in metres: {}.", scene.team_defaults.join(separator)))?;
     }
-    if !scene.ground().is_empty() {
+    if !scene.ensemble.ground().is_empty() {
         output.line(&format!("  Stage: {}.", ground(scene)))?;
     }
-    let choice = scene.ensemble.is_none().then(|| scene.motion.solver(scene.velocities));
-    solvers(scene, choice.as_ref(), output)?;
-    alerts(scene, choice.as_ref(), output)?;
+    let choices: Vec<Choice> =
+        scene.ensemble.dragons().iter().map(|dragon| dragon.motion.solver(scene.velocities)).collect();
+    solvers(scene, &choices, output)?;
+    alerts(scene, &choices, output)?;
     publishing(scene, output)
 }
 
-/// Prints each dragon, with its place among several.
+/// Prints each dragon; with a name, also its place in the show.
 fn dragons(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
-    let Some(ensemble) = &scene.ensemble else {
-        return dragon(&scene.motion, scene.placement.as_ref(), output);
-    };
-    for (k, Dragon { name, delay, motion }) in ensemble.dragons().iter().enumerate() {
-        let handles = ensemble.handles_of(k);
+    for (k, Dragon { name, delay, motion }) in scene.ensemble.dragons().iter().enumerate() {
+        let handles = scene.ensemble.handles_of(k);
         let (first, last) = (handles.start, handles.end - 1);
-        output.line(&format!("  Dragon {}, {name}: handles {first} to {last}, counting from 0.", k + 1))?;
-        dragon(motion, Some(motion.placement()), output)?;
+        if !name.is_empty() {
+            output.line(&format!("  Dragon {}, {name}: handles {first} to {last}, counting from 0.", k + 1))?;
+        }
+        dragon(motion, scene.placement.as_ref().unwrap_or(motion.placement()), output)?;
         if *delay > 0.0 {
             output.line(&format!("  It stands at its start for {} s.", number(*delay)))?;
         }
@@ -45,13 +45,10 @@ fn dragons(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Prints the solver of each dragon, and whether velocities are computed. `choice` is the solver of a dragon alone.
-fn solvers(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Result<(), CommandError> {
-    if let Some(choice) = choice {
-        output.line(&format!("  Solver: {}.", choice.reason))?;
-    }
-    for Dragon { name, motion, .. } in scene.ensemble.iter().flat_map(Ensemble::dragons) {
-        output.line(&format!("  Solver of {name}: {}.", motion.solver(scene.velocities).reason))?;
+/// Prints the solver of each dragon, and whether velocities are computed.
+fn solvers(scene: &Scene, choices: &[Choice], output: &mut Output) -> Result<(), CommandError> {
+    for (dragon, choice) in scene.ensemble.dragons().iter().zip(choices) {
+        output.line(&format!("  {}: {}.", dragon.titled("Solver"), choice.reason))?;
     }
     output.line(match scene.velocities {
         Velocities::Computed => "  Velocities: computed for every handle.",
@@ -60,15 +57,15 @@ fn solvers(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Resul
 }
 
 /// Prints the rules of alerts, and what the show does at a contact and at its end.
-fn alerts(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Result<(), CommandError> {
+fn alerts(scene: &Scene, choices: &[Choice], output: &mut Output) -> Result<(), CommandError> {
     match scene.alerts {
         Some(rules) => {
             output.line(&format!(
                 "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
                 rules.approach_time, rules.approach_clearance
             ))?;
-            if let Some(choice) = choice {
-                let monitor = scene.motion.clearance_monitor(choice);
+            if let (Some(motion), [choice]) = (scene.ensemble.only(), choices) {
+                let monitor = motion.clearance_monitor(choice);
                 output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
             }
         }
@@ -110,7 +107,7 @@ fn publishing(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
 }
 
 /// Prints the team, the path and the placement of a dragon.
-fn dragon(motion: &Motion, placement: Option<&Placement>, output: &mut Output) -> Result<(), CommandError> {
+fn dragon(motion: &Motion, placement: &Placement, output: &mut Output) -> Result<(), CommandError> {
     let team = motion.team();
     output.line(&format!(
         "  Team: {} benches, {} handles; head board {} m, the others {} m, {} m wide, holes {} m from the ends.",
@@ -122,7 +119,7 @@ fn dragon(motion: &Motion, placement: Option<&Placement>, output: &mut Output) -
         team.hole_inset
     ))?;
     output.line(&format!("  Path: {}; the head moves at {} m/s.", path(motion), motion.head_speed()))?;
-    match placement.and_then(placed) {
+    match placed(placement) {
         Some(sentence) => output.line(&format!("  {sentence}")),
         None => Ok(()),
     }
@@ -141,7 +138,7 @@ fn placed(placement: &Placement) -> Option<String> {
 
 /// Describes the obstacles in words.
 fn ground(scene: &Scene) -> String {
-    let ground = scene.ground();
+    let ground = scene.ensemble.ground();
     let obstacles = ground.obstacles().len() - usize::from(ground.has_boundary());
     let counted = match obstacles {
         0 => "no obstacle".to_owned(),

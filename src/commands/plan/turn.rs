@@ -28,9 +28,9 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
     if let Some(ratio) = arc_ratio {
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
-    let scene: Scene = common.scene_text()?.parse()?;
+    let (scene, motion) = common.scene_text()?.parse_only()?;
     super::warn_of_obstacles(&scene);
-    let description = scene.motion.description();
+    let description = motion.description();
     let Some(pitch) = description.pitch().or_else(|| description.pitch_of_turn()) else {
         let sentence = "the scene's path is a route without a turn, or with several: expected path.kind \"spiral\" or \
                         \"turnaround\", or a route with one piece of kind \"turn\"";
@@ -38,7 +38,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
     };
     let bar = progress_bar(1000, common).with_message("searching for the turn");
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let found = least_turn(scene.team(), pitch, arc_ratio, &mut progress)?;
+    let found = least_turn(motion.team(), pitch, arc_ratio, &mut progress)?;
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {

@@ -33,7 +33,7 @@ pub(super) fn verify(common: &Common, file: &Path) -> Result<(), CommandError> {
         )));
     };
     let name = contents.scene.clone().unwrap_or_else(|| "scene".to_owned());
-    let scene = Scene::parse_any(&text, &format!("{shown}, scene.toml"), &name)?;
+    let scene = Scene::parse(&text, &format!("{shown}, scene.toml"), &name)?;
     let hash = scene_hash(&text);
     if hash != contents.stage.stage.scene_hash {
         return Err(CommandError::Failed(format!(

@@ -51,12 +51,13 @@ impl Found {
     /// Searches the scene of a certificate; `None` if it is refused.
     pub fn new(text: &str) -> Option<Self> {
         let scene = scene(text)?;
-        let timeline = scene.motion.timeline(&mut |_| ());
-        let mut solver = scene.motion.with_method(Method::Newton).ok()?.solver(Velocities::Computed).solver;
+        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let mut solver =
+            scene.ensemble.only().unwrap().with_method(Method::Newton).ok()?.solver(Velocities::Computed).solver;
         let end = timeline.end().time;
         let times = (0..FRAMES).map(|frame| f64::from(frame) / f64::from(FRAMES) * end);
         let frames = times.filter_map(|time| {
-            let mut chain = Chain::new(scene.team().handles());
+            let mut chain = Chain::new(scene.ensemble.handles());
             solver.solve(time, &mut chain).ok()?;
             Some((time, chain))
         });
@@ -86,7 +87,7 @@ impl Found {
             EventKind::PathEnd => Kind::PathEnd,
             EventKind::Obstacle => Kind::Obstacle,
         };
-        let obstacle = outcome.obstacle.map(|number| self.scene.motion.obstacle_number(number));
+        let obstacle = outcome.obstacle.map(|number| self.scene.ensemble.obstacle_number(number));
         let mut events = self.timeline.events().iter().map(|timed| (timed.event, timed.time));
         let is_it = |event: &Event| event.kind == kind && (obstacle.is_none() || event.bench_b == obstacle);
         let found = events.find(|(event, _)| is_it(event)).map(|(_, time)| time);
@@ -112,12 +113,13 @@ impl Found {
         };
         let Some(until) = until else { return false };
         let is_apart = |chain: &Chain, lo: f64| {
-            least_clearance_all_pairs(chain, self.scene.team()).is_none_or(|pair| pair.value >= lo - CLOSE)
+            least_clearance_all_pairs(chain, self.scene.ensemble.only().unwrap().team())
+                .is_none_or(|pair| pair.value >= lo - CLOSE)
         };
         let least = || {
-            let motion = &self.scene.motion;
-            let found = motion.least_clearance(&self.timeline, self.timeline.end(), &mut |_| ());
-            Some(found?.least.value).filter(|_| self.timeline.searched_until().is_none())
+            let ensemble = &self.scene.ensemble;
+            let found = ensemble.least_clearances(&self.timeline, self.timeline.end(), &mut |_| ());
+            Some(found.own?.least.value).filter(|_| self.timeline.searched_until().is_none())
         };
         let mut frames = self.frames.iter().filter(|(time, _)| *time <= until);
         claim.lo.is_none_or(|lo| frames.all(|(_, chain)| is_apart(chain, lo)))
@@ -127,7 +129,7 @@ impl Found {
     /// Returns true if no handle is faster in a frame than the upper bound. Also, the lower bound must not be above the
     /// greatest ratio that the search finds.
     fn has_speed(&self, claim: &ProvedSpeed) -> bool {
-        let ratio = |x: &f64, y: &f64| x.hypot(*y) / self.scene.motion.head_speed();
+        let ratio = |x: &f64, y: &f64| x.hypot(*y) / self.scene.ensemble.only().unwrap().head_speed();
         let is_slow =
             |chain: &Chain| chain.vx.iter().zip(&chain.vy).all(|(x, y)| ratio(x, y) <= claim.ratio_hi + CLOSE);
         let mut frames = self.frames.iter().filter(|(time, _)| *time <= claim.time_until);
@@ -139,7 +141,8 @@ impl Found {
 
     /// Returns true if the claim agrees with the ordinary search for the least pitch.
     fn has_pitch(&self, claim: &ProvedPitch) -> bool {
-        let find = || (claim.radius, least_pitch(self.scene.team(), claim.radius, &mut |_| ()).ok());
+        let find =
+            || (claim.radius, least_pitch(self.scene.ensemble.only().unwrap().team(), claim.radius, &mut |_| ()).ok());
         let (radius, found) = *self.pitch.get_or_init(find);
         let found = if radius == claim.radius { found } else { find().1 };
         // Every pitch may reach the radius, or none.
@@ -153,12 +156,12 @@ impl Found {
 /// Returns the lines of a scene's certificate.
 pub fn certificate(text: &str) -> Vec<Value> {
     let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
-    let timeline = scene.motion.timeline(&mut |_| {});
+    let timeline = scene.ensemble.timeline(&mut |_| {});
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| {
         lines.push(serde_json::to_value(line).unwrap());
         Ok::<(), std::io::Error>(())
     };
-    certify::certify(&scene.motion, &timeline, text, certify::MOST_STEPS, &mut write, &mut |_| {}).unwrap();
+    certify::certify(&scene.ensemble, &timeline, text, certify::MOST_STEPS, &mut write, &mut |_| {}).unwrap();
     lines
 }

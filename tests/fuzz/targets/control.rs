@@ -39,7 +39,7 @@ fn scene(pauses: bool) -> &'static (Scene, Timeline) {
                     [[cues]]\nname = \"end\"\nat = 20.0\n";
         let text = if pauses { text.to_owned() } else { text.replace("then = \"pause\"\n", "") };
         let scene = Scene::parse(&text, "control.toml", "control").expect("a scene");
-        let timeline = scene.motion.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact();
         (scene, timeline)
     })
 }

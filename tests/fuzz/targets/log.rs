@@ -252,8 +252,8 @@ fn timeline(text: &str, scene: &Scene) -> Timeline {
         known.clear();
     }
     let search = || match scene.alerts {
-        Some(_) => scene.motion.timeline(&mut |_| ()),
-        None => scene.motion.timeline_without_contact(),
+        Some(_) => scene.ensemble.timeline(&mut |_| ()),
+        None => scene.ensemble.timeline_without_contact(),
     };
     known.entry(text.to_owned()).or_insert_with(search).clone()
 }

@@ -107,20 +107,21 @@ pub fn is_quick(scene: &Scene) -> bool {
 }
 
 fn is_within(scene: &Scene, benches: usize, links: f64) -> bool {
-    let team = scene.team();
-    let paper_steps = match scene.motion.method() {
-        Method::Paper(rules) => scene.motion.path().length() / scene.motion.head_speed() / rules.time_step,
+    let motion = scene.ensemble.only().unwrap();
+    let team = motion.team();
+    let paper_steps = match motion.method() {
+        Method::Paper(rules) => motion.path().length() / motion.head_speed() / rules.time_step,
         _ => 0.0,
     };
     team.benches <= benches
-        && scene.motion.path().length() + team.length() <= links * team.shortest_link()
+        && motion.path().length() + team.length() <= links * team.shortest_link()
         && paper_steps <= MOST_PAPER_STEPS
 }
 
 fn play(scene: &Scene) {
     let timeline = match scene.alerts {
-        Some(_) => scene.motion.timeline(&mut |_| ()),
-        None => scene.motion.timeline_without_contact(),
+        Some(_) => scene.ensemble.timeline(&mut |_| ()),
+        None => scene.ensemble.timeline_without_contact(),
     };
     let is_searched = timeline.searched_until().is_none();
     let stop = timeline.show_end(scene.stops_at_contact()).time;
@@ -130,7 +131,7 @@ fn play(scene: &Scene) {
     let time_scale = (1.1 * stop * playback.rate / FRAMES as f64).clamp(1e-6, 1e6);
     // A show that begins where it ends is refused.
     let Ok(mut show) = Show::new(scene, timeline, Playback { time_scale, ..playback }) else { return };
-    let stage = stage(1, 0, [0; 32], &scene.motion, &show);
+    let stage = stage(1, 0, [0; 32], &scene.ensemble, &show);
     let stage = stage.stage;
     let dragon = stage.first_dragon();
     let sizes = [dragon.hole_inset, dragon.head_length, dragon.body_length, dragon.width, stage.freeze_time];
@@ -152,7 +153,7 @@ fn play(scene: &Scene) {
 
 /// Checks the promises about a frame.
 fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
-    let (chain, team, tick) = (&frame.chain, scene.team(), frame.tick);
+    let (chain, team, tick) = (&frame.chain, scene.ensemble.only().unwrap().team(), frame.tick);
     let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
     assert!(finite(&[frame.sim_time, frame.time_scale]), "tick {tick}: {} s", frame.sim_time);
     assert!(finite(&chain.x) && finite(&chain.y) && finite(&chain.heading), "tick {tick}: {chain:?}");
@@ -164,7 +165,7 @@ fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
     if scene.alerts.is_some() && team.benches >= 3 {
         assert!(frame.min_clearance.is_finite(), "tick {tick}: {} m", frame.min_clearance);
     }
-    if matches!(scene.motion.method(), Method::Paper(_)) {
+    if !scene.ensemble.is_exact() {
         return;
     }
     assert!(!is_searched || frame.unsolved_frames == 0, "tick {tick}: unsolved at {} s", frame.sim_time);
@@ -173,7 +174,7 @@ fn check(scene: &Scene, frame: &Frame, is_searched: bool) {
     for bench in 0..team.benches {
         let link = (chain.x[bench] - chain.x[bench + 1]).hypot(chain.y[bench] - chain.y[bench + 1]);
         let ulp = furthest.next_up() - furthest;
-        let tolerance = 1e-12 * team.link(bench) + 4.0 * ulp + scene.motion.link_tolerance();
+        let tolerance = 1e-12 * team.link(bench) + 4.0 * ulp + scene.ensemble.link_tolerance();
         let off = (link - team.link(bench)).abs();
         assert!(off <= tolerance, "tick {tick}, bench {bench}: off by {off:e} m, expected {tolerance:e}");
     }

@@ -44,7 +44,7 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
         assert!(same_bits(value, value_hi) && value_lo < value_hi && value_hi - value_lo <= 1e-9, "{plan}");
         assert!(radius >= REACH && from < value_lo, "{}: {plan}", scene.name);
         if scene.name == "school" {
-            let known = least_pitch(scene.load().team(), REACH, &mut |_| ()).unwrap();
+            let known = least_pitch(scene.load().ensemble.only().unwrap().team(), REACH, &mut |_| ()).unwrap();
             let overlap = known.overlap.unwrap();
             let bounds =
                 [(value_lo, known.value_lo), (value_hi, known.value_hi.unwrap()), (radius, overlap.head_radius)];
@@ -91,7 +91,7 @@ fn plan_speed_has_its_keys_or_names_what_forbids_it() {
         planned += 1;
         if scene.benches() <= 60 {
             let loaded = scene.load();
-            let timeline = loaded.motion.timeline(&mut |_| ());
+            let timeline = loaded.ensemble.timeline(&mut |_| ());
             let known = greatest_speed(&loaded, &timeline, LIMIT, &mut |_| ()).unwrap();
             let bounds = [(value_lo, known.value_lo), (value_hi, known.value_hi)];
             for (printed, known) in bounds.into_iter().chain([(time, known.time), (ratio, known.ratio)]) {

@@ -12,7 +12,7 @@ const KINDS: [&str; 4] = ["contact", "stall", "lock", "path_end"];
 fn events_as_json_are_the_timeline_bit_for_bit() {
     for scene in scenes() {
         let lines = scene.answer(&["events", "--json"]);
-        let timeline = scene.load().motion.timeline(&mut |_| ());
+        let timeline = scene.load().ensemble.timeline(&mut |_| ());
         assert_eq!(lines.lines().count(), timeline.events().len(), "{}: {lines}", scene.name);
         for (line, timed) in lines.lines().zip(timeline.events()) {
             let event: Value = serde_json::from_str(line).unwrap();
@@ -205,5 +205,5 @@ fn check_states_what_each_scene_models() {
 
 /// Returns the time of the event of that kind in the library's timeline.
 pub fn time_of(scene: &SceneFile, kind: EventKind) -> Option<f64> {
-    scene.load().motion.timeline(&mut |_| ()).find(kind).map(|timed| timed.time)
+    scene.load().ensemble.timeline(&mut |_| ()).find(kind).map(|timed| timed.time)
 }

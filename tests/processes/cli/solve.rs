@@ -58,7 +58,7 @@ fn read_json(scene: &SceneFile, lines: &str) -> Vec<SolvedTime> {
 /// Returns the results of the library's own solver at these times.
 fn solved(scene: &SceneFile, times: &[f64]) -> Vec<SolvedTime> {
     let loaded = scene.load();
-    let mut solver = loaded.motion.solver(loaded.velocities).solver;
+    let mut solver = loaded.ensemble.only().unwrap().solver(loaded.velocities).solver;
     let mut chain = Chain::new(scene.handles());
     let mut moment = |time: &f64| {
         solve_at_or_just_before(solver.as_mut(), *time, &mut chain).unwrap();
@@ -82,7 +82,7 @@ fn assert_same(scene: &SceneFile, printed: &[SolvedTime], expected: &[SolvedTime
 
 /// Returns times not in order, one of them twice, and every event of this scene by its name.
 fn times(scene: &SceneFile) -> (String, Vec<f64>) {
-    let timeline = scene.load().motion.timeline(&mut |_| ());
+    let timeline = scene.load().ensemble.timeline(&mut |_| ());
     let mut times = vec![("1.25".to_owned(), 1.25), ("0".to_owned(), 0.0), ("1.25".to_owned(), 1.25)];
     times.extend(timeline.events().iter().map(|timed| (timed.event.kind.name().to_owned(), timed.time)));
     times.push(("1e-3".to_owned(), 1e-3));

@@ -1,6 +1,6 @@
-//! The least clearances of a show of several dragons, first of each dragon alone, then of each two. For each two,
-//! stretches of time show that the boards are further apart than a number of metres, and one more time shows two boards
-//! that are no further apart. Lemma 12 of `docs/proofs.md`.
+//! The least clearances of a show, first of each dragon alone, then of each two. For each two, stretches of time show
+//! that the boards are further apart than a number of metres, and one more time shows two boards that are no further
+//! apart. Lemma 12 of `docs/proofs.md`.
 
 use super::side::{Extent, Side};
 use super::{Aim, PairSearch, Write};
@@ -39,9 +39,9 @@ pub(super) struct UpperBetween {
     benches: [usize; 2],
 }
 
-/// The enclosures of a show of several dragons.
+/// The enclosures of the dragons of a show.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SeveralClearances {
+pub struct EnsembleClearances {
     /// The enclosures of each dragon alone, at its own travel.
     pub own: Vec<ClearanceEnclosures>,
     /// The enclosures of each two, in the order of [`pairs`].
@@ -67,40 +67,49 @@ pub struct BetweenEnclosure {
 }
 
 /// Encloses least clearances from the start of a show until the show ends at `show_end`, and writes a certificate. The
-/// clearances are those of each dragon, of each obstacle and each dragon, and of each two dragons. `scene` is the text
-/// of the scene. Each search gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1.
+/// clearances are those of each dragon, of each obstacle and each dragon, and of each two dragons. `hints` are for a
+/// dragon without a name; for others the ordinary search makes them. `scene` is the text of the scene. Each search
+/// gives up after `most_steps`. `progress` receives the share that is done, from 0 to 1. The enclosures are a nanometre
+/// wide, unless a search gives up. The certificate of a show that ends with a lock ends a nanometre of travel before
+/// the lock.
 ///
 /// # Errors
 /// [`CertifyError::Write`]
-pub fn certify_several_clearances(
+pub fn certify_clearances(
     ensemble: &Ensemble,
     show_end: &TimedEvent,
+    hints: ClearanceHints<'_>,
     scene: &str,
     most_steps: u64,
     write: Write<'_>,
     progress: &mut dyn FnMut(f64),
-) -> Result<SeveralClearances, CertifyError> {
+) -> Result<EnsembleClearances, CertifyError> {
     clearance_first_line(&mut *write, scene)?;
     let dragons = ensemble.dragons();
     let parts = (dragons.len() * (dragons.len() + 1) / 2) as f64;
     let (mut own, mut between, mut done) = (Vec::new(), Vec::new(), 0.0);
-    for (number, Dragon { delay, motion, .. }) in dragons.iter().enumerate() {
-        write(&CertificateLine::Dragon { dragon: number })?;
-        let end = own_end(ensemble, number, show_end);
-        let least = motion.least_clearance(&motion.timeline_without_contact(), &end, &mut |_| ());
-        let obstacles = motion.obstacle_clearances(&end, &mut |_| ());
-        let least = least.map(|found| found.least);
-        let hints = ClearanceHints { boards: least.as_ref(), obstacles: &obstacles };
-        let part = Part { dragons: vec![number], delay: *delay, show_end: Some(show_end.time) };
-        own.push(certify_part(motion, (part, &end), hints, most_steps, &mut *write, &mut |share| {
-            progress((done + share) / parts);
-        })?);
+    for (number, dragon) in dragons.iter().enumerate() {
+        let mut progress = |share| progress((done + share) / parts);
+        let (write, motion) = (&mut *write, &dragon.motion);
+        own.push(if dragon.name.is_empty() {
+            // The format has no line for this dragon.
+            certify_part(motion, (Part::default(), show_end), hints, most_steps, write, &mut progress)?
+        } else {
+            write(&CertificateLine::Dragon { dragon: number })?;
+            let end = own_end(ensemble, number, show_end);
+            let alone = Ensemble::alone(motion.clone());
+            let least = alone.least_clearances(&alone.timeline_without_contact(), &end, &mut |_| ()).own;
+            let (least, obstacles) = (least.map(|found| found.least), alone.obstacle_clearances(&end, &mut |_| ()));
+            let hints = ClearanceHints { boards: least.as_ref(), obstacles: &obstacles };
+            let part = Part { dragons: vec![number], delay: dragon.delay, show_end: Some(show_end.time) };
+            certify_part(motion, (part, &end), hints, most_steps, write, &mut progress)?
+        });
         done += 1.0;
     }
     for pair in pairs(dragons.len()) {
         write(&CertificateLine::Pair { dragons: pair })?;
         let sides = pair.map(|k| {
-            let end = dragons[k].motion.timeline_without_contact().end().event;
+            let end = Ensemble::alone(dragons[k].motion.clone()).timeline_without_contact().end().event;
             Side::new(&dragons[k], end, end.kind == EventKind::Lock, None)
         });
         let hint = ensemble.nearest_of(pair, show_end.time);
@@ -114,7 +123,7 @@ pub fn certify_several_clearances(
         between.push(enclosure);
         done += 1.0;
     }
-    Ok(SeveralClearances { own, between })
+    Ok(EnsembleClearances { own, between })
 }
 
 /// Returns the bench of each of two dragons, counted within it, if the show ends with their contact.

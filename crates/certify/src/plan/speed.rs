@@ -9,6 +9,7 @@ use super::PlanError;
 use crate::clearance::Write;
 use crate::speed::{GreatestRatio, certify_greatest_ratio, greatest_ratio};
 use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::Motion;
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
 
@@ -46,15 +47,15 @@ const LARGE: f64 = 4.0;
 /// encloses its greatest value ([`greatest_ratio`]). The show ends at the event that `timeline` gives.
 ///
 /// # Errors
-/// The show runs into a lock: near a lock speeds have no bound.
+/// The show runs into a lock: near a lock speeds have no bound. The scene has `[[dragons]]`.
 pub fn greatest_speed(
     scene: &Scene,
     timeline: &Timeline,
     limit: f64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<GreatestSpeed, PlanError> {
-    let (end, tolerance) = asked(scene, timeline, limit)?;
-    Ok(answer(scene, limit, greatest_ratio(&scene.motion, end, tolerance, progress)))
+    let (motion, end, tolerance) = asked(scene, timeline, limit)?;
+    Ok(answer(motion, limit, greatest_ratio(motion, end, tolerance, progress)))
 }
 
 /// Encloses the greatest speed as [`greatest_speed`] does, and writes a certificate. `text` is the scene's text. The
@@ -71,13 +72,15 @@ pub fn certify_greatest_speed(
     write: Write<'_>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<io::Result<GreatestSpeed>, PlanError> {
-    let (end, tolerance) = asked(scene, timeline, limit)?;
-    let found = certify_greatest_ratio(&scene.motion, end, (tolerance, limit), text, most_handles, write, progress);
-    Ok(found.map(|found| answer(scene, limit, found)))
+    let (motion, end, tolerance) = asked(scene, timeline, limit)?;
+    let found = certify_greatest_ratio(motion, end, (tolerance, limit), text, most_handles, write, progress);
+    Ok(found.map(|found| answer(motion, limit, found)))
 }
 
-/// Returns the metres that the head travels in the show, and the tolerance of the ratio.
-fn asked(scene: &Scene, timeline: &Timeline, limit: f64) -> Result<(f64, f64), PlanError> {
+/// Returns the motion, the metres that its head travels in the show, and the tolerance of the ratio.
+fn asked<'s>(scene: &'s Scene, timeline: &Timeline, limit: f64) -> Result<(&'s Motion, f64, f64), PlanError> {
+    let motion = scene.ensemble.only();
+    let motion = motion.ok_or_else(|| PlanError("the scene has [[dragons]], expected [team]".to_owned()))?;
     let show_end = timeline.show_end(scene.stops_at_contact());
     if show_end.event.kind == EventKind::Lock {
         return Err(PlanError(format!(
@@ -86,12 +89,12 @@ fn asked(scene: &Scene, timeline: &Timeline, limit: f64) -> Result<(f64, f64), P
         )));
     }
     // A little less, since the two speeds are rounded away from each other.
-    Ok((show_end.event.travelled, 0.99 * TOLERANCE / limit.clamp(1.0, LARGE)))
+    Ok((motion, show_end.event.travelled, 0.99 * TOLERANCE / limit.clamp(1.0, LARGE)))
 }
 
-fn answer(scene: &Scene, limit: f64, found: GreatestRatio) -> GreatestSpeed {
+fn answer(motion: &Motion, limit: f64, found: GreatestRatio) -> GreatestSpeed {
     let (value_lo, value_hi) = found.divide(limit);
     let GreatestRatio { handle, travelled, ratio, proved, steps, .. } = found;
-    let time = scene.motion.time_at(travelled);
+    let time = motion.time_at(travelled);
     GreatestSpeed { value_lo, value_hi, time, handle: handle as u32, ratio, proved, steps }
 }

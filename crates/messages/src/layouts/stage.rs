@@ -289,8 +289,8 @@ pub struct StageCue {
 /// use bench_dragon_show::convert::stage;
 ///
 /// let scene = Scene::paper();
-/// let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
-/// let message = stage(1, 0, [0; 32], &scene.motion, &show);
+/// let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+/// let message = stage(1, 0, [0; 32], &scene.ensemble, &show);
 /// let StageMessage { stage, .. } = &message;
 /// assert_eq!((stage.dragons.len(), stage.first_dragon().benches), (1, 223));
 /// assert_eq!(message.path(stage.first_dragon())[0].kind_name(), "inward_spiral");

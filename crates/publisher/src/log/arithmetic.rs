@@ -26,15 +26,10 @@ pub struct Arithmetic {
 impl Arithmetic {
     /// Returns the arithmetic of a scene's show on this machine.
     pub fn of(scene: &Scene) -> Self {
+        let names = scene.ensemble.dragons().iter().map(|dragon| dragon.motion.instructions().name());
         Self {
             architecture: std::env::consts::ARCH.to_owned(),
-            instructions: match &scene.ensemble {
-                Some(ensemble) => {
-                    let names = ensemble.dragons().iter().map(|dragon| dragon.motion.instructions().name());
-                    names.collect::<Vec<_>>().join(",")
-                }
-                None => scene.motion.instructions().name().to_owned(),
-            },
+            instructions: names.collect::<Vec<_>>().join(","),
             elementary_functions: ELEMENTARY_FUNCTIONS.to_owned(),
         }
     }

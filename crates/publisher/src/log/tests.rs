@@ -158,7 +158,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     let (mut publisher, mut reader) = queue_of(4 * 76, 50);
     let scene = scene_text(NEWTON, false).parse().unwrap();
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
     for tick in 0..40 {
         // Three commands come in each period. The records of the first of these periods fit exactly.
         if tick >= 10 {
@@ -190,7 +190,7 @@ fn a_frame_is_read_when_all_of_it_has_come() {
     let text = scene_text(NEWTON, false);
     let scene = text.parse().unwrap();
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, scene.motion.timeline_without_contact(), playback).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
     let line = ShowLine::new(&text, &playback, Arithmetic::of(&scene), "", (1, 2));
     let mut writer = LogWriter::new(SharedFile(File::default()), line);
     publisher.publish(Outgoing::new(&FrameHeader::default(), show.frame(0))).unwrap();

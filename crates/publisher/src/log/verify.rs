@@ -135,7 +135,7 @@ fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, Ve
     if show.format != FORMAT {
         return Err(lines.error(&format!("the format is {}, expected {FORMAT}", show.format)));
     }
-    let scene = show.scene_text(file).parse_any().map_err(|error| VerifyError::Scene(error.to_string()))?;
+    let scene = show.scene_text(file).parse().map_err(|error| VerifyError::Scene(error.to_string()))?;
     let playback = show.playback().ok_or_else(|| {
         lines.error("on_contact and at_end are not understood, expected \"stop\" or \"continue\", \"hold\" or \"loop\"")
     })?;
@@ -157,14 +157,7 @@ fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, Ve
 
 /// Returns the scene computed with these instructions, one set for each dragon.
 fn with_instructions(scene: Scene, sets: &[Instructions]) -> Scene {
-    match (&scene.ensemble, sets) {
-        (Some(ensemble), _) => Scene { ensemble: ensemble.with_instructions(sets).or(scene.ensemble), ..scene },
-        (None, [one]) => {
-            let motion = scene.motion.clone().with_instructions(*one);
-            Scene { motion: motion.unwrap_or(scene.motion), ..scene }
-        }
-        (None, _) => scene,
-    }
+    Scene { ensemble: scene.ensemble.with_instructions(sets).unwrap_or(scene.ensemble), ..scene }
 }
 
 /// Returns the distance in metres that two exact solutions may have besides their rounding.

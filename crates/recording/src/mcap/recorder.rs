@@ -173,7 +173,7 @@ impl Recorder {
             return;
         }
         // The publisher has checked the scene; a publisher of a later version may know more.
-        let scene = Scene::parse_any(text, "the scene of the show", "scene").ok();
+        let scene = Scene::parse(text, "the scene of the show", "scene").ok();
         let settings = scene.and_then(|scene| scene.ros2);
         let stamps = settings.map_or_else(StampClock::default, |settings| settings.stamps);
         self.clock = Some((run_id, stamps));

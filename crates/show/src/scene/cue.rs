@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::{Accepted, SceneError, Source};
 use bench_dragon_messages::SceneName;
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::Motion;
+use bench_dragon_motion::ensemble::Ensemble;
 use bench_dragon_motion::timeline::Timeline;
 
 /// A named time of the show.
@@ -34,7 +34,7 @@ pub enum CueMoment {
         /// Simulated seconds before it.
         seconds: f64,
     },
-    /// The travel of the head along the path, in metres.
+    /// The travel of the head of `[team]` along the path, in metres.
     Travelled(f64),
 }
 
@@ -51,11 +51,11 @@ pub enum CueAction {
 impl Cue {
     /// Returns the simulated time of the cue. Returns `None` for a cue before an event that does not happen, or that
     /// would be before the start.
-    pub fn time(&self, motion: &Motion, timeline: &Timeline) -> Option<f64> {
+    pub fn time(&self, ensemble: &Ensemble, timeline: &Timeline) -> Option<f64> {
         let time = match self.moment {
             CueMoment::At(time) => time,
             CueMoment::Before { event, seconds } => timeline.find(event)?.time - seconds,
-            CueMoment::Travelled(metres) => motion.time_at(metres),
+            CueMoment::Travelled(metres) => ensemble.only()?.time_at(metres),
         };
         (time >= 0.0).then_some(time)
     }

@@ -1,4 +1,4 @@
-//! A scene of several dragons: `[[dragons]]` in place of `[team]`, `[path]` and `[placement]`.
+//! A scene of dragons with names: `[[dragons]]` in place of `[team]`, `[path]` and `[placement]`.
 //!
 //! In: the tables from serde. Out: an [`Ensemble`], or one sentence about the wrong field.
 
@@ -22,7 +22,7 @@ pub const MOST_DRAGONS: usize = 16;
 /// The greatest number of bytes of a dragon's name.
 pub const MOST_DRAGON_NAME: usize = 32;
 
-/// Distinguishes a scene of several dragons from a scene of one.
+/// Distinguishes a scene with `[[dragons]]` from a scene with `[team]`.
 #[derive(Deserialize)]
 pub(super) struct Probe {
     pub dragons: Option<Spanned<IgnoredAny>>,
@@ -30,7 +30,7 @@ pub(super) struct Probe {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct RawSeveral {
+pub(super) struct RawEnsemble {
     name: Option<Spanned<String>>,
     dragons: Spanned<Vec<Spanned<RawDragon>>>,
     team: Option<Spanned<IgnoredAny>>,
@@ -57,7 +57,7 @@ struct RawDragon {
     motion: RawMotion,
 }
 
-impl RawSeveral {
+impl RawEnsemble {
     /// Checks the tables and returns the scene.
     pub(super) fn validated(self, source: &Source, stem: &str) -> Result<Scene, SceneError> {
         let tables = [("team", &self.team), ("path", &self.path), ("placement", &self.placement)];
@@ -93,8 +93,6 @@ impl RawSeveral {
                 "cues.travelled names no dragon, expected cues.at or cues.before in a show of several dragons";
             return Err(source.field_error(travelled, sentence));
         }
-        let ensemble = Ensemble::new(dragons);
-        let motion = ensemble.dragons()[0].motion.clone();
         let of_dragon = |raw: &Spanned<RawDragon>| {
             let RawDragon { name, team, .. } = raw.get_ref();
             let defaults = team.defaults();
@@ -102,8 +100,8 @@ impl RawSeveral {
         };
         let team_defaults = given.iter().filter_map(of_dragon).collect();
         let Self { name, alerts, cues, publish, motion: ends, .. } = self;
-        let scene = SharedTables { name, alerts, cues, publish, ends }.validated(source, stem, motion, None)?;
-        Ok(Scene { ensemble: Some(ensemble), team_defaults, ..scene })
+        let shared = SharedTables { name, alerts, cues, publish, ends };
+        Ok(Scene { team_defaults, ..shared.validated(source, stem, Ensemble::new(dragons))? })
     }
 }
 
@@ -116,7 +114,7 @@ impl RawDragon {
                 format!("dragons.name is {name:?}, expected 1 to {MOST_DRAGON_NAME} of the letters a-z, 0-9 and _");
             return Err(source.field_error(&self.name, &sentence));
         }
-        let within = Source { dragon: Some(name), ..source.clone() };
+        let within = source.of_dragon(name);
         if let Some(field) = self.motion.ends().first_given() {
             let sentence = format!("motion.{field} belongs to the whole show, expected it in the table [motion]");
             return Err(within.field_error(&self.name, &sentence));

@@ -81,7 +81,7 @@ mod tests {
     fn refused(from: &str, to: &str) -> String {
         let text = SceneText::paper().text;
         assert!(text.contains(from), "{from}");
-        Scene::parse_any(&text.replacen(from, to, 1), "a.toml", "a").unwrap_err().to_string()
+        Scene::parse(&text.replacen(from, to, 1), "a.toml", "a").unwrap_err().to_string()
     }
 
     #[test]

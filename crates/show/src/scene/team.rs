@@ -100,7 +100,7 @@ mod tests {
         let (before, rest) = text.split_once("[team]").unwrap();
         let (_, after) = rest.split_once("[path]").unwrap();
         let text = format!("{before}[team]\n{team}\n[path]{after}");
-        Scene::parse_any(&text, "a.toml", "a").map_err(|error| error.to_string())
+        Scene::parse(&text, "a.toml", "a").map_err(|error| error.to_string())
     }
 
     #[test]
@@ -113,7 +113,8 @@ mod tests {
         assert_eq!(Scene { team_defaults: Vec::new(), ..scene }, Scene::paper());
         let scene = with_team("benches = 223\nwidth = 0.4\nhead_length = 3.0").unwrap();
         assert_eq!(scene.team_defaults, ["body_length = 2.2", "hole_inset = 0.275"]);
-        assert_eq!((scene.team().width, scene.team().head_length, scene.team().body_length), (0.4, 3.0, 2.2));
+        let team = scene.ensemble.only().unwrap().team();
+        assert_eq!((team.width, team.head_length, team.body_length), (0.4, 3.0, 2.2));
         assert!(with_team("width = 0.3").unwrap_err().contains("missing field `benches`"));
     }
 

@@ -2,7 +2,9 @@
 
 use std::path::Path as FilePath;
 
-use super::{PAPER, Scene, SceneError};
+use super::source::Source;
+use super::{PAPER, Scene, SceneError, dragons_in};
+use bench_dragon_motion::Motion;
 
 /// The text of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,12 +50,19 @@ impl SceneText {
         Scene::parse(&self.text, &self.file, &self.stem)
     }
 
-    /// Parses the text of a scene of one dragon or of several.
+    /// Parses the text of a scene with `[team]`, and returns the scene and the motion of its dragon.
     ///
     /// # Errors
-    /// As [`Scene::parse_any`].
-    pub fn parse_any(&self) -> Result<Scene, SceneError> {
-        Scene::parse_any(&self.text, &self.file, &self.stem)
+    /// As [`Scene::parse`]. A scene with `[[dragons]]` is refused.
+    pub fn parse_only(&self) -> Result<(Scene, Motion), SceneError> {
+        if let Some(dragons) = dragons_in(&self.text) {
+            let sentence = "the scene has several dragons, which this command does not take, expected one dragon in \
+                            [team] and [path]";
+            return Err(Source::new(&self.text, &self.file).field_error(&dragons, sentence));
+        }
+        let scene = self.parse()?;
+        let motion = scene.ensemble.only().expect("a scene without [[dragons]] has one dragon without a name").clone();
+        Ok((scene, motion))
     }
 }
 

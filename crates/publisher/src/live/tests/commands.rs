@@ -133,7 +133,7 @@ fn steps_on_each_others_heels_are_all_answered() {
     let text = format!("{team}{path}[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n");
     let scene = Scene::parse(&text, "small.toml", "small").unwrap();
     let playback = Playback { paused: true, ..Playback::of(&scene) };
-    let show = Show::new(&scene, scene.motion.timeline(&mut |_| ()), playback).unwrap();
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), playback).unwrap();
     let mut show = ShowSource::new(show);
     let (port, mut queue) = command_queue();
     let mut queues = CommandQueues::new(vec![port]);

@@ -170,12 +170,12 @@ impl Setup {
 
     pub fn run(self) -> Run {
         let mut scene = self.text.parse().unwrap();
-        scene.motion = scene.motion.with_instructions(self.instructions).unwrap();
+        scene.ensemble = scene.ensemble.with_instructions(&[self.instructions]).unwrap();
         let mut playback = Playback { rate: RATE, ..Playback::of(&scene) };
         (self.playback)(&mut playback);
         let timeline = match scene.alerts {
-            Some(_) => scene.motion.timeline(&mut |_| ()),
-            None => scene.motion.timeline_without_contact(),
+            Some(_) => scene.ensemble.timeline(&mut |_| ()),
+            None => scene.ensemble.timeline_without_contact(),
         };
         let show = Show::new(&scene, timeline, playback).unwrap();
         let solver = show.solver_reason().to_owned();

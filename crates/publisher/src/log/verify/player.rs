@@ -56,8 +56,8 @@ impl Player {
     /// Creates the player of a scene.
     pub fn new(scene: &Scene, playback: Playback, same_arithmetic: bool) -> Result<Self, StartError> {
         let timeline = match scene.alerts {
-            Some(_) => scene.timeline(&mut |_| ()),
-            None => scene.timeline_without_contact(),
+            Some(_) => scene.ensemble.timeline(&mut |_| ()),
+            None => scene.ensemble.timeline_without_contact(),
         };
         let show = Show::new(scene, timeline, playback)?;
         let reference = Reference::of(scene);
@@ -345,8 +345,8 @@ mod tests {
         let text =
             text.replace("[motion]\n", "[motion]\nsolver = \"newton\"\n").replace("benches = 223", "benches = 40");
         let scene = Scene::parse(&text, "lock.toml", "lock").unwrap();
-        let motion = &scene.motion;
-        let lock = motion.timeline_without_contact().show_end(false).time;
+        let motion = scene.ensemble.only().unwrap();
+        let lock = scene.ensemble.timeline_without_contact().show_end(false).time;
         let mut reference = Reference::of(&scene);
         let mut solver = motion.solver(Velocities::Omitted).solver;
         let mut chain = Chain::new(motion.team().handles());

@@ -7,9 +7,9 @@ use std::f64::consts::PI;
 use super::super::lines::SecondLine;
 use super::accuracy_of;
 use bench_dragon_messages::HandlePose;
+use bench_dragon_motion::Method;
 use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
-use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::scene::Scene;
 use bench_dragon_show::solve_at_or_just_before;
 
@@ -30,8 +30,7 @@ pub struct Reference {
 
 /// The second solver of a dragon, and the greatest distance from it so far.
 struct OneReference {
-    /// The dragon, if it is one of several: its motion has its own time.
-    dragon: Option<Dragon>,
+    dragon: Dragon,
     solver: Box<dyn Solver>,
     chain: Chain,
     head_speed: f64,
@@ -45,12 +44,8 @@ struct OneReference {
 impl Reference {
     /// Makes the second solver of a scene: `newton`, or the paper's rules for a scene that requests them.
     pub fn of(scene: &Scene) -> Self {
-        let Some(ensemble) = &scene.ensemble else {
-            return Self { parts: vec![(0, OneReference::new(None, scene.motion.clone()))] };
-        };
-        let part = |(k, dragon): (usize, &Dragon)| {
-            (ensemble.handles_of(k).start, OneReference::new(Some(dragon.clone()), dragon.motion.clone()))
-        };
+        let ensemble = &scene.ensemble;
+        let part = |(k, dragon): (usize, &Dragon)| (ensemble.handles_of(k).start, OneReference::new(dragon.clone()));
         Self { parts: ensemble.dragons().iter().enumerate().map(part).collect() }
     }
 
@@ -98,7 +93,8 @@ impl Reference {
 }
 
 impl OneReference {
-    fn new(dragon: Option<Dragon>, motion: Motion) -> Self {
+    fn new(dragon: Dragon) -> Self {
+        let motion = dragon.motion.clone();
         let accuracy = accuracy_of(&motion);
         let other = match motion.method() {
             Method::Paper(_) => motion,
@@ -139,7 +135,7 @@ impl OneReference {
 
     /// Solves the dragon for a time of the show, and returns the time of its own motion.
     fn solve(&mut self, time: f64) -> Result<f64, String> {
-        let own_time = self.dragon.as_ref().map_or(time, |dragon| dragon.own_time(time).0);
+        let own_time = self.dragon.own_time(time).0;
         let solved = time.is_finite()
             && time >= 0.0
             && solve_at_or_just_before(self.solver.as_mut(), own_time, &mut self.chain).is_ok();

@@ -1,5 +1,4 @@
-//! The frames of a scene with several dragons: one chain with all handles, and the nearest two
-//! boards of all dragons.
+//! The dragons of a scene in play: one chain with all handles, and the nearest two boards of all dragons.
 //!
 //! In: the scene and a time of the show. Out: the chain on the stage, with the handles of all dragons one after the
 //! other, and its clearance.
@@ -10,11 +9,11 @@ use crate::dancer::{Closest, Dancer};
 use crate::scene::Scene;
 use bench_dragon_motion::Choice;
 use bench_dragon_motion::clearance::{BetweenMonitor, Moment, PairClearance};
-use bench_dragon_motion::ensemble::{Dragon, Ensemble};
+use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::linkage::NoFollower;
 use bench_dragon_motion::solve::{Chain, ChainMut};
 
-/// One of several dragons in play.
+/// A dragon in play, at its place in the show.
 struct Member {
     dragon: Dragon,
     dancer: Dancer,
@@ -24,18 +23,19 @@ struct Member {
 }
 
 /// All dragons of a show in play.
-pub(crate) struct Several {
+pub(crate) struct Dancers {
     members: Vec<Member>,
     between: Option<BetweenMonitor>,
     /// By dragon: the metres that its head has travelled in the latest frame.
     travelled: Vec<f64>,
 }
 
-impl Several {
-    pub(crate) fn new(scene: &Scene, ensemble: &Ensemble) -> Self {
+impl Dancers {
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let ensemble = &scene.ensemble;
         let choices: Vec<Choice> =
             ensemble.dragons().iter().map(|dragon| Dancer::choice(scene, &dragon.motion)).collect();
-        let between = scene.alerts.map(|_| ensemble.between_monitor(&choices));
+        let between = scene.alerts.and_then(|_| ensemble.between_monitor(&choices));
         let member = |((k, dragon), choice): ((usize, &Dragon), Choice)| Member {
             dancer: Dancer::new(scene, &dragon.motion, choice),
             handles: ensemble.handles_of(k),
@@ -48,9 +48,11 @@ impl Several {
 
     /// Returns the names of the solvers and the reasons for their choice.
     pub(crate) fn reason(&self) -> String {
-        let reasons: Vec<String> =
-            self.members.iter().map(|of| format!("of {}: {}", of.dragon.name, of.dancer.reason)).collect();
-        reasons.join("; ")
+        let reason = |Member { dragon, dancer, .. }: &Member| match dragon.name.as_str() {
+            "" => dancer.reason.clone(),
+            name => format!("of {name}: {}", dancer.reason),
+        };
+        self.members.iter().map(reason).collect::<Vec<_>>().join("; ")
     }
 
     /// Returns the greatest error of a clearance, in metres.
