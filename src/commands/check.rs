@@ -2,6 +2,7 @@
 
 mod description;
 mod parts;
+mod required;
 
 use std::fs::File;
 use std::io::BufReader;
@@ -9,14 +10,16 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::ensemble::LeastClearances;
 use bench_dragon::motion::ground::Obstacle;
-use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
+use bench_dragon::motion::timeline::{TimedClearance, TimedObstacleClearance, Timeline};
 use bench_dragon::show::scene::{Scene, printable};
 use bench_dragon::show::timed_cues;
 use serde::Serialize;
 
 use description::describe;
 use parts::{Found, Parts};
+use required::{Searched, Verdicts};
 
 use super::events::{bench_name, find_least_clearance, least_clearance, least_clearance_between, sentence};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
@@ -30,8 +33,8 @@ pub struct CheckArguments {
     /// certificate and print its results; with --json, print no results
     #[arg(long, value_name = "FILE")]
     certificate: Option<PathBuf>,
-    /// Prove the least clearance of the show and that of each obstacle: enclose them within a nanometre, rounding
-    /// included. The proof takes seconds to minutes; with --json, print the proof (and the line of --swept) alone
+    /// Prove the least clearance of the whole route and that of each obstacle: enclose them within a nanometre, rounding
+    /// included. With [require] the proof decides. It takes seconds to minutes; with --json, print the proof (and the line of --swept) alone
     #[arg(long)]
     prove: bool,
     /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage
@@ -65,27 +68,32 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if let (Some(covered), true) = (&covered, common.json) {
         output.json(&covered.line())?;
     }
-    let prove = |found: Found<'_>, show_end| {
-        Parts::enclosed((&scene, &text.text), show_end, found, arguments.certify.as_deref(), common)
-    };
-    if arguments.prove && common.json {
-        let (found, show_end) = find_least_clearance(&scene, &timeline, common);
-        let beside = obstacle_clearances(&scene, show_end, common);
-        prove((found.of_show(), &beside), show_end)?.print_lines(&mut output)?;
+    if common.json && covered.is_some() && !arguments.prove {
         return output.finish();
     }
-    if common.json {
-        return if covered.is_some() { output.finish() } else { print_lines(&scene, &timeline, common, output) };
+    if !common.json {
+        describe(&scene, &warnings(&scene, &timeline), &mut output)?;
+        ahead(&scene, &timeline, &mut output)?;
     }
-    describe(&scene, &warnings(&scene, &timeline), &mut output)?;
-    ahead(&scene, &timeline, &mut output)?;
-    let (found, show_end) = find_least_clearance(&scene, &timeline, common);
+    let found = find_least_clearance(&scene, &timeline, common);
+    let beside = obstacle_clearances(&scene, &timeline, common);
+    let least: Found<'_> = (found.of_show(), &beside);
+    let prove = || Parts::enclosed((&scene, &text.text), timeline.end(), least, arguments.certify.as_deref(), common);
+    let parts = arguments.prove.then(prove).transpose()?;
+    let searched = Searched { timeline: &timeline, boards: found.of_show(), obstacles: &beside };
+    let verdicts = Verdicts::of(&scene, &searched, parts.as_ref());
+    if common.json {
+        match &parts {
+            Some(parts) => parts.print_lines(&mut output)?,
+            None => print_lines(&scene, &timeline, &found, &beside, &mut output)?,
+        }
+        verdicts.print_lines(&mut output)?;
+        return output.finish().and(verdicts.result());
+    }
     output.line(&format!("  {}", least_clearance(&scene, found.of_show())))?;
     if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show()) {
         output.line(&format!("  {}", least_clearance_between(&scene, &between)))?;
     }
-    let beside = obstacle_clearances(&scene, show_end, common);
-    let parts = arguments.prove.then(|| prove((found.of_show(), &beside), show_end)).transpose()?;
     parts.iter().try_for_each(|parts| parts.print_unnamed(None, &mut output))?;
     for least in &beside {
         output.line(&format!("  {}", obstacle_sentence(&scene, &timeline, least)))?;
@@ -93,6 +101,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         parts.iter().try_for_each(|parts| parts.print_unnamed(Some(name), &mut output))?;
     }
     parts.iter().try_for_each(|parts| parts.print_named(&mut output))?;
+    verdicts.print(&mut output)?;
     if let Some(covered) = covered {
         output.line(&format!("  {}", covered.sentence()))?;
     }
@@ -102,7 +111,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             output.line(&format!("    {sentence}."))?;
         }
     }
-    output.finish()
+    output.finish().and(verdicts.result())
 }
 
 /// Prints the events and the cues.
@@ -113,6 +122,11 @@ fn ahead(scene: &Scene, timeline: &Timeline, output: &mut Output) -> Result<(), 
     }
     for cue in cues(scene, timeline) {
         output.line(&format!("  {cue}"))?;
+    }
+    let stop = timeline.show_end(scene.stops_at_contact());
+    if stop.time < timeline.end().time {
+        let sentence = "where `motion.on_contact` stops it. The least clearances below are of the whole route";
+        output.line(&format!("  The show stops at t = {} s, {sentence}.", figure(stop.time)))?;
     }
     Ok(())
 }
@@ -135,6 +149,8 @@ struct LeastClearanceLine {
     time: Option<f64>,
     bench_a: Option<u32>,
     bench_b: Option<u32>,
+    /// Simulated seconds up to which the clearance is the least: the end of the motion, or where the search gave up.
+    until: f64,
 }
 
 /// A line of `check --json`: the least clearance of an obstacle.
@@ -145,35 +161,43 @@ struct ObstacleLine<'a> {
     clearance: f64,
     time: f64,
     bench: u32,
+    until: f64,
 }
 
-/// Prints the least clearances of the show as JSON lines.
-fn print_lines(scene: &Scene, timeline: &Timeline, common: &Common, mut output: Output) -> Result<(), CommandError> {
-    let (found, show_end) = find_least_clearance(scene, timeline, common);
+/// Prints the least clearances of the whole route as JSON lines.
+fn print_lines(
+    scene: &Scene,
+    timeline: &Timeline,
+    found: &LeastClearances,
+    beside: &[TimedObstacleClearance],
+    output: &mut Output,
+) -> Result<(), CommandError> {
+    let until = |searched: Option<f64>| searched.unwrap_or(timeline.end().time);
     let line = |check, found: Option<TimedClearance>| LeastClearanceLine {
         check,
         clearance: found.map(|found| found.least.value),
         time: found.map(|found| found.time),
         bench_a: found.map(|found| found.least.bench_a),
         bench_b: found.map(|found| found.least.bench_b),
+        until: until(found.and_then(|found| found.searched_until)),
     };
     output.json(&line("clearance", found.of_show()))?;
     if scene.ensemble.only().is_none() {
         output.json(&line("clearance_between_dragons", found.between))?;
     }
-    for TimedObstacleClearance { obstacle, least, time, .. } in obstacle_clearances(scene, show_end, common) {
+    for TimedObstacleClearance { obstacle, least, time, searched_until } in beside.iter().copied() {
         let obstacle = &scene.ensemble.ground().obstacles()[obstacle].name;
         let (check, clearance, bench) = ("obstacle", least.value, least.bench);
-        output.json(&ObstacleLine { check, obstacle, clearance, time, bench })?;
+        output.json(&ObstacleLine { check, obstacle, clearance, time, bench, until: until(searched_until) })?;
     }
-    output.finish()
+    Ok(())
 }
 
-/// Searches for the least clearance of each obstacle over the whole show.
-fn obstacle_clearances(scene: &Scene, show_end: &TimedEvent, common: &Common) -> Vec<TimedObstacleClearance> {
+/// Searches for the least clearance of each obstacle over the whole route.
+fn obstacle_clearances(scene: &Scene, timeline: &Timeline, common: &Common) -> Vec<TimedObstacleClearance> {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
     let mut progress = |share: f64| bar.set_position((1000.0 * share) as u64);
-    let found = scene.ensemble.obstacle_clearances(show_end, &mut progress);
+    let found = scene.ensemble.obstacle_clearances(timeline.end(), &mut progress);
     bar.finish_and_clear();
     found
 }
@@ -182,15 +206,20 @@ fn obstacle_clearances(scene: &Scene, show_end: &TimedEvent, common: &Common) ->
 fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleClearance) -> String {
     let TimedObstacleClearance { obstacle, least, time, searched_until } = *found;
     let Obstacle { name, keep_out, .. } = &scene.ensemble.ground().obstacles()[obstacle];
-    let (value, at, bench) = (figure(least.value), figure(time), bench_name(scene, least.bench));
+    let (at, bench) = (figure(time), bench_name(scene, least.bench));
     let up_to = searched_until
         .map_or(String::new(), |until| format!(" up to t = {} s, where the search gave up", figure(until)));
-    let beyond = if *keep_out > 0.0 { format!(" beyond its keep-out of {keep_out} m") } else { String::new() };
+    let distance = figure(least.value + keep_out);
+    let beyond = match (*keep_out > 0.0, least.value < 0.0) {
+        (false, _) => String::new(),
+        (true, false) => format!(", {} m beyond the keep-out of {keep_out} m", figure(least.value)),
+        (true, true) => format!(", {} m inside the keep-out of {keep_out} m", figure(-least.value)),
+    };
     let number = Some((scene.ensemble.handles() + obstacle) as u32);
     let first = timeline.events().iter().find(|timed| timed.event.bench_b == number);
     let first = first.map_or(String::new(), |timed| format!(" First met at t = {} s.", figure(timed.time)));
     format!(
-        "The least clearance of the {}{beyond}{up_to} is {value} m, at t = {at} s, with {bench} (counting from 1).{first}",
+        "The least distance from the {}{up_to} is {distance} m{beyond}, at t = {at} s, with {bench} (counting from 1).{first}",
         printable(name)
     )
 }

@@ -64,8 +64,9 @@ struct LookArguments {
     /// The distance from the centre of the stage to the edge of the picture, in metres; by default all boards are shown
     #[arg(long, value_name = "METRES", conflicts_with = "view", allow_negative_numbers = true)]
     radius: Option<f64>,
-    /// The point in the middle of the picture and its width, metres, as in 1.5,2,4
-    #[arg(long, value_name = "X,Y,METRES", value_parser = view, allow_hyphen_values = true)]
+    /// The point in the middle of the picture, its width and its height, metres, as in 14,7.5,28,15; without the height
+    /// it is as high as the sheet, and the sheet is a square
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = view, allow_hyphen_values = true)]
     view: Option<Framing>,
     /// plan; lanterns: the stage at night in the light of the dragon's lanterns; seat or seat=TURNS,DISTANCE,HEIGHT:
     /// the same from a place in the audience
@@ -365,11 +366,12 @@ fn theme(text: &str) -> Result<Theme, String> {
 fn view(text: &str) -> Result<Framing, String> {
     let numbers: Vec<f64> = text.split(',').map(|number| number.trim().parse().unwrap_or(f64::NAN)).collect();
     match numbers[..] {
-        [x, y, across] => {
+        [x, y, across, ..] if numbers.len() <= 4 => {
             for coordinate in [x, y] {
                 Accepted::PLACE.check("a coordinate", coordinate)?;
             }
             VIEW.check("the width", across)?;
+            let high = numbers.get(3).map(|high| VIEW.check("the height", *high)).transpose()?;
             // Fewer digits would be left of the coordinates in the picture.
             let least = 1e-9 * x.abs().max(y.abs());
             if across < least {
@@ -379,9 +381,9 @@ fn view(text: &str) -> Result<Framing, String> {
                     number(least)
                 ));
             }
-            Ok(Framing::View(Point::new(x, y), across))
+            Ok(Framing::View(Point::new(x, y), across, high))
         }
-        _ => Err("expected a point and a width in metres, as in 1.5,2,4".to_owned()),
+        _ => Err("expected a point, a width and perhaps a height in metres, as in 1.5,2,4".to_owned()),
     }
 }
 

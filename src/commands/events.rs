@@ -122,7 +122,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 output.line(&proof_sentence(EventKind::Obstacle, status))?;
             }
         }
-        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).0.of_show()))?;
+        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).of_show()))?;
     }
     output.finish()
 }
@@ -225,36 +225,37 @@ fn obstacle_label(obstacle: &Obstacle) -> String {
     format!("the {}", printable(&obstacle.name))
 }
 
-/// Returns the least clearances of the whole show, and the event that ends it.
-pub fn find_least_clearance<'t>(
-    scene: &Scene,
-    timeline: &'t Timeline,
-    common: &Common,
-) -> (LeastClearances, &'t TimedEvent) {
+/// Returns the least clearances of the whole route: up to the lock or the path end with which the motion ends, even if
+/// the show stops earlier.
+pub fn find_least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> LeastClearances {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
-    let show_end = timeline.show_end(scene.stops_at_contact());
     let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let found = scene.ensemble.least_clearances(timeline, show_end, &mut progress);
+    let found = scene.ensemble.least_clearances(timeline, timeline.end(), &mut progress);
     bar.finish_and_clear();
-    (found, show_end)
+    found
 }
 
-/// Returns a sentence for people on the least clearance of the whole show.
+/// Returns a sentence for people on the least clearance of the whole route.
 pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
     let Some(TimedClearance { least, time, searched_until }) = found else {
-        return "The least clearance of the show is not computed: there are no two benches that could meet, or the search gave up.".to_owned();
+        return "The least clearance of the whole route is not computed: there are no two benches that could meet, or the search gave up.".to_owned();
     };
     let (first, second) = (bench_name(scene, least.bench_a), bench_name(scene, least.bench_b));
     let (value, time) = (figure(least.value), figure(time));
-    let of = searched_until
-        .map_or("of the show".to_owned(), |until| format!("up to t = {} s, where the search gave up,", figure(until)));
+    let of = searched_until.map_or("of the whole route".to_owned(), |until| {
+        format!("up to t = {} s, where the search gave up,", figure(until))
+    });
     format!("The least clearance {of} is {value} m, at t = {time} s, between {first} and {second} (counting from 1).")
 }
 
 /// Returns a sentence for people on the least clearance of boards of two dragons.
 pub fn least_clearance_between(scene: &Scene, found: &TimedClearance) -> String {
     let sentence = least_clearance(scene, Some(*found));
-    sentence.replacen(" of the show", "", 1).replacen("The least clearance", "The least clearance between dragons", 1)
+    sentence.replacen(" of the whole route", "", 1).replacen(
+        "The least clearance",
+        "The least clearance between dragons",
+        1,
+    )
 }
 
 /// Returns a bench's name for people, counted from 1.

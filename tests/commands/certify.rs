@@ -85,8 +85,8 @@ fn the_program_proves_the_contact_of_two_dragons() {
     // Until the dragons touch, at 0; each alone is on a line, with two holes between benches 1 and 3.
     let (said, errors, code) = program(&["--scene", scene, "check", "--prove", "--certify", file]);
     assert_eq!((errors.as_str(), code), ("", Some(0)), "{said}");
-    assert!(said.contains("The least clearance of the show is"), "{said}");
-    // The least clearance of the show is the least clearance between dragons, and is printed once.
+    assert!(said.contains("The least clearance of the whole route is"), "{said}");
+    // The least clearance of the whole route is the least clearance between dragons, and is printed once.
     assert!(!said.contains("The least clearance between dragons"), "{said}");
     assert!(said.contains("The least clearance of gold and jade: Proved: it is"), "{said}");
     let (lines, errors, code) = program(&["--scene", scene, "check", "--prove", "--json"]);

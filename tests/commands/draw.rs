@@ -194,6 +194,13 @@ fn the_view_is_what_was_asked_for() {
         of(&["draw", "--view", "1,-2,8", "--no-axes", "--width", "1600", "--height", "900"]),
         [-3.0, -4.25, 5.0, 0.25],
     );
+    let court = ["draw", "--view", "14,7.5,28,15", "--no-axes"];
+    close(of(&court), [0.0, 0.0, 28.0, 15.0]);
+    let [width, height] = ["width", "height"].map(|side| {
+        let svg = answer(&court);
+        Document::parse(&svg).unwrap().root_element().attribute(side).unwrap().parse::<f64>().unwrap()
+    });
+    assert!((height / width - 15.0 / 28.0).abs() < 1e-3, "{width} x {height}");
     // The frame surrounds a team on a straight line, and not the origin, which is 150 m away.
     let [left, bottom, right, top] = of(&["--scene", &scene_file("procession"), "draw", "--at", "path_end"]);
     assert!(left > -20.0 && right < 80.0 && bottom > -10.0 && top > 115.0, "{left} {bottom} {right} {top}");

@@ -12,5 +12,6 @@ mod hard_scenes;
 mod harness;
 mod packages;
 mod placement;
+mod require;
 mod swept;
 mod turn;

@@ -108,13 +108,13 @@ impl<'a> Drawing<'a> {
                 boards.padded(margin)
             }
             Framing::Radius(radius) => StageBox::around(Point::origin(), 2.0 * radius, 2.0 * radius),
-            // Only the width is given: the height follows from the viewport.
-            Framing::View(centre, across) => StageBox::around(centre, across, f64::MIN_POSITIVE),
+            // Without a height, it follows from the viewport.
+            Framing::View(centre, across, high) => StageBox::around(centre, across, high.unwrap_or(f64::MIN_POSITIVE)),
         };
         // A straight team still gets space beside it, and a tall one is not higher than a page.
         let shape = match look.framing {
             _ if matches!(look.style, Style::Seat(_)) => seat::SHAPE,
-            Framing::View(..) => 1.0,
+            Framing::View(_, across, high) => (high.unwrap_or(across) / across).clamp(0.05, 4.0),
             _ => (shown.height() / shown.width()).clamp(0.3, 1.3),
         };
         let rows =
@@ -217,7 +217,7 @@ impl<'a> Drawing<'a> {
                 head: signs.0,
                 tail: signs.1,
                 outlined: (!outlined.is_empty()).then_some(what),
-                ground: self.ground.map(|area| format!("ground covered: {} m\u{b2}", rounded(area.area(), 3))),
+                ground: self.ground.map(|area| format!("ground covered: {} m\u{b2}", rounded(area.area(), 1))),
                 events: &events,
             };
             let (below, colour) = self.subtitle(time, &happened, &overlaps, palette);
@@ -354,6 +354,9 @@ fn outlined(happened: &[Happened], overlaps: &[(usize, usize, f64)]) -> (Vec<usi
     (benches, what)
 }
 
+/// The opacity of the ground that boards cover, so that keep-outs are seen through it.
+const SWEPT: f64 = 0.3;
+
 /// Returns the ground that boards cover.
 fn covered(area: &SweptArea, palette: &Palette) -> Path {
     let mut data = String::new();
@@ -361,7 +364,12 @@ fn covered(area: &SweptArea, palette: &Palette) -> Path {
         let corners: Vec<String> = ring.iter().map(|[x, y]| format!("{} {}", metres(*x), metres(*y))).collect();
         data += &format!("M{}z", corners.join("L"));
     }
-    Path::new().set("id", "swept").set("d", data).set("fill", palette.line).set("fill-rule", "evenodd")
+    Path::new()
+        .set("id", "swept")
+        .set("d", data)
+        .set("fill-rule", "evenodd")
+        .set("fill", palette.warning)
+        .set("fill-opacity", SWEPT)
 }
 
 /// Returns metres as SVG data, to a tenth of a micrometre.

@@ -55,8 +55,8 @@ pub enum Framing {
     Everything,
     /// The square about the origin with this half width, in metres.
     Radius(f64),
-    /// A width in metres about a point.
-    View(Point, f64),
+    /// A width in metres about a point, and a height; without it, that of the sheet.
+    View(Point, f64, Option<f64>),
 }
 
 /// The content around the stage.

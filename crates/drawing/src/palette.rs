@@ -19,11 +19,11 @@ pub struct Palette {
     pub quiet: &'static str,
     /// The path.
     pub faint: &'static str,
-    /// The ground that boards cover, keep-outs, and the grid of plots.
+    /// Keep-outs, and the grid of plots.
     pub line: &'static str,
     /// Boards that touch or overlap.
     pub danger: &'static str,
-    /// Events ahead.
+    /// Events ahead, and the ground that boards cover.
     pub warning: &'static str,
     /// A board without a known speed, and obstacles.
     pub still: &'static str,

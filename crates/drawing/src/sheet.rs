@@ -158,7 +158,8 @@ pub fn legend(contents: &Contents, camera: &Camera, palette: &Palette) -> Group 
     }
     if let Some(ground) = &contents.ground {
         let patch = Rectangle::new().set("x", rounded(row.x, 2)).set("y", rounded(y - 7.0, 2));
-        let patch = patch.set("width", 24).set("height", 14).set("fill", palette.line);
+        let patch =
+            patch.set("width", 24).set("height", 14).set("fill", palette.warning).set("fill-opacity", super::SWEPT);
         group = group.add(patch).add(row.after(24.0, ground, palette));
     }
     for (event, sentence) in contents.events {

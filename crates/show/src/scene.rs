@@ -10,6 +10,7 @@ mod mend;
 pub mod path;
 mod piece;
 pub mod precision;
+mod require;
 pub mod ros2;
 mod source;
 pub(crate) mod stage;
@@ -28,6 +29,8 @@ use self::dragons::{Probe, RawEnsemble};
 use self::path::RawPath;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
+use self::require::RawRequire;
+pub use self::require::Requirements;
 use self::ros2::RawRos2;
 use self::source::Source;
 use self::stage::RawStage;
@@ -134,6 +137,8 @@ pub struct Scene {
     pub cues: Vec<Cue>,
     /// The limits for warnings; `None` for a scene without alerts.
     pub alerts: Option<AlertRules>,
+    /// The clearances that the show must keep; `None` without any.
+    pub require: Option<Requirements>,
     /// The rate, in frames per second.
     pub rate: f64,
     /// The velocities: computed or not.
@@ -198,6 +203,7 @@ struct RawScene {
     stage: Option<RawStage>,
     motion: RawMotion,
     alerts: Option<RawAlerts>,
+    require: Option<RawRequire>,
     #[serde(default)]
     cues: Vec<RawCue>,
     #[serde(default)]
@@ -238,6 +244,7 @@ struct RawEnds {
 struct SharedTables {
     name: Option<Spanned<String>>,
     alerts: Option<RawAlerts>,
+    require: Option<RawRequire>,
     cues: Vec<RawCue>,
     publish: RawPublish,
     ends: RawEnds,
@@ -273,13 +280,13 @@ struct RawPublish {
 
 impl RawScene {
     fn validated(self, source: &Source, stem: &str) -> Result<Scene, SceneError> {
-        let Self { name, team, path, placement, stage, motion, alerts, cues, publish } = self;
+        let Self { name, team, path, placement, stage, motion, alerts, require, cues, publish } = self;
         let (checked, placement) = motion_of(source, &team, &path, &motion, placement.as_ref())?;
         let checked = match &stage {
             Some(stage) => checked.on_ground(stage.validated(source)?),
             None => checked,
         };
-        let shared = SharedTables { name, alerts, cues, publish, ends: motion.ends() };
+        let shared = SharedTables { name, alerts, require, cues, publish, ends: motion.ends() };
         let scene = shared.validated(source, stem, Ensemble::alone(checked))?;
         let placement = Some(placement.unwrap_or(Placement::IDENTITY));
         Ok(Scene { team_defaults: team.defaults(), placement, ..scene })
@@ -348,6 +355,7 @@ impl SharedTables {
                 .map_or(Ok(DEFAULT_END_HOLD), |seconds| source.check("motion.end_hold", seconds, Accepted::END_HOLD))?,
             cues: self.cues.iter().map(|cue| cue.validated(source, self.alerts.is_some())).collect::<Result<_, _>>()?,
             alerts: self.alerts.as_ref().map(|alerts| alerts.validated(source)).transpose()?,
+            require: self.require.as_ref().map(|require| require.validated(source)).transpose()?,
             rate,
             velocities: if velocities { Velocities::Computed } else { Velocities::Omitted },
             single_precision: self.publish.precision.single(self.publish.every.as_ref(), source)?,

@@ -123,6 +123,15 @@ impl Parts {
         Ok(Self(own.chain(proved.between.iter().map(|between| between_part(ensemble, between))).collect()))
     }
 
+    /// Returns the proved bounds of the least clearance of boards, or of boards and an obstacle: the lower one if it is
+    /// proved to the end of the motion, and the upper one.
+    pub(super) fn bounds(&self, obstacle: Option<&str>) -> (Option<f64>, Option<f64>) {
+        let parts = || self.0.iter().filter(|part| part.obstacle.as_deref() == obstacle && !part.is_empty);
+        let least = |of: fn(&Part) -> Option<f64>| parts().filter_map(of).reduce(f64::min);
+        let is_whole = parts().all(|part| part.proved.lo.is_some() && part.proved.proved_until.is_none());
+        (least(|part| part.proved.lo).filter(|_| is_whole), least(|part| part.proved.hi))
+    }
+
     /// Prints each part as a line of JSON.
     pub(super) fn print_lines(&self, output: &mut Output) -> Result<(), CommandError> {
         self.0.iter().try_for_each(|part| output.json(part))

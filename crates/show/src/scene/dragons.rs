@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use super::cue::RawCue;
 use super::path::RawPath;
+use super::require::RawRequire;
 use super::stage::RawStage;
 use super::team::RawTeam;
 use super::{
@@ -40,6 +41,7 @@ pub(super) struct RawEnsemble {
     #[serde(default)]
     motion: RawEnds,
     alerts: Option<RawAlerts>,
+    require: Option<RawRequire>,
     #[serde(default)]
     cues: Vec<RawCue>,
     #[serde(default)]
@@ -99,8 +101,8 @@ impl RawEnsemble {
             (!defaults.is_empty()).then(|| format!("{}: {}", name.get_ref(), defaults.join(", ")))
         };
         let team_defaults = given.iter().filter_map(of_dragon).collect();
-        let Self { name, alerts, cues, publish, motion: ends, .. } = self;
-        let shared = SharedTables { name, alerts, cues, publish, ends };
+        let Self { name, alerts, require, cues, publish, motion: ends, .. } = self;
+        let shared = SharedTables { name, alerts, require, cues, publish, ends };
         Ok(Scene { team_defaults, ..shared.validated(source, stem, Ensemble::new(dragons))? })
     }
 }

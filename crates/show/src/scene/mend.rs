@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::cue::RawCue;
 use super::path::RawPath;
+use super::require::RawRequire;
 use super::stage::RawStage;
 use super::team::RawTeam;
 use super::{RawAlerts, RawMotion, RawPlacement, RawPublish, RawRos2};
@@ -54,11 +55,12 @@ fn decimal_comma(line: &str) -> Option<&str> {
 /// Returns the table in which a key stands, by the tables' own definitions.
 fn table_of(key: &str) -> Option<&'static str> {
     type HasKey = fn(&str) -> bool;
-    let tables: [(&str, HasKey); 8] = [
+    let tables: [(&str, HasKey); 9] = [
         ("team", has::<RawTeam>),
         ("path", has::<RawPath>),
         ("motion", has::<RawMotion>),
         ("alerts", has::<RawAlerts>),
+        ("require", has::<RawRequire>),
         ("placement", has::<RawPlacement>),
         ("stage", has::<RawStage>),
         ("publish", has::<RawPublish>),
