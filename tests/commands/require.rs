@@ -60,6 +60,15 @@ fn the_village_keeps_what_it_requires_and_fails_where_it_does_not() {
     assert!(text(&output.stderr).contains("the show does not keep what [require] states"));
 }
 
+/// A square of 22 m by 20 m with a tree in its middle, and 50 benches: made by following `docs/your-village.md` only.
+#[test]
+fn a_second_village_that_follows_the_guide_passes() {
+    let output = check(include_str!("../scenes/second_village.toml"), &["--json"]);
+    let found = verdicts(&output);
+    assert_eq!(output.status.code(), Some(0), "{found:?}");
+    assert_eq!(found.iter().map(|verdict| verdict.0.as_str()).collect::<Vec<_>>(), ["boards", "tree", "boundary"]);
+}
+
 /// A show that stops has the least clearances of the same show that continues, and says where it stops.
 #[test]
 fn the_least_clearances_are_of_the_whole_route() {

@@ -41,7 +41,7 @@ struct Verdict {
 /// The verdicts on a show, the boards' first.
 pub(super) struct Verdicts(Vec<Verdict>);
 
-/// What the search has found of a show.
+/// The results of the search.
 pub(super) struct Searched<'s> {
     pub timeline: &'s Timeline,
     pub boards: Option<TimedClearance>,
@@ -148,7 +148,7 @@ fn undecided(because: &str) -> Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict in words. What is not decided has failed.
+    /// Returns the verdict in words. An undecided one is a failure.
     fn sentence(&self) -> String {
         let word = if self.verdict == Outcome::Pass { "PASS" } else { "FAIL" };
         let who = match &self.obstacle {
