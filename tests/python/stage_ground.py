@@ -87,6 +87,14 @@ def obstacles_are_drawn():
         plates = page.evaluate("picture.labels.map(({text, x, y, half, tall, end}) => [text, end && Math.max(Math.abs(end.x - x) - half, Math.abs(end.y - y) - tall)])")
         assert {text for text, _ in plates} >= names and all(beyond is None or beyond > 2 for text, beyond in plates if text in names), plates
         assert not any("boundary" in text for text in page.evaluate("picture.labels.map(({text}) => text)"))
+        # The whole of it: boards and obstacles, also where no board is yet.
+        page.goto("about:blank")
+        page.goto(url)
+        drawn(page)
+        pixels, to_pixel, _ = canvas_pixels(page)
+        for place in [*SPECTATORS, *circle(KERB)]:
+            across, down = to_pixel(numpy.array(place))
+            assert 0 < across < pixels.shape[1] and 0 < down < pixels.shape[0], (place, across, down)
         # The head passes the northern spectators within the warning's distance.
         command("seek", 55.8)
         until(page, "document.body.dataset.level === 'approaching'", "an approach")

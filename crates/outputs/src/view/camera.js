@@ -69,7 +69,8 @@ export class Camera {
   update(teams, passed, followed = teams[0], rate = 1) {
     this.longest = Math.max(...teams.map(({ stage }) => Math.max(stage.head_length, stage.body_length)));
     const all = teams.map(({ stage, places }) => this.box(stage, places)).reduce(around), { places } = followed;
-    const box = teams.reduce((box, { stage, places }) => this.ahead(box, all, stage, places), all);
+    const boards = teams.reduce((box, { stage, places }) => this.ahead(box, all, stage, places), all);
+    const box = teams.flatMap(({ stage }) => this.obstacles(stage)).reduce(around, boards);
     if (!this.goal || this.stale || outgrown(this.goal, box)) this.goal = grown(box);
     if (!this.frame || this.stale) this.frame = this.goal;
     this.stale = false;
@@ -85,7 +86,7 @@ export class Camera {
     [this.x, this.y] = [right * this.c + up * this.s, up * this.c - right * this.s];
   }
 
-  /** Returns the box of everything, along the screen's axes: the middle and half the sizes. */
+  /** Returns the box of a team, along the screen's axes: the middle and half the sizes. */
   box(stage, places) {
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
     for (let k = 0; k < places.length; k += STRIDE) {
@@ -97,6 +98,16 @@ export class Camera {
     }
     const edge = stage.width + stage.hole_inset;
     return [(left + right) / 2, (low + high) / 2, (right - left) / 2 + edge, (high - low) / 2 + edge];
+  }
+
+  /** Returns the boxes of the obstacles of a stage, without its boundary, whose streets may be long. */
+  obstacles({ obstacles = [] }) {
+    const sides = obstacles.filter(({ kind }) => kind !== "boundary").flatMap(({ outline }) => outline);
+    return sides.map(({ x, y, heading, length, curvature }) => {
+      const c = Math.cos(heading), s = Math.sin(heading), radius = curvature ? 1 / curvature : length / 2;
+      const [cx, cy] = curvature ? [x - radius * s, y + radius * c] : [x + radius * c, y + radius * s];
+      return [cx * this.c - cy * this.s, cx * this.s + cy * this.c, Math.abs(radius), Math.abs(radius)];
+    });
   }
 
   /** Returns a box with room ahead of a head that leaves the box `all` of everything, in the outer part of it. */
