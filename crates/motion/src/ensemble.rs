@@ -105,12 +105,8 @@ impl Ensemble {
     /// Returns the same dragons, whose tables are read with these instructions, one set for each dragon, or `None` if
     /// this processor lacks them.
     pub fn with_instructions(&self, sets: &[Instructions]) -> Option<Self> {
-        let of = |(dragon, set): (&Dragon, &Instructions)| {
-            let motion = dragon.motion.clone().with_instructions(*set)?;
-            Some(Dragon { motion, ..dragon.clone() })
-        };
-        let dragons: Option<Vec<Dragon>> = self.dragons.iter().zip(sets).map(of).collect();
-        dragons.filter(|dragons| dragons.len() == self.dragons.len()).map(Self::new)
+        let mut sets = sets.iter();
+        self.try_map(|motion| sets.next().and_then(|set| motion.clone().with_instructions(*set)).ok_or(())).ok()
     }
 
     /// Returns the dragons in the order of the scene.
@@ -271,12 +267,19 @@ impl Ensemble {
         to: f64,
         progress: &mut dyn FnMut(f64),
     ) -> Option<(f64, [usize; 2])> {
-        let two: Vec<&Dragon> = pair.iter().map(|dragon| &self.dragons[*dragon]).collect();
-        let found: Vec<_> = two.iter().map(|dragon| dragon.motion.singularities(&mut |_| ())).collect();
-        let moving: Result<Vec<_>, _> = two.iter().zip(&found).map(|(dragon, found)| moving(dragon, found)).collect();
-        let (moving, mut budget) = (moving.ok()?, Budget::new(CONTACT_BUDGET, progress));
-        let contact = between::first_contact([&moving[0], &moving[1]], (0.0, to), &mut budget).ok()?;
-        contact.value.map(|meeting| (meeting.time, meeting.benches))
+        let two = self.pair(pair);
+        let TimedEvent { time, event } = two.contact_between(to, progress).ok()?.0?;
+        Some((time, two.within([event.bench_a?, event.bench_b?])))
+    }
+
+    /// Returns two of the dragons as an ensemble.
+    fn pair(&self, pair: [usize; 2]) -> Self {
+        Self::new(pair.map(|dragon| self.dragons[dragon].clone()).into())
+    }
+
+    /// Returns the numbers of a bench of each of two dragons within its dragon.
+    fn within(&self, benches: [u32; 2]) -> [usize; 2] {
+        [0, 1].map(|k| benches[k] as usize - self.first_handles[k])
     }
 
     fn contact_event(&self, meeting: &Meeting, pair: [usize; 2]) -> TimedEvent {
@@ -295,7 +298,11 @@ impl Ensemble {
     }
 
     fn moving<'a>(&'a self, found: &'a [Singularities]) -> Result<Vec<MovingDragon<'a>>, NoFollower> {
-        self.dragons.iter().zip(found).map(|(dragon, found)| moving(dragon, found)).collect()
+        let moving = |(Dragon { delay, motion, .. }, found): (&'a Dragon, &'a Singularities)| {
+            let end = found.end.map_or(motion.path().length(), |end| end.travelled);
+            MovingDragon::new(motion.advancement(found), *motion.placement(), (*delay, motion.head_speed(), end))
+        };
+        self.dragons.iter().zip(found).map(moving).collect()
     }
 
     /// Returns the least clearances of any two boards that share no handle, from the start until the show ends at
@@ -329,10 +336,10 @@ impl Ensemble {
         let Dragon { delay, motion, .. } = &self.dragons[dragon];
         let first = self.first_handles[dragon] as u32;
         // Before the first contact, every clearance is above that at the contact.
-        let of_dragon = |bench: Option<u32>| self.owner(bench? as usize).filter(|(owner, _)| *owner == dragon);
         let is_own =
-            |timed: &&TimedEvent| [timed.event.bench_a, timed.event.bench_b].map(of_dragon).iter().all(Option::is_some);
-        let from = contact.filter(is_own).map_or(0.0, |contact| contact.event.travelled);
+            |bench: Option<u32>| bench.is_some_and(|bench| self.handles_of(dragon).contains(&(bench as usize)));
+        let own = contact.filter(|contact| is_own(contact.event.bench_a) && is_own(contact.event.bench_b));
+        let from = own.map_or(0.0, |contact| contact.event.travelled);
         let to = self.own_end(dragon, show_end);
         let found = motion.least_clearance((from, to), progress)?;
         let LeastClearance { value, travelled, bench_a, bench_b } = found.value?;
@@ -376,15 +383,9 @@ impl Ensemble {
     /// Returns the time at which boards of two dragons are nearest, up to a time of the show. Returns also a bench of
     /// each dragon, counted within the dragon. Returns `None` if the search failed.
     pub fn nearest_of(&self, pair: [usize; 2], to: f64) -> Option<(f64, [usize; 2])> {
-        let two = pair.map(|dragon| &self.dragons[dragon]);
-        let found = two.map(|dragon| dragon.motion.singularities(&mut |_| ()));
-        let [one, other] = [0, 1].map(|k| moving(two[k], &found[k]).ok());
-        let moving = [&one?, &other?];
-        let mut unreported = |_| {};
-        let mut budget = Budget::new(CONTACT_BUDGET, &mut unreported);
-        let guess = between::guess_least_clearance(moving, (0.0, to), &mut budget).ok()?;
-        let nearer = between::least_clearance(moving, (0.0, to), guess, &mut budget).ok()?.value;
-        nearer.or(guess).map(|meeting| (meeting.time, meeting.benches))
+        let two = self.pair(pair);
+        let TimedClearance { least, time, .. } = two.least_clearance_between(to, &mut |_| ())?;
+        Some((time, two.within([least.bench_a, least.bench_b])))
     }
 
     /// Returns the least clearance of each obstacle over all dragons from the start until the show ends at `show_end`.
@@ -493,14 +494,6 @@ impl Solver for EnsembleSolver {
         }
         Ok(())
     }
-}
-
-fn moving<'a>(
-    Dragon { delay, motion, .. }: &'a Dragon,
-    found: &'a Singularities,
-) -> Result<MovingDragon<'a>, NoFollower> {
-    let end = found.end.map_or(motion.path().length(), |end| end.travelled);
-    MovingDragon::new(motion.advancement(found), *motion.placement(), (*delay, motion.head_speed(), end))
 }
 
 /// Returns all pairs of `count` dragons, in order.

@@ -61,6 +61,7 @@ impl SceneText {
             return Err(Source::new(&self.text, &self.file).field_error(&dragons, sentence));
         }
         let scene = self.parse()?;
+        // Only `[[dragons]]` gives names.
         let motion = scene.ensemble.only().expect("a scene without [[dragons]] has one dragon without a name").clone();
         Ok((scene, motion))
     }
