@@ -1,13 +1,14 @@
 //! Second copies of large messages, for readers of Fast DDS on this machine.
 //!
-//! RustDDS 0.15.1 sends a message in a burst of datagrams of up to 65 kB (`FragmentationIter`). A socket of Fast DDS has
-//! room for 212,992 bytes, the default of Linux, so for three of them. What does not fit is lost, and RustDDS repairs
-//! eight fragments of 256 bytes each 10 ms (`handle_repair_frags_send_worker`): of 5,000 benches a reader got a third of
-//! all messages. So the fragments of such a message come again here, in datagrams at intervals, within the period of the
-//! messages. A reader takes only what is missing. Held by `a_reliable_subscriber_gets_the_messages_of_a_large_team`.
+//! RustDDS 0.15.1 sends a message in a burst of datagrams of up to 65 kB (`FragmentationIter`, `rtps/writer.rs:2304`).
+//! A socket of Fast DDS has room for 212,992 bytes, the default of Linux, so for three of them. What does not fit is
+//! lost, and RustDDS repairs eight fragments of 256 bytes each 10 ms (`Writer::handle_repair_frags_send_worker`,
+//! `rtps/writer.rs:1580`): of 5,000 benches a reader got a third of all messages. So the fragments of such a message
+//! come again here, in datagrams at intervals, within the period of the messages. A reader takes only what is missing.
+//! Held by `a_reliable_subscriber_gets_the_messages_of_a_large_team`.
 //!
-//! In: a message as RustDDS has numbered it. Out: datagrams, sent by a thread. A message that comes before the datagrams
-//! of the one before are sent replaces them.
+//! In: a message as RustDDS has numbered it. Out: datagrams, sent by a thread. A message that comes before the
+//! datagrams of the one before are sent replaces them.
 
 use std::net::SocketAddr;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};

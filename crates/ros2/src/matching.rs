@@ -1,7 +1,7 @@
 //! The remote endpoints that RustDDS has matched with the program's own: the endpoints that a message reaches.
 //!
-//! In: the events of the participant, in which RustDDS reports each match once, and which only this file reads. Out: the
-//! readers of each writer; for the services, whether a response has a receiver, since a response is lost if it is
+//! In: the events of the participant, in which RustDDS reports each match once, and which only this file reads. Out:
+//! the readers of each writer; for the services, whether a response has a receiver, since a response is lost if it is
 //! written before the client's reply reader is matched.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -90,7 +90,8 @@ impl Matches {
         act(&mut ends)
     }
 
-    /// Processes pending discovery events. RustDDS buffers 2,048 and drops the rest, so call it often.
+    /// Processes pending discovery events. RustDDS buffers 2,048 (`dds/participant.rs:324`) and drops the rest, so call
+    /// it often.
     pub(super) fn update(&self) {
         self.with(|_| ());
     }
@@ -136,10 +137,12 @@ impl Matches {
     /// Notifies a remote reader that a local writer has written `written` messages until now.
     ///
     /// Cyclone DDS takes the messages that the first heartbeat of a writer names for old ones, and acknowledges them
-    /// without delivery to a volatile reader. RustDDS sends a heartbeat when it matches a reader, but the reader may not
-    /// know the writer yet. The next heartbeat may name an answer that RustDDS has not sent: it counts a message from
-    /// the call that writes it, and answers an ACKNACK before it sends (`Writer::handle_ack_nack`). The client would
-    /// then wait without end. So this heartbeat, just before an answer is written, names the earlier answers.
+    /// without delivery to a volatile reader. RustDDS sends a heartbeat when it matches a reader
+    /// (`Writer::update_reader_proxy`, `rtps/writer.rs:1971`), but the reader may not know the writer yet. The next
+    /// heartbeat may name an answer that RustDDS has not sent: it counts a message from the call that writes it, and
+    /// answers an ACKNACK before it sends (`Writer::handle_ack_nack`, `rtps/writer.rs:1137`). The client would then
+    /// wait without end. So this heartbeat, just before an answer is written, names the earlier answers. Held by
+    /// `a_hundred_new_clients_of_each_kind`.
     pub(super) fn announce(&self, writer: GUID, reader: GUID, written: u32) {
         self.with(|ends| {
             let addresses = ends.addresses.get(&reader).into_iter().flatten().copied();
@@ -148,7 +151,7 @@ impl Matches {
     }
 
     /// Notifies all subscribers of a local writer that the writer has written nothing until now, for the reason that
-    /// [`announce`](Self::announce) has.
+    /// [`announce`](Self::announce) has. Held by `a_subscriber_that_is_there_before_a_show`.
     pub(super) fn announce_to_all(&self, writer: GUID) {
         self.subscribers(writer).into_keys().for_each(|reader| self.announce(writer, reader, 0));
     }

@@ -4,9 +4,9 @@
 //!
 //! | reader | is owed | because RustDDS | held by the test |
 //! |---|---|---|---|
-//! | new, of a transient-local writer | no message but the latest, or those of the lifespan; a volatile one none | offers all that it keeps, whatever the reader's durability and depth (`Writer::update_reader_proxy`) | `a_late_subscriber_gets_the_current_alert`, `a_late_volatile_subscriber`, `a_late_subscriber_of_rosout` |
-//! | best-effort | an acknowledgement of every message, in its name | waits for it without end (`Writer::remove_all_acked_changes_but_keep_depth`) | `subscribers_that_come_and_go` |
-//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones | `a_killed_subscriber_stops_no_other` |
+//! | new, of a transient-local writer | no message but the latest, or those of the lifespan; a volatile one none | offers all that it keeps, whatever the reader's durability and depth (`Writer::matched_reader_update`, `rtps/writer.rs:2074`) | `a_late_subscriber_gets_the_current_alert`, `a_late_volatile_subscriber`, `a_late_subscriber_of_rosout` |
+//! | best-effort | an acknowledgement of every message, in its name | waits for it without end (`Writer::remove_all_acked_changes_but_keep_depth`, `rtps/writer.rs:1660`) | `subscribers_that_come_and_go` |
+//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones (`WriterSendBuffer::admit_blocking`, `rtps/writer_send_buffer.rs:199`) | `a_killed_subscriber_stops_no_other` |
 //!
 //! A dead reader leaves with its participant ([`departures`](super::departures)), held by
 //! `the_ports_of_a_killed_subscriber`. The tests are those of `tests/ros2/fast_dds`.
@@ -21,7 +21,8 @@ use super::matching::Requests;
 /// The age from which messages are acknowledged. A new subscriber takes milliseconds, on a busy machine a second.
 /// RustDDS ignores the acknowledgement if the reader itself has acknowledged more.
 const AGE: Duration = Duration::from_secs(2);
-/// The interval of the acknowledgements of a writer. RustDDS removes old messages every six seconds.
+/// The interval of the acknowledgements of a writer. RustDDS removes old messages every six seconds
+/// (`rtps/writer.rs:312`).
 const INTERVAL: Duration = Duration::from_millis(500);
 
 /// The readers of a writer.

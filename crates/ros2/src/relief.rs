@@ -1,10 +1,10 @@
 //! The relief of a volatile writer by a second one of the same topic. Pure.
 //!
 //! For each new subscriber a volatile writer of RustDDS 0.15.1 lists the number of every message that it has written,
-//! about 13 bytes each (`RtpsReaderProxy::set_pending_gap_up_to`). The list stays until the subscriber acknowledges,
-//! and a best-effort or killed subscriber never acknowledges. A second writer begins at 1. It writes nothing until the
-//! subscribers have discovered it. Then it writes alone, and the first writer stays for the retransmission of its last
-//! messages.
+//! about 13 bytes each (`RtpsReaderProxy::set_pending_gap_up_to`, `rtps/rtps_reader_proxy.rs:506`). The list stays
+//! until the subscriber acknowledges, and a best-effort or killed subscriber never acknowledges. A second writer
+//! begins at 1. It writes nothing until the subscribers have discovered it. Then it writes alone, and the first writer
+//! stays for the retransmission of its last messages. Held by `a_subscriber_loses_no_message_and_gets_none_twice`.
 
 use std::time::{Duration, Instant};
 

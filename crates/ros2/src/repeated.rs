@@ -2,12 +2,14 @@
 //! reports the match, and any datagram can be lost.
 //!
 //! Old messages are withheld from a new reader of a transient-local topic by a GAP. RustDDS retransmits 5 ms after the
-//! reader's request (`NACK_RESPONSE_DELAY`); a GAP that comes later leaves the reader with old messages first.
+//! reader's request (`NACK_RESPONSE_DELAY`, `rtps/constant.rs:25`); a GAP that comes later leaves the reader with old
+//! messages first. Held by the tests of transient-local topics in the table of [`readers`](super::readers).
 //!
 //! The first requests of a new Fast DDS client are requested again. RustDDS drops a request that comes before its
-//! discovery thread has matched the client's writer, and then sends an ACKNACK without requests, which Fast DDS answers
-//! after its heartbeat period of 3 s (`Reader::send_preemptive_acknacks`). Without this half of all first calls take
-//! 3 s, and a `hold` must not. A writer retransmits the messages that it has and that are not acknowledged; RustDDS
+//! discovery thread has matched the client's writer (`Reader::process_received_data`, `rtps/reader.rs:744`), and then
+//! sends an ACKNACK without requests, which Fast DDS answers after its heartbeat period of 3 s
+//! (`Reader::send_preemptive_acknack_to`, `rtps/reader.rs:1426`). Without this half of all first calls take 3 s, and a
+//! `hold` must not. A writer retransmits the messages that it has and that are not acknowledged; RustDDS
 //! drops a message that comes twice. NACK_FRAG and the ACKNACKs of RustDDS have separate counters. Held by
 //! `a_hundred_new_clients_each_get_the_answer_to_their_first_call`.
 

@@ -24,7 +24,8 @@ use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability};
 /// The most lines in the queue; then the oldest is dropped.
 const QUEUED_LINES: usize = 256;
 /// The most lines kept for late subscribers, and the longest time, as every node of ROS 2 does (rcl's
-/// `rcl_qos_profile_rosout_default`). RustDDS sends lines of any age, and Fast DDS takes them.
+/// `rcl_qos_profile_rosout_default`). RustDDS sends lines of any age (no lifespan in `rtps/writer.rs`), and Fast DDS
+/// takes them.
 const DEPTH: u32 = 100;
 const LIFESPAN: Duration = Duration::from_secs(10);
 /// A usual length of a message in bytes, for the bound of the memory.

@@ -5,13 +5,15 @@
 //! Fast DDS so would a volatile subscriber, since RustDDS does not read the durability of a subscriber. So a message
 //! without subscribers is held here and not written, and a writer of events is replaced after its last subscriber has
 //! left. A GAP of our own ([`readers`](super::readers)) withholds older messages from a subscriber that joins others.
-//! RustDDS sends a GAP only if the writer is volatile. A second, volatile writer is no remedy: a volatile subscriber
-//! matches both, and a transient-local one would report the second as incompatible. Messages to single readers are no
-//! remedy either: RustDDS repairs them for every later subscriber.
+//! RustDDS sends a GAP only if the writer is volatile (`Writer::matched_reader_update`, `rtps/writer.rs:2074`). A
+//! second, volatile writer is no remedy: a volatile subscriber matches both, and a transient-local one would report
+//! the second as incompatible. Messages to single readers are no remedy either: RustDDS repairs them for every later
+//! subscriber.
 //!
 //! A reliable subscriber that has acknowledged nothing, since it is new or was killed, makes RustDDS refuse messages
-//! for all subscribers of the topic. So a refused message is held and written again, and a writer that refuses for
-//! longer than a new subscriber takes is replaced.
+//! for all subscribers of the topic (`WriterSendBuffer::admit_blocking`, `rtps/writer_send_buffer.rs:199`). So a
+//! refused message is held and written again, and a writer that refuses for longer than a new subscriber takes is
+//! replaced.
 //!
 //! A volatile writer is relieved by a second one before it has written many messages ([`relief`](super::relief)), and
 //! keeps the messages of some seconds only ([`readers`](super::readers)).

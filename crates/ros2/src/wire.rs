@@ -1,4 +1,5 @@
-//! Datagrams that this process sends beside RustDDS, because RustDDS 0.15.1 has no call for them.
+//! Datagrams that this process sends beside RustDDS, because RustDDS 0.15.1 has no call for them. The files that send
+//! them give the reasons: places in RustDDS are `file:line` below `src` of that version.
 //!
 //! In: endpoints, message numbers, addresses. Out: RTPS messages (RTPS 2.5, chapter 9.4) of one or a few submessages,
 //! from one endpoint to one other. An endpoint is named by its GUID, or by the number of its entity in a participant.
@@ -34,12 +35,12 @@ const PARTICIPANT_READER: [u8; 4] = [0, 1, 0, 0xc7];
 const PARTICIPANT_WRITER: [u8; 4] = [0, 1, 0, 0xc2];
 /// The number of a participant's last message: more than any participant sends.
 const LAST_MESSAGE: u32 = 1 << 30;
-/// The bytes of a fragment: RustDDS's `FRAGMENT_SIZE`. A reader takes fragments of one size.
+/// The bytes of a fragment: RustDDS's `FRAGMENT_SIZE` (`rtps/constant.rs:110`). A reader takes fragments of one size.
 pub(super) const FRAGMENT_BYTES: usize = 256;
 /// The bytes before a payload: its encoding, little-endian CDR, and no options.
 const CDR_LE: [u8; 4] = [0, 1, 0, 0];
-/// The first counter of acknowledgements: RustDDS ignores an ACKNACK that has the counter of the one before, and
-/// subscribers count from 1.
+/// The first counter of acknowledgements: RustDDS ignores an ACKNACK that has the counter of the one before
+/// (`Writer::handle_ack_nack`, `rtps/writer.rs:1137`), and subscribers count from 1.
 const FIRST_COUNTER: u32 = 1 << 30;
 
 /// Returns the participant of an endpoint.
@@ -73,8 +74,8 @@ pub(super) fn acknowledgement(reader: GUID, writer: GUID, last: u64, round: u32)
 /// to it (`StatefulReader::processGapMsg` calls `History::remove_change_nts`), and the next `take` never returns.
 pub(super) fn gap(writer: GUID, reader: GUID, numbers: RangeInclusive<u32>) -> Vec<u8> {
     let (first, last) = numbers.into_inner();
-    // The start (high, low), the first number after the end, and an empty set from there on. Fast DDS 2.14 ignores a GAP
-    // whose set begins at the start.
+    // The start (high, low), the first number after the end, and an empty set from there on. Fast DDS 2.14 ignores a
+    // GAP whose set begins at the start.
     let words = [0, first, 0, last + 1, 0];
     between(writer, reader, |writer, reader| submessage(GAP, 0, [reader, writer], &words))
 }
@@ -127,7 +128,7 @@ pub(super) fn fragments(writer: GUID, reader: GUID, sequence: u64, body: &[u8], 
 pub(super) fn farewell(participant: Prefix, round: u16) -> Vec<u8> {
     let mut bytes = header(participant);
     // No flags beyond the header's, the distance to the parameters, and the message's number. RustDDS ignores a number
-    // that it has received (`TopicCache::add_change`).
+    // that it has received (`TopicCache::add_change`, `structure/dds_cache.rs:303`).
     let number = (LAST_MESSAGE + u32::from(round)).to_le_bytes();
     let mut body = [[0, 0, 16, 0], PARTICIPANT_READER, PARTICIPANT_WRITER, [0; 4], number].concat();
     // PID_STATUS_INFO: disposed and unregistered; the end of the parameters.
