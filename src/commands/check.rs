@@ -218,6 +218,12 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
     let number = Some((scene.ensemble.handles() + obstacle) as u32);
     let first = timeline.events().iter().find(|timed| timed.event.bench_b == number);
     let first = first.map_or(String::new(), |timed| format!(" First met at t = {} s.", figure(timed.time)));
+    if least.value == f64::NEG_INFINITY {
+        return format!(
+            "No board fits inside the {}: at t = {at} s {bench} (counting from 1) is outside.",
+            printable(name)
+        );
+    }
     format!(
         "The least distance from the {}{up_to} is {distance} m{beyond}, at t = {at} s, with {bench} (counting from 1).{first}",
         printable(name)

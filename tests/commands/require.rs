@@ -128,3 +128,18 @@ fn the_table_is_checked() {
     assert!(text(&output.stdout).contains("PASS: boards: no two could meet; required: 0.2 m."));
     assert!(output.status.success());
 }
+
+#[test]
+fn a_boundary_in_which_no_board_fits_is_named() {
+    let scene = "[team]\nbenches = 4\n[path]\nkind = \"pieces\"\npieces = [{ kind = \"line\", length = 10.0 }]\n[motion]\n\
+                 head_speed = 1.0\n[stage]\nboundary = { polygon = [[-1, -1], [1, -1], [1, 1], [-1, 1]], keep_out = 0.5 }\n\
+                 [require]\n";
+    let output = check(scene, &[]);
+    let said = text(&output.stdout);
+    assert!(said.contains("No board fits inside the boundary: at t = 0 s bench 1 (the head)"), "{said}");
+    assert!(
+        said.contains("FAIL: the boundary: no board fits inside; required: 0.5 m.") && !said.contains("inf"),
+        "{said}"
+    );
+    assert_eq!(output.status.code(), Some(1));
+}

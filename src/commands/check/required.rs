@@ -156,6 +156,7 @@ impl Verdict {
             Some(name) => format!("the {}", printable(name)),
         };
         let least = match (self.clearance, self.time) {
+            (Some(f64::NEG_INFINITY), _) => "no board fits inside".to_owned(),
             (Some(clearance), Some(time)) => {
                 format!("{} m at the least, at t = {} s", figure(clearance), figure(time))
             }

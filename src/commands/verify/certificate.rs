@@ -3,6 +3,7 @@
 use std::io::BufRead;
 
 use bench_dragon::messages::hexadecimal;
+use bench_dragon::messages::sentence::number;
 use bench_dragon::proof::{
     EventKind, Proved, ProvedClearance, ProvedEvent, ProvedObstacleClearance, ProvedPitch, ProvedSpeed, Refused,
     Status, Until, scene_hash,
@@ -111,7 +112,8 @@ fn sentence(outcome: &ProvedEvent) -> String {
             format!("touch of obstacle {} (counting from 1, the boundary last)", number.unwrap_or(0) + 1)
         }
     };
-    let seconds = |time: Option<f64>| time.map_or("?".to_owned(), |time| format!("{time} s"));
+    // Without the sign of zero.
+    let seconds = |time: Option<f64>| time.map_or("?".to_owned(), |time| format!("{} s", number(time + 0.0)));
     let (lo, hi) = (seconds(outcome.time_lo), seconds(outcome.time_hi));
     match (outcome.status, outcome.bench_a, outcome.bench_b) {
         (Status::Proved, Some(a), Some(b)) => {
@@ -188,7 +190,8 @@ fn speed_sentence(outcome: &ProvedSpeed) -> String {
 /// Returns a sentence on a proved least pitch.
 fn pitch_sentence(outcome: &ProvedPitch) -> String {
     let ProvedPitch { radius, from, value_lo, value_hi } = *outcome;
-    let blocked = value_lo.map(|value_lo| {
+    // A certificate may claim nothing: then its number is below the first pitch.
+    let blocked = value_lo.filter(|value_lo| *value_lo >= from).map(|value_lo| {
         format!("with every pitch from {from} m to {value_lo} m two boards overlap, or a link locks, before {radius} m")
     });
     let free = value_hi.map(|value_hi| {
