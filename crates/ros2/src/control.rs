@@ -55,7 +55,7 @@ const LINGER: Duration = Duration::from_millis(20);
 /// Returns for each service its name, and whether the bytes are a request of `rmw_fastrtps_cpp` and of
 /// `rmw_cyclonedds_cpp`. The bytes are never a request of both for a service that conducts the show. For tests.
 pub fn mappings_of(bytes: &[u8]) -> impl Iterator<Item = (&'static str, [bool; 2])> {
-    services::SERVICES.iter().chain(&parameters::SERVICES).map(|service| {
+    services::SERVICES.iter().chain(&services::PARAMETER_SERVICES).map(|service| {
         let headed = bytes.split_at_checked(mapping::CYCLONE_HEADER).and_then(|(_, body)| (service.read)(body));
         (service.name, [(service.read)(bytes).is_some(), headed.is_some()])
     })

@@ -16,7 +16,7 @@ use rustdds::{
 };
 
 use super::departures::Departures;
-use super::readers::Owed;
+use super::readers::{Owed, Requests};
 use super::repeated::Repeated;
 use super::wire::{self, Prefix, prefix};
 
@@ -51,15 +51,6 @@ struct Ends {
     farewells: u16,
     /// Acknowledgements that have been sent.
     acknowledged: u32,
-}
-
-/// The requests of a remote reader.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Requests {
-    /// True if the reader requests the history.
-    pub(super) transient_local: bool,
-    /// True if the reader acknowledges messages.
-    pub(super) reliable: bool,
 }
 
 impl Matches {

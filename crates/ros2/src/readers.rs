@@ -16,8 +16,6 @@ use std::time::{Duration, Instant};
 
 use rustdds::GUID;
 
-use super::matching::Requests;
-
 /// The age from which messages are acknowledged. A new subscriber takes milliseconds, on a busy machine a second.
 /// RustDDS ignores the acknowledgement if the reader itself has acknowledged more.
 const AGE: Duration = Duration::from_secs(2);
@@ -44,6 +42,15 @@ pub(super) enum Kind {
     Latest,
     /// A late reader that requests the history gets the messages of this time.
     Lifespan(Duration),
+}
+
+/// The requests of a remote reader.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Requests {
+    /// True if the reader requests the history.
+    pub(super) transient_local: bool,
+    /// True if the reader acknowledges messages.
+    pub(super) reliable: bool,
 }
 
 struct Reader {

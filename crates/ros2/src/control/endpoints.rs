@@ -16,8 +16,7 @@ use rustdds::{
 };
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 
-use super::parameters;
-use super::services::{Response, SERVICES, Service};
+use super::services::{PARAMETER_SERVICES, Response, SERVICES, Service};
 use crate::Ros2Error;
 
 /// Requests of one service that its reader keeps between two polls.
@@ -125,7 +124,7 @@ impl Endpoints {
                 reported: Reported::default(),
             })
         };
-        let services = parameters::SERVICES.iter().chain(if conducting { &SERVICES[..] } else { &[] });
+        let services = PARAMETER_SERVICES.iter().chain(if conducting { &SERVICES[..] } else { &[] });
         let ports = services.map(&mut open).collect::<Result<_, Ros2Error>>()?;
         Ok(Self { ports })
     }

@@ -3,13 +3,10 @@
 //!
 //! In: the bytes of a request. Out: a [`ParameterCall`], and its [`ParameterResponse`].
 
-use ros2_client::rcl_interfaces::{GetParametersRequest, ListParametersRequest, SetParametersRequest};
 use rustdds::RepresentationIdentifier;
 use rustdds::serialization::deserialize_from_cdr_with_rep_id;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-
-use super::services::{Call, Service};
 
 /// A call of a parameter service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,32 +63,8 @@ impl ParameterCall {
     }
 }
 
-/// The parameter services of a node.
-pub const SERVICES: [Service; 6] = {
-    const fn service(name: &'static str, kind: &'static str, read: fn(&[u8]) -> Option<Call>) -> Service {
-        Service { name, package: "rcl_interfaces", kind, read }
-    }
-    const GET: fn(&[u8]) -> Option<Call> =
-        |bytes| whole::<GetParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::Get));
-    [
-        service("list_parameters", "ListParameters", |bytes| {
-            whole::<ListParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::List))
-        }),
-        service("get_parameters", "GetParameters", GET),
-        service("get_parameter_types", "GetParameterTypes", GET),
-        service("describe_parameters", "DescribeParameters", GET),
-        service("set_parameters", "SetParameters", |bytes| {
-            let request = whole::<SetParametersRequest>(bytes)?;
-            Some(Call::Parameters(ParameterCall::Set(request.parameter.len())))
-        }),
-        service("set_parameters_atomically", "SetParametersAtomically", |bytes| {
-            whole::<SetParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::SetAtomically))
-        }),
-    ]
-};
-
 /// Returns the message of these bytes, if it ends where they end, with or without padding.
-fn whole<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
+pub fn whole<Message: DeserializeOwned>(bytes: &[u8]) -> Option<Message> {
     let (message, used) = deserialize_from_cdr_with_rep_id(bytes, RepresentationIdentifier::CDR_LE).ok()?;
     (bytes.len().checked_sub(used)? < 4).then_some(message)
 }

@@ -4,10 +4,11 @@
 //! `std_srvs/Trigger`. The services of `rosbag2_interfaces` (Humble to Kilted, and the later `Resume`) have the names
 //! that rosbag2's player gives them. In: the bytes of a request. Out: a [`Call`]; back from a [`Response`].
 
+use ros2_client::rcl_interfaces::{GetParametersRequest, ListParametersRequest, SetParametersRequest};
 use serde::Serialize;
 
 use super::mapping::body;
-use super::parameters::{ParameterCall, ParameterResponse};
+use super::parameters::{ParameterCall, ParameterResponse, whole};
 
 /// A service: its name below the publisher's, its type, and the form of a request.
 pub struct Service {
@@ -57,6 +58,30 @@ pub const SERVICES: [Service; 16] = {
         trigger("hold", |bytes| empty(bytes, Call::Hold)),
         trigger("release", |bytes| empty(bytes, Call::Release)),
         trigger("go", |bytes| empty(bytes, Call::Go)),
+    ]
+};
+
+/// The parameter services of a node.
+pub const PARAMETER_SERVICES: [Service; 6] = {
+    const fn service(name: &'static str, kind: &'static str, read: fn(&[u8]) -> Option<Call>) -> Service {
+        Service { name, package: "rcl_interfaces", kind, read }
+    }
+    const GET: fn(&[u8]) -> Option<Call> =
+        |bytes| whole::<GetParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::Get));
+    [
+        service("list_parameters", "ListParameters", |bytes| {
+            whole::<ListParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::List))
+        }),
+        service("get_parameters", "GetParameters", GET),
+        service("get_parameter_types", "GetParameterTypes", GET),
+        service("describe_parameters", "DescribeParameters", GET),
+        service("set_parameters", "SetParameters", |bytes| {
+            let request = whole::<SetParametersRequest>(bytes)?;
+            Some(Call::Parameters(ParameterCall::Set(request.parameter.len())))
+        }),
+        service("set_parameters_atomically", "SetParametersAtomically", |bytes| {
+            whole::<SetParametersRequest>(bytes).map(|_| Call::Parameters(ParameterCall::SetAtomically))
+        }),
     ]
 };
 
