@@ -12,7 +12,7 @@ use bench_dragon::motion::model::team::Team;
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::{TimedEvent, Timeline};
-use bench_dragon::show::scene::{AtEnd, Scene};
+use bench_dragon::show::scene::{AtEnd, Scene, SceneText};
 use bench_dragon::show::{Playback, Show};
 use fastrand::Rng;
 
@@ -381,6 +381,7 @@ fn what_cannot_be_is_refused_in_one_sentence() {
         assert!(error.contains(expected), "{error}\ninstead of: {expected}");
         assert!(!error.contains('\n'), "{error}");
     }
-    let error = Scene::parse(&gold, "x.toml", "x").unwrap_err().to_string();
+    let gold = SceneText { text: gold, file: "x.toml".to_owned(), stem: "x".to_owned() };
+    let error = gold.parse_only().unwrap_err().to_string();
     assert!(error.starts_with("x.toml, line 1: the scene has several dragons"), "{error}");
 }

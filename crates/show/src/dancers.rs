@@ -78,22 +78,24 @@ impl Dancers {
         for member in &mut self.members {
             member.solve(show_time, moves, all_handles, &mut all)?;
         }
-        let nearer = |one: Option<PairClearance>, other: Option<PairClearance>| match (one, other) {
-            (Some(one), Some(other)) if other.value < one.value => Some(other),
-            (one, other) => one.or(other),
-        };
-        let own = self.members.iter().map(|member| member.closest.boards).fold(None, nearer);
         let Self { members, between, travelled } = self;
+        let own = nearest(members.iter().filter_map(|member| member.closest.boards.as_ref()));
         let between = between.as_mut().and_then(|monitor| {
             travelled.clear();
             travelled.extend(members.iter().map(|member| member.dragon.travelled_at(show_time)));
             let moment = Moment { time: show_time, travelled };
             monitor.nearest(chain, own.map_or(f64::INFINITY, |own| own.value), moment)
         });
-        let boards = nearer(own, between);
-        let any = self.members.iter().map(|member| member.closest.any).fold(boards, nearer);
-        Ok(Closest { boards, any })
+        let boards = nearest(own.into_iter().chain(&between));
+        let any = members.iter().filter_map(|member| member.closest.any.as_ref());
+        let any = nearest(boards.into_iter().chain(any));
+        Ok(Closest { boards: boards.copied(), any: any.copied() })
     }
+}
+
+/// Returns the nearest of some pairs, the first of equals.
+fn nearest<'a>(pairs: impl Iterator<Item = &'a PairClearance>) -> Option<&'a PairClearance> {
+    pairs.reduce(|nearest, pair| if pair.value < nearest.value { pair } else { nearest })
 }
 
 impl Member {
@@ -112,13 +114,11 @@ impl Member {
         }
         let (first, own_handles) = (self.handles.start, self.handles.len());
         let mut own = chain.range_mut(self.handles.clone());
-        let Closest { boards, any } = self.dancer.solve(state.0, state.1, &mut own)?;
-        let numbered = |pair: PairClearance| {
-            let PairClearance { bench_a, bench_b, .. } = pair;
-            let bench_b = if bench_b < own_handles { bench_b + first } else { bench_b - own_handles + all_handles };
-            PairClearance { bench_a: bench_a + first, bench_b, ..pair }
-        };
-        self.closest = Closest { boards: boards.map(numbered), any: any.map(numbered) };
+        self.closest = self.dancer.solve(state.0, state.1, &mut own)?;
+        for pair in [&mut self.closest.boards, &mut self.closest.any].into_iter().flatten() {
+            pair.bench_a += first;
+            pair.bench_b += if pair.bench_b < own_handles { first } else { all_handles - own_handles };
+        }
         Ok(())
     }
 }
