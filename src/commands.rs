@@ -17,6 +17,7 @@ pub mod draw;
 mod duration;
 pub mod events;
 mod lines;
+pub mod list;
 mod log_lines;
 pub mod metrics;
 mod new_file;

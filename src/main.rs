@@ -29,6 +29,8 @@ pub enum Command {
     /// Publish a scene live
     #[command(arg = scene_argument())]
     Run(commands::run::RunArguments),
+    /// List the shows that run on this machine
+    List(commands::list::ListArguments),
     /// Conduct a running publisher: pause, rate, seek, step, hold
     Control(commands::control::ControlArguments),
     /// Record a running publisher as MCAP, or repair a recording that was cut
@@ -120,6 +122,7 @@ fn main() -> ExitCode {
     let ready = common.check_names(takes_several).and_then(|()| commands::end_when_shared_memory_is_full());
     let done = ready.and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
+        Command::List(arguments) => commands::list::list(&common, arguments),
         Command::Control(arguments) => commands::control::control(&common, arguments),
         Command::Record(arguments) => commands::record::record(&common, arguments),
         Command::Replay(arguments) => commands::replay::replay(&common, arguments),

@@ -277,7 +277,8 @@ impl Screen<'_> {
 
     fn lines(&self, report: &IntervalReport) -> Vec<String> {
         let Some(header) = report.present_header() else {
-            return vec![format!("waiting for a publisher of \"{}\"", self.name)];
+            let instead = shows::instead(self.name, &shows::running());
+            return vec![format!("waiting for a publisher of \"{}\"", self.name), instead];
         };
         let state = report.state().unwrap_or(FrameState::Moving);
         let style = self.style(state.severity());

@@ -9,6 +9,7 @@ mod feed;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod light;
+mod list;
 mod live;
 mod log;
 mod metrics;

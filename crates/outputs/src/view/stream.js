@@ -116,6 +116,8 @@ export class Stream {
     this.messages = { stage: {}, alert: {}, cue: {}, facts: {}, chase: {} };
     /** The reason why no frames come: a key of the page's words, or the server's reason; null while they come. */
     this.trouble = "server";
+    /** The names of the shows that run on the server's machine instead; null while that is not known. */
+    this.running = null;
     this.received = 0;
     /** The transport times of the last frames, ms. */
     this.ways = [];
@@ -201,7 +203,10 @@ export class Stream {
 
   handle(message) {
     this.onmessage?.(message);
-    if (message.type === "waiting") this.lose(message.reason ?? "publisher");
+    if (message.type === "waiting") {
+      this.lose(message.reason ?? "publisher");
+      this.running = message.running ?? null;
+    }
     message.at = performance.now();
     if (this.messages[message.type]) this.messages[message.type].newest = message;
   }

@@ -20,6 +20,8 @@ export class Transport {
     this.kind = null;
     /** The reason of a disconnection: a key of the words, or the server's sentence; null while frames come. */
     this.reason = null;
+    /** Words on what to do without a publisher; may be empty. */
+    this.instead = "";
     /** The cue at which the show waits, or the cue that it has just passed. */
     this.cue = null;
     /** The moments of the latest change and of the latest passed cue, as this page saw them (ms). */

@@ -212,6 +212,8 @@ const WORDS = {
   // The state of the page, spoken once.
   server: ["waiting for the server", "等待服务器"],
   publisher: ["waiting for a publisher", "等待发布端"],
+  runningHere: ["running here: {names}", "本机正在运行：{names}"],
+  startOne: ["start it with: bench-dragon run --name {name}", "启动命令：bench-dragon run --name {name}"],
   noStage: ["waiting for the stage", "等待舞台数据"],
   version: ["this page is for another version of the server: load it again", "本页面与服务器版本不符：请重新载入"],
   noFramesNow: ["no frames", "没有新帧"],
