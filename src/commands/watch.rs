@@ -14,7 +14,9 @@ use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::messages::json::{AlertObject, ChaseObject, CueObject};
-use bench_dragon::messages::sentence::{Figures, alert_sentence, chase_sentence, cue_sentence, rounded, time_until};
+use bench_dragon::messages::sentence::{
+    Figures, alert_sentence, chase_sentence, cue_sentence, lost_files_sentence, rounded, time_until,
+};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState, Severity};
 use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus, Stage};
@@ -43,6 +45,9 @@ struct IntervalLine {
     received: u64,
     missed: u64,
     latency_ns: Option<Latency>,
+    /// Files of the publisher that another program has removed, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lost_files: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     chase: Option<ChaseLine>,
 }
@@ -171,6 +176,7 @@ impl Screen<'_> {
                     received: report.received,
                     missed: report.missed,
                     latency_ns: report.latency,
+                    lost_files: report.status.map(|status| status.lost_files).filter(|lost| *lost > 0),
                     chase: report.chase.map(|(status, has_died)| ChaseLine { status: (&status).into(), has_died }),
                 };
                 write_json(&mut output, &line)?;
@@ -312,6 +318,8 @@ impl Screen<'_> {
             format!("{}  {} handles  clearance {clearance}", self.dancers(report), header.handles),
         ];
         lines.extend(report.status.iter().flat_map(status_lines));
+        let lost = report.status.map_or(0, |status| status.lost_files);
+        lines.extend((lost > 0).then(|| lost_files_sentence(lost)));
         lines.extend(report.chase.map(|(status, has_died)| chase_line(&status, has_died, header.time_scale)));
         lines
     }

@@ -12,6 +12,7 @@ mod light;
 mod list;
 mod live;
 mod log;
+mod lost_files;
 mod metrics;
 mod outputs_of_dragons;
 mod placed;
