@@ -8,6 +8,7 @@ mod logging;
 
 use std::process::ExitCode;
 
+use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use commands::ros_args;
 use commands::scene_argument::{self, scene_argument};
@@ -113,6 +114,9 @@ fn main() -> ExitCode {
     };
     if let Err(sentence) = scene_argument::resolve(&mut common.scene, &definition, &matches) {
         return exit_code(Err(CommandError::BadInput(sentence)));
+    }
+    if matches!(command, Command::Soak(_)) && matches.value_source("names") == Some(ValueSource::DefaultValue) {
+        common.names = vec![commands::soak::NAME.to_owned()];
     }
     logging::set_up(&common);
     if let [name] = &mut common.names[..] {

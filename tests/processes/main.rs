@@ -26,6 +26,7 @@ mod send;
 mod service_manager;
 mod several;
 mod soak;
+mod soak_verdict;
 mod transports;
 mod tunnel;
 mod watch;
