@@ -24,6 +24,7 @@ mod new_file;
 mod parent;
 pub mod plan;
 mod publishing;
+mod qr_code;
 mod realtime_scheduling;
 pub mod record;
 pub mod replay;

@@ -17,6 +17,7 @@ mod metrics;
 mod outputs_of_dragons;
 mod placed;
 mod python_module;
+mod qr_code;
 mod readers;
 mod record;
 mod replay;

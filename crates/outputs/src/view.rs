@@ -209,7 +209,7 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         let mut files = ServeDir::new(folder);
         let own = Router::new().fallback(move |request: Request| own_file(files.try_call(request)));
         let own = own.layer(from_fn_with_state(server.clone(), own_page));
-        router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("/pages/") }));
+        router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("pages/") }));
     }
     router
         .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))

@@ -132,9 +132,11 @@ export class Stream {
   }
 
   open() {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
     const whose = this.name === null ? "" : `&name=${encodeURIComponent(this.name)}`;
-    const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}${whose}`);
+    // Beside this module, which a proxy may have below a path.
+    const address = new URL(`frames?rate=${MOST_FRAMES}${whose}`, import.meta.url);
+    address.protocol = address.protocol.replace("http", "ws");
+    const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     let requested = null, checked = 0, heard = 0, nearest = Infinity;

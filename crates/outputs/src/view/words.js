@@ -186,6 +186,7 @@ const WORDS = {
   noStageYet: ["NO STAGE", "没有舞台数据"],
   otherVersion: ["OTHER VERSION", "版本不符"],
   sinceThen: ["for {passed}", "已 {passed}"],
+  heldTouch: ["for {passed} · release: the red button", "已 {passed} · 按红色按钮解除"],
   heldFor: ["for {passed} · release: H", "已 {passed} · 按 H 解除"],
   goDetail: ["{cue} · waits {passed}", "{cue} · 已等待 {passed}"],
   endedAt: ["at {time} s", "停于 {time} 秒"],
