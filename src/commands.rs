@@ -17,12 +17,14 @@ pub mod draw;
 mod duration;
 pub mod events;
 mod lines;
+pub mod list;
 mod log_lines;
 pub mod metrics;
 mod new_file;
 mod parent;
 pub mod plan;
 mod publishing;
+mod qr_code;
 mod realtime_scheduling;
 pub mod record;
 pub mod replay;
@@ -66,7 +68,7 @@ pub struct Common {
     /// The scene (TOML), of commands that take it as their argument; by default the paper's, which is built in
     #[arg(long, value_name = "FILE", global = true)]
     pub scene: Option<std::path::PathBuf>,
-    /// The name under which services and topics appear; view, send and metrics take several
+    /// The name under which services and topics appear; view, send and metrics take several, soak has "soak" of its own
     #[arg(long = "name", value_name = "NAME", global = true, default_value = "bench_dragon")]
     pub names: Vec<String>,
     /// Print JSON lines for machines

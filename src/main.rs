@@ -8,6 +8,7 @@ mod logging;
 
 use std::process::ExitCode;
 
+use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use commands::ros_args;
 use commands::scene_argument::{self, scene_argument};
@@ -29,6 +30,8 @@ pub enum Command {
     /// Publish a scene live
     #[command(arg = scene_argument())]
     Run(commands::run::RunArguments),
+    /// List the shows that run on this machine
+    List(commands::list::ListArguments),
     /// Conduct a running publisher: pause, rate, seek, step, hold
     Control(commands::control::ControlArguments),
     /// Record a running publisher as MCAP, or repair a recording that was cut
@@ -112,6 +115,9 @@ fn main() -> ExitCode {
     if let Err(sentence) = scene_argument::resolve(&mut common.scene, &definition, &matches) {
         return exit_code(Err(CommandError::BadInput(sentence)));
     }
+    if matches!(command, Command::Soak(_)) && matches.value_source("names") == Some(ValueSource::DefaultValue) {
+        common.names = vec![commands::soak::NAME.to_owned()];
+    }
     logging::set_up(&common);
     if let [name] = &mut common.names[..] {
         *name = names.applied_to(name);
@@ -120,6 +126,7 @@ fn main() -> ExitCode {
     let ready = common.check_names(takes_several).and_then(|()| commands::end_when_shared_memory_is_full());
     let done = ready.and_then(|()| match &command {
         Command::Run(arguments) => commands::run::run(&common, arguments),
+        Command::List(arguments) => commands::list::list(&common, arguments),
         Command::Control(arguments) => commands::control::control(&common, arguments),
         Command::Record(arguments) => commands::record::record(&common, arguments),
         Command::Replay(arguments) => commands::replay::replay(&common, arguments),

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
+use bench_dragon::client::shows;
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::recording::mcap::recorder::{
     DEFAULT_TOPICS, Recorded, RecordedCounts, Recorder, RecorderConfig, Split,
@@ -98,14 +99,15 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
         eprintln!("Recording \"{}\" to {}; Ctrl-C ends.", common.name(), file.display());
     }
     let over = || stop.load(Ordering::Relaxed);
-    let fed = follow(&mut feed, &queue, &thread, arguments.duration, over, &progress(common));
+    let fed = follow(&mut feed, common.name(), (&queue, &thread), arguments.duration, over, &progress(common));
     let (recorded, failure) = thread.finish(queue);
     print(common, &recorded)?;
     fed?;
     match failure {
         Some(error) => Err(CommandError::Failed(error.to_string())),
         None if recorded.files.is_empty() => {
-            Err(CommandError::Failed(format!("nothing came from \"{}\": there is no recording", common.name())))
+            let (name, instead) = (common.name(), shows::instead(common.name(), &shows::running()));
+            Err(CommandError::Failed(format!("nothing came from \"{name}\" ({instead}): there is no recording")))
         }
         None => Ok(()),
     }
@@ -116,8 +118,8 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
 /// replay needs the stage, and `verify` the scene.
 fn follow(
     feed: &mut Feed,
-    queue: &RecordQueue,
-    thread: &RecordThread,
+    name: &str,
+    (queue, thread): (&RecordQueue, &RecordThread),
     duration: Option<f64>,
     over: impl Fn() -> bool,
     bar: &ProgressBar,
@@ -149,9 +151,10 @@ fn follow(
         } else if obstacle.is_met(polled) {
             std::thread::sleep(Obstacle::RETRY_INTERVAL);
         }
-        if shown.elapsed() >= PROGRESS_INTERVAL {
+        if shown.elapsed() >= PROGRESS_INTERVAL && !bar.is_hidden() {
             shown = Instant::now();
-            bar.set_message(sentence(&thread.recorded()));
+            let recorded = thread.recorded();
+            bar.set_message(if recorded.files.is_empty() { waiting(name) } else { sentence(&recorded) });
             bar.tick();
         }
     }
@@ -166,15 +169,17 @@ fn progress(common: &Common) -> ProgressBar {
     }
     // The template is a constant of known keys: the fallback is never used.
     let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
-    ProgressBar::new_spinner().with_style(style).with_message("waiting for a publisher")
+    ProgressBar::new_spinner().with_style(style)
+}
+
+/// Returns the words while there is no publisher.
+fn waiting(name: &str) -> String {
+    format!("waiting for a publisher of \"{name}\"; {}", shows::instead(name, &shows::running()))
 }
 
 /// Returns the recording's progress in words.
 fn sentence(recorded: &Recorded) -> String {
     let RecordedCounts { messages, frames, missed, bytes, .. } = recorded.counts;
-    if recorded.files.is_empty() {
-        return "waiting for a publisher".to_owned();
-    }
     format!("{}, {}, {messages} messages, {frames} frames, {missed} missed", time(recorded), size(bytes))
 }
 

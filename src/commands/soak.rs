@@ -1,7 +1,7 @@
 //! `soak`: a publisher and subscribers as processes for hours, and a verdict. The command starts `soak-subscriber`.
 
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -11,6 +11,7 @@ use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedOptions};
 use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::show::scene::Accepted;
+use bench_dragon::soak::causes::causes;
 use bench_dragon::soak::figures;
 use bench_dragon::soak::fleet::{Fleet, FleetError};
 use bench_dragon::soak::history::History;
@@ -18,9 +19,9 @@ use bench_dragon::soak::limits::{Limits, bytes, nanoseconds, share};
 use bench_dragon::soak::member::Role;
 use bench_dragon::soak::observer::Observer;
 use bench_dragon::soak::processes::{ConductPlan, Plan};
-use bench_dragon::soak::report::{Machine, Report, SCHEMA, SubscriberReport};
+use bench_dragon::soak::report::{LoadAverage, Machine, Report, SCHEMA, SubscriberReport};
 use bench_dragon::soak::verdict::SoakVerdict;
-use indicatif::ProgressBar;
+use indicatif::{FormattedDuration, ProgressBar};
 
 use super::parent::Parent;
 use super::realtime_scheduling::RealtimeScheduling;
@@ -28,6 +29,9 @@ use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_se
 
 /// Sleep of a slow subscriber: longer than a queue of 64 frames lasts at 60 Hz.
 const SLOW_PAUSE: Duration = Duration::from_millis(1500);
+
+/// The name of a soak test without `--name`: a show may run under the usual name.
+pub const NAME: &str = "soak";
 
 /// Clients of the control service for which there is room beside the load generator.
 const MOST_FLAKY_CLIENTS: usize = 8;
@@ -64,6 +68,9 @@ pub struct SoakArguments {
     /// Write the report to FILE.json and FILE.html, histograms to FILE.hgrm, the log of the show to FILE.log.jsonl
     #[arg(long, value_name = "FILE", help_heading = "The test")]
     report: Option<PathBuf>,
+    /// Write the verdict to FILE as JUnit XML, a test case for each limit
+    #[arg(long, value_name = "FILE", help_heading = "The test")]
+    junit: Option<PathBuf>,
     #[command(flatten)]
     scheduling: RealtimeScheduling,
     /// The number of frames that the subscribers that keep up may miss in all
@@ -95,10 +102,12 @@ pub struct SoakSubscriberArguments {
 pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandError> {
     arguments.check(common)?;
     let files = arguments.report.as_deref().map(ReportFiles::create).transpose()?;
+    let junit = arguments.junit.as_deref().map(|file| created("--junit", file)).transpose()?;
     let stop = stop_on_signals()?;
     let began_at = realtime_ns() / 1_000_000_000;
     let mut fleet = Fleet::start(arguments.plan(common)?, &|| !stop.load(Ordering::Relaxed))?;
-    let bar = progress_bar(arguments.duration.ceil() as u64, common);
+    let mut progress = Progress::new(arguments.duration, common);
+    let mut load = LoadAverage::default();
     let mut history = History::new(figures::columns(&fleet));
     let began = Instant::now();
     let mut seconds = 0.0;
@@ -109,20 +118,23 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
         }
         seconds = began.elapsed().as_secs_f64();
         history.push(seconds, figures::row(&mut fleet));
-        show_progress(&bar, &mut fleet, seconds);
+        load.sample();
+        progress.show(&mut fleet, seconds);
     }
     fleet.finish()?;
-    bar.finish_and_clear();
+    progress.bar.finish_and_clear();
     fleet.take_stderr().iter().for_each(|line| eprintln!("publisher: {line}"));
     let limits = arguments.limits();
     let verdict = SoakVerdict::of(&fleet, &limits);
     let report = Report {
         schema: SCHEMA,
         verdict: verdict.word(),
+        causes: causes(&fleet),
         checks: verdict.checks,
         command: std::env::args().collect(),
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine::this(),
+        load,
         began_at,
         seconds,
         publisher: fleet.summary().cloned(),
@@ -132,29 +144,76 @@ pub fn soak(common: &Common, arguments: &SoakArguments) -> Result<(), CommandErr
         history,
     };
     drop(fleet);
-    conclude(&report, common, files)
+    conclude(&report, common, files, junit)
 }
 
-fn show_progress(bar: &ProgressBar, fleet: &mut Fleet, seconds: f64) {
-    for line in fleet.take_stderr() {
-        bar.suspend(|| eprintln!("publisher: {line}"));
+/// The progress on standard error: a bar on a terminal, or else a line at times.
+struct Progress {
+    bar: ProgressBar,
+    duration: f64,
+    /// The seconds after which the next line is due; none on a terminal, and with `--quiet`.
+    next_line: f64,
+}
+
+impl Progress {
+    fn new(duration: f64, common: &Common) -> Self {
+        let has_lines = !common.quiet && !std::io::stderr().is_terminal();
+        if !common.quiet {
+            eprintln!("Soaking \"{}\" for {}; Ctrl-C ends with a verdict.", common.name(), clock(duration));
+        }
+        let next_line = if has_lines { Self::interval(duration) } else { f64::INFINITY };
+        Self { bar: progress_bar(duration.ceil() as u64, common), duration, next_line }
     }
-    let (rate, overruns) = fleet.status().map_or((0.0, 0), |status| (status.measured_rate, status.overruns));
-    bar.set_message(format!("{rate:.1} Hz, {overruns} overruns, {} missed", fleet.missed()));
-    bar.set_position(seconds as u64);
+
+    /// Returns the seconds between two lines: 20 lines a test, but one each ten minutes at least.
+    fn interval(duration: f64) -> f64 {
+        (duration / 20.0).clamp(5.0, 600.0)
+    }
+
+    fn show(&mut self, fleet: &mut Fleet, seconds: f64) {
+        for line in fleet.take_stderr() {
+            self.bar.suspend(|| eprintln!("publisher: {line}"));
+        }
+        let (rate, skipped) = fleet.status().map_or((0.0, 0), |status| (status.measured_rate, status.skipped));
+        let so_far = format!("{rate:.1} Hz, {skipped} periods skipped, {} frames missed", fleet.missed());
+        if seconds >= self.next_line && seconds < self.duration {
+            self.next_line = seconds + Self::interval(self.duration);
+            eprintln!(
+                "{} of {}, {} left: {so_far}",
+                clock(seconds),
+                clock(self.duration),
+                clock(self.duration - seconds)
+            );
+        }
+        self.bar.set_message(so_far);
+        self.bar.set_position(seconds as u64);
+    }
 }
 
-fn conclude(report: &Report, common: &Common, files: Option<ReportFiles>) -> Result<(), CommandError> {
+/// Returns seconds as hours, minutes and seconds.
+fn clock(seconds: f64) -> FormattedDuration {
+    FormattedDuration(Duration::try_from_secs_f64(seconds.round()).unwrap_or_default())
+}
+
+fn conclude(
+    report: &Report,
+    common: &Common,
+    files: Option<ReportFiles>,
+    junit: Option<Output>,
+) -> Result<(), CommandError> {
     // The Ctrl-C that ended the test, or a closed terminal, may have ended the reader of the output.
     if let Some(files) = files {
         files.write(report)?;
+    }
+    if let Some(mut output) = junit {
+        report.write_junit(&mut output.writer)?;
+        output.finish()?;
     }
     let printed = print(report, common);
     if report.verdict == "PASS" {
         return printed;
     }
-    let broken: Vec<_> = report.checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
-    Err(CommandError::Failed(format!("the soak test failed: {}", broken.join("; "))))
+    Err(CommandError::Failed(format!("the soak test failed: {}", report.failure())))
 }
 
 fn print(report: &Report, common: &Common) -> Result<(), CommandError> {
@@ -257,6 +316,14 @@ fn with_end(stem: &Path, end: &str) -> OsString {
     name
 }
 
+/// Creates a file that an option names.
+fn created(option: &str, file: &Path) -> Result<Output, CommandError> {
+    Output::file(file).map_err(|error| match error {
+        CommandError::BadInput(sentence) => CommandError::BadInput(format!("{option}: {sentence}")),
+        other => other,
+    })
+}
+
 /// Both files of a report, opened before the test: after eight hours a failure would be too late.
 struct ReportFiles {
     json: Output,
@@ -265,12 +332,7 @@ struct ReportFiles {
 
 impl ReportFiles {
     fn create(stem: &Path) -> Result<Self, CommandError> {
-        let create = |end: &str| {
-            Output::file(Path::new(&with_end(stem, end))).map_err(|error| match error {
-                CommandError::BadInput(sentence) => CommandError::BadInput(format!("--report: {sentence}")),
-                other => other,
-            })
-        };
+        let create = |end: &str| created("--report", Path::new(&with_end(stem, end)));
         // The publisher creates these.
         [HISTOGRAMS, LOG].into_iter().try_for_each(|end| create(end).map(drop))?;
         Ok(Self { json: create(".json")?, html: create(".html")? })

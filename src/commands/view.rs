@@ -1,6 +1,6 @@
 //! `view`: the live stage picture in a browser.
 
-use std::io::ErrorKind;
+use std::io::{ErrorKind, IsTerminal};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,6 +11,7 @@ use bench_dragon::proof::{Proved, Refused, scene_hash};
 use serde::Serialize;
 use serde_json::json;
 
+use super::qr_code::qr_code;
 use super::scene_facts::scene_facts;
 use super::verify::certificate::reason;
 use super::{CommandError, Common, Output, stop_on_signals};
@@ -142,6 +143,12 @@ fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result
     if arguments.pages.is_some() {
         let host = if of_all { format!("localhost:{port}") } else { address.to_string() };
         output.line(&format!("Your own pages are at http://{host}/pages/."))?;
+    }
+    // A phone would have to type the token.
+    let for_phones = if of_all { others.first().cloned() } else { Some(format!("http://{address}/")) };
+    let is_reachable = !address.ip().is_loopback() && std::io::stdout().is_terminal();
+    if let Some(code) = for_phones.filter(|_| is_reachable).and_then(|url| qr_code(&format!("{url}{fragment}"))) {
+        output.line(&code)?;
     }
     if token.is_some() {
         output.line("Only who has this address with its token may conduct; without the token one may watch.")?;

@@ -13,8 +13,11 @@ use bench_dragon::client::clock::monotonic_ns;
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
+use bench_dragon::client::shows;
 use bench_dragon::messages::json::{AlertObject, ChaseObject, CueObject};
-use bench_dragon::messages::sentence::{Figures, alert_sentence, chase_sentence, cue_sentence, rounded, time_until};
+use bench_dragon::messages::sentence::{
+    Figures, alert_sentence, chase_sentence, cue_sentence, lost_files_sentence, rounded, time_until,
+};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState, Severity};
 use bench_dragon::messages::{ChaseStatus, CollisionAlert, LoopStatus, Stage};
@@ -43,6 +46,9 @@ struct IntervalLine {
     received: u64,
     missed: u64,
     latency_ns: Option<Latency>,
+    /// Files of the publisher that another program has removed, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lost_files: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     chase: Option<ChaseLine>,
 }
@@ -63,12 +69,15 @@ const CLEAR_BELOW_CURSOR: &str = "\x1b[J";
 /// Column of an alert's words on the terminal: behind its time.
 const INDENT: &str = "              ";
 
+/// The greatest length of a line in a file or a pipe.
+const LINE_COLUMNS: usize = 120;
+
 /// The form of reports and events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Display {
     /// Redrawn in place.
     Terminal,
-    /// A line a report.
+    /// Some lines a report.
     Lines,
     /// A JSON line a report.
     Json,
@@ -171,11 +180,12 @@ impl Screen<'_> {
                     received: report.received,
                     missed: report.missed,
                     latency_ns: report.latency,
+                    lost_files: report.status.map(|status| status.lost_files).filter(|lost| *lost > 0),
                     chase: report.chase.map(|(status, has_died)| ChaseLine { status: (&status).into(), has_died }),
                 };
                 write_json(&mut output, &line)?;
             }
-            Display::Lines => writeln!(output, "{}", self.lines(report).join("; "))?,
+            Display::Lines => folded(&self.lines(report)).iter().try_for_each(|line| writeln!(output, "{line}"))?,
             Display::Terminal => {
                 self.clear_previous(&mut output)?;
                 self.drawn = self.lines(report);
@@ -249,15 +259,15 @@ impl Screen<'_> {
     /// Prints a line above the last report.
     fn print_line(&self, line: &str) -> Result<(), CommandError> {
         let mut output = stdout().lock();
+        let filled = |columns| textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT));
         if self.display == Display::Lines {
-            writeln!(output, "{line}")?;
+            writeln!(output, "{}", filled(LINE_COLUMNS))?;
             return Ok(output.flush()?);
         }
         self.clear_previous(&mut output)?;
         // Some terminals have no known size.
         let columns = rustix::termios::tcgetwinsize(&output).map_or(0, |size| usize::from(size.ws_col));
-        let columns = if columns == 0 { 80 } else { columns };
-        writeln!(output, "{}", textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT)))?;
+        writeln!(output, "{}", filled(if columns == 0 { 80 } else { columns }))?;
         self.draw(&mut output)?;
         Ok(output.flush()?)
     }
@@ -277,7 +287,8 @@ impl Screen<'_> {
 
     fn lines(&self, report: &IntervalReport) -> Vec<String> {
         let Some(header) = report.present_header() else {
-            return vec![format!("waiting for a publisher of \"{}\"", self.name)];
+            let instead = shows::instead(self.name, &shows::running());
+            return vec![format!("waiting for a publisher of \"{}\"", self.name), instead];
         };
         let state = report.state().unwrap_or(FrameState::Moving);
         let style = self.style(state.severity());
@@ -311,6 +322,8 @@ impl Screen<'_> {
             format!("{}  {} handles  clearance {clearance}", self.dancers(report), header.handles),
         ];
         lines.extend(report.status.iter().flat_map(status_lines));
+        let lost = report.status.map_or(0, |status| status.lost_files);
+        lines.extend((lost > 0).then(|| lost_files_sentence(lost)));
         lines.extend(report.chase.map(|(status, has_died)| chase_line(&status, has_died, header.time_scale)));
         lines
     }
@@ -348,6 +361,23 @@ impl Screen<'_> {
             _ => Style::new(),
         }
     }
+}
+
+/// Returns the parts of a report as lines that are not longer than [`LINE_COLUMNS`] unless a part is; the first of them
+/// is not indented.
+fn folded(parts: &[String]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for part in parts {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + part.chars().count() + 2 <= LINE_COLUMNS => {
+                line.push_str("; ");
+                line.push_str(part);
+            }
+            None => lines.push(part.clone()),
+            Some(_) => lines.push(format!("  {part}")),
+        }
+    }
+    lines
 }
 
 /// Returns the line of a chase.

@@ -262,6 +262,25 @@ fn in_reach(scenario: &str) {
     run_scenario("stage_reach.py", scenario, &[]);
 }
 
+fn on_the_way(scenario: &str) {
+    run_scenario("stage_ways.py", scenario, &[]);
+}
+
+#[test]
+fn the_page_works_below_the_path_of_a_proxy() {
+    on_the_way("below_a_path");
+}
+
+#[test]
+fn a_phone_is_offered_the_button_that_releases() {
+    on_the_way("held_on_a_phone");
+}
+
+#[test]
+fn a_page_without_a_publisher_says_what_to_start() {
+    on_the_way("nobody_publishes");
+}
+
 #[test]
 fn boards_are_where_the_truth_has_them() {
     in_a_browser("boards_are_where_the_truth_has_them");

@@ -301,3 +301,45 @@ fn a_show_follows_the_art_net_timecode_of_another_library() {
     let time = serde_json::from_slice::<Value>(&shown.stdout).unwrap()["sim_time"].as_f64().unwrap();
     assert!((17.9..22.0).contains(&time), "{time}");
 }
+
+/// Returns a chunk of PosiStageNet 2.03: the number in 16 bits, the length in 15, then whether it has chunks.
+fn chunk(id: u16, has_chunks: bool, body: &[u8]) -> Vec<u8> {
+    let header = u32::from(id) | (body.len() as u32) << 16 | u32::from(has_chunks) << 31;
+    [&header.to_le_bytes(), body].concat()
+}
+
+#[test]
+fn a_tracker_whose_sender_calls_it_invalid_is_counted_and_said_so() {
+    let name = "chase_invalid";
+    let port = port();
+    let _publisher = publisher(name, &[]);
+    let mut chase = Process::start(program(name).args(["chase", "psn", "--group", &format!("127.0.0.1:{port}")]));
+    let said = chase.error_lines();
+    chase.first_line();
+    let mut watch = Process::start(program(name).args(["watch", "--json"]));
+    let seconds = watch.lines();
+    let socket = std::net::UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+    let position: Vec<u8> = [1.0_f32, 2.0, 0.0].iter().flat_map(|metres| metres.to_le_bytes()).collect();
+    let fields = [chunk(0, false, &position), chunk(3, false, &0.0_f32.to_le_bytes())].concat();
+    let packet = chunk(0x6755, true, &chunk(1, true, &chunk(1, true, &fields)));
+    for _ in 0..5 {
+        socket.send_to(&packet, ("127.0.0.1", port)).unwrap();
+    }
+    assert!(said.until("status 0").contains("tracker 1 comes with status 0"));
+    let counted = |line: &str| serde_json::from_str::<Value>(line).unwrap()["chase"]["ignored"] == 5;
+    let line = seconds.all_until_one(counted, "five ignored positions").pop().unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&line).unwrap()["chase"]["readings"], 0, "{line}");
+}
+
+#[test]
+fn a_show_that_was_paused_before_gives_a_chase_no_error() {
+    let name = "chase_paused";
+    let port = port().to_string();
+    let _publisher = crate::harness::answering(publisher(name, &["--start", "200"]), || program(name));
+    control(name, &["pause"]);
+    let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
+    let _sender = sender(name, &["--port", &port, "--seconds", "12"]);
+    let locked = state(&lines, "locked");
+    assert!(locked["error"].is_null(), "{locked}");
+    state(&lines, "paused");
+}

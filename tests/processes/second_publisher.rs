@@ -89,7 +89,9 @@ fn a_second_publisher_is_admitted_and_nothing_of_it_is_taken_for_the_show() {
     assert_refused(&place, &["run"]);
     first.stop();
     assert_refused(&place, &["run", "--duration", "1"]);
-    let soaked = Process::start(place.program().args(["soak", "--duration", "1", "--rate", "100"])).output();
+    let soaked =
+        Process::start(place.program().args(["--name", "bench_dragon", "soak", "--duration", "1", "--rate", "100"]))
+            .output();
     assert!(!soaked.status.success(), "{}", text(&soaked.stdout));
     first.signal(SIGCONT);
 

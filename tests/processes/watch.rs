@@ -79,3 +79,21 @@ fn cues_are_printed_as_they_are_announced() {
     assert_eq!(cues[1]["sim_time"], 0.8);
     assert!(cues.iter().all(|cue| cue["run_id"].is_string() && cue["stamp_ns"].is_string() && cue["tick"].is_u64()));
 }
+
+#[test]
+fn lines_in_a_pipe_fit_a_hundred_and_twenty_columns() {
+    let mut publisher = program("narrow");
+    // Alerts as the contact approaches.
+    let mut publisher = Process::start(publisher.args(["run", "--quiet", "--rate", "50", "--start", "405"]));
+    let mut people = Process::start(program("narrow").arg("watch"));
+    let lines = people.lines();
+    let mut read = lines.all_until("approaching");
+    // A report after the first status, and the next one.
+    read.extend(lines.all_until("lateness p99"));
+    read.extend(lines.all_until("lateness p99"));
+    people.signal(nix::sys::signal::Signal::SIGTERM);
+    publisher.close_stdout();
+    let long: Vec<&String> = read.iter().filter(|line| line.chars().count() > 120).collect();
+    assert!(long.is_empty(), "{long:#?}");
+    assert!(read.iter().any(|line| line.contains("; latency ")), "a line has one part: {read:#?}");
+}

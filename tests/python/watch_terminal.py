@@ -133,13 +133,17 @@ def is_publishing(rows):
     return len(rows) >= len(FIGURES) and rows[-1].startswith("lateness")
 
 
+def is_waiting(rows):
+    return any(row.startswith("waiting for a publisher") for row in rows)
+
+
 def figures_are_redrawn_in_place():
     started = [rf'Watching "{NAME}"; Ctrl-C ends, \? lists the keys\.', rf'A publisher of "{NAME}" is running \(run [0-9a-f]{{16}}\)\.']
     # The wide one knows its columns only, as a serial line does.
     with Terminal(80) as terminal, Terminal(200, rows=0) as wide, Terminal(60) as narrow, Terminal(50) as narrowest:
         every = [terminal, wide, narrow, narrowest]
         for each in every:
-            each.read_until(lambda rows: rows and rows[-1].startswith("waiting for a publisher"))
+            each.read_until(is_waiting)
         with publisher() as running:
             for each in every:
                 each.read_until(is_publishing)
@@ -163,8 +167,8 @@ def figures_are_redrawn_in_place():
                 for begin in ["rate ", "head (", "publisher: "]:
                     assert sum(row.startswith(begin) for row in rows) == 1, "\n".join(rows)
             running.send_signal(signal.SIGKILL)
-            ended = [rf'The publisher of "{NAME}" has ended; waiting for the next\.', rf'waiting for a publisher of "{NAME}"']
-            terminal.read_until(lambda rows: rows and rows[-1].startswith("waiting for a publisher"))
+            ended = [rf'The publisher of "{NAME}" has ended; waiting for the next\.', rf'waiting for a publisher of "{NAME}"', r'(no show runs|running) here: .+']
+            terminal.read_until(is_waiting)
             lines = terminal.lines()
             alerts = lines[len(started) : -len(ended)]
             assert_matches(lines, started + [ALERT] * len(alerts) + ended)

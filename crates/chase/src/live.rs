@@ -276,7 +276,8 @@ impl<'a> Chase<'a> {
             None => state,
         };
         (self.status.rate, self.status.error) = match (goal, self.steering.show_time(now_ns)) {
-            (Goal::Follow { time, rate }, Some(show)) => (rate, show - time),
+            (Goal::Follow { time, rate }, Some(show)) if !self.steering.begins() => (rate, show - time),
+            (Goal::Follow { rate, .. }, Some(_)) => (rate, f64::NAN),
             (Goal::Follow { rate, .. }, None) => (rate, f64::NAN),
             _ => (f64::NAN, f64::NAN),
         };

@@ -58,6 +58,8 @@ pub enum Input {
         /// The moment, CLOCK_MONOTONIC in nanoseconds.
         at_ns: u64,
     },
+    /// A position that is invalid by the source's own account.
+    Invalid,
     /// A malformed message.
     Malformed,
     /// The stream has ended.
@@ -120,13 +122,19 @@ pub fn psn(
     tracker: u16,
     stop: &Arc<AtomicBool>,
 ) -> Result<Receiver<Input>, SourceError> {
+    let mut has_warned = false;
     let group = address.ip().is_multicast().then(|| interface.unwrap_or(Ipv4Addr::UNSPECIFIED));
     let socket = listening(address, group).map_err(|source| SourceError::Listen { address, source })?;
     Ok(datagrams(socket, stop, move |datagram, _, at_ns, inputs| match psn::decode(datagram) {
         Ok(trackers) => {
-            // Status 0: the position is the last one known.
-            let seen = trackers.iter().filter(|it| it.id == tracker && it.status != 0.0);
-            inputs.extend(seen.map(|it| Input::Position { position: it.position, at_ns }));
+            for seen in trackers.iter().filter(|it| it.id == tracker) {
+                // Status 0: the position is the last one known.
+                let is_valid = seen.status != 0.0;
+                if !is_valid && !std::mem::replace(&mut has_warned, true) {
+                    log::warn!("tracker {tracker} comes with status 0, by which its place is not known: it is ignored");
+                }
+                inputs.push(if is_valid { Input::Position { position: seen.position, at_ns } } else { Input::Invalid });
+            }
         }
         Err(psn::Malformed) => inputs.push(Input::Malformed),
     }))
@@ -148,7 +156,7 @@ fn listening(address: SocketAddrV4, group: Option<Ipv4Addr>) -> io::Result<UdpSo
 fn datagrams(
     socket: UdpSocket,
     stop: &Arc<AtomicBool>,
-    decode: impl Fn(&[u8], SocketAddr, u64, &mut Vec<Input>) + Send + 'static,
+    mut decode: impl FnMut(&[u8], SocketAddr, u64, &mut Vec<Input>) + Send + 'static,
 ) -> Receiver<Input> {
     let (sender, inputs) = channel();
     let stop = Arc::clone(stop);

@@ -121,6 +121,12 @@ impl Steering {
         self.waiting
     }
 
+    /// Returns true for a show that was paused when the chase found it, until the show plays or answers a command: its
+    /// distance from the source is no error of the chase.
+    pub fn begins(&self) -> bool {
+        self.show.as_ref().is_some_and(|show| show.is_new)
+    }
+
     /// Returns the latest frame.
     pub fn frame(&self) -> Option<&FrameHeader> {
         self.show.as_ref().map(|show| &show.frame)
@@ -383,6 +389,18 @@ mod tests {
             let command = steering.command(Goal::Stand(None), at(6));
             assert_eq!(matches!(command, Some(Command::Pause)), is_own, "{command:?}");
         }
+    }
+
+    /// Its distance from the source is nobody's error, and the pause nobody's command to the chase.
+    #[test]
+    fn a_show_that_was_paused_before_the_chase_begins_without_an_error() {
+        let mut steering = Steering::new(Limits { take_up: 0.1, seek_above: 0.5, seeks_back: true });
+        let paused = FrameHeader { playback: PlaybackState::Paused as u32, ..playing(0, 0, 3.0) };
+        steering.frame_came(&paused, at(0));
+        assert_eq!((steering.begins(), steering.waiting()), (true, None));
+        assert!(matches!(steering.command(Goal::Follow { time: 20.5, rate: 1.0 }, at(1)), Some(Command::Go)));
+        steering.answered(at(1), Some((Code::Refused, 2)));
+        assert_eq!((steering.begins(), steering.waiting()), (false, Some(Waiting::Paused)));
     }
 
     #[test]

@@ -23,9 +23,9 @@ use crate::clock::monotonic_clock_name;
 use crate::layouts;
 use crate::shared_memory::MOST_PUBLISHERS;
 use crate::shared_memory::{CLOCK, OpenError, check_room_to_subscribe, node, reserve_pages, service_name, stale_files};
+use crate::shows::servers;
 use bench_dragon_messages::{
-    ChaseStatus, CollisionAlert, ControlRequest, ControlResponse, Cue, FrameHeader, HandlePose, LoopStatus,
-    SceneHeader, Stage, StageSegment,
+    ChaseStatus, CollisionAlert, Cue, FrameHeader, HandlePose, LoopStatus, SceneHeader, Stage, StageSegment,
 };
 use selected::{OfRun, Origin, Selected, publishers};
 pub use slices::{SceneSample, StageSample};
@@ -181,21 +181,7 @@ impl Subscription {
 
     /// Returns true if a show of this name runs in this shared memory: only a show serves commands.
     pub fn show_is_here(&self) -> bool {
-        !self.shows_here().is_empty()
-    }
-
-    /// Returns the nodes with which shows of this name serve commands.
-    fn shows_here(&self) -> Vec<UniqueNodeId> {
-        let mut nodes = Vec::new();
-        let Ok(name) = service_name(&self.name, "control") else { return nodes };
-        let opened = self.node.service_builder(&name).request_response::<ControlRequest, ControlResponse>().open();
-        if let Ok(service) = opened {
-            service.dynamic_config().list_servers(|server| {
-                nodes.push(server.node_id);
-                CallbackProgression::Continue
-            });
-        }
-        nodes
+        !servers(&self.node, &self.name).is_empty()
     }
 
     /// Returns true if another process than this machine's show is selected, and frames that the show may have sent are
@@ -203,7 +189,7 @@ impl Subscription {
     pub fn passes_over_the_show(&self, connection: &Connection) -> bool {
         let Selection::Following { selected, passes_over: true, .. } = &connection.selection else { return false };
         let process = |node: &UniqueNodeId| node.pid::<ipc::Service>().ok();
-        let shows = self.shows_here();
+        let shows = servers(&self.node, &self.name);
         !shows.is_empty() && shows.iter().all(|show| process(show) != process(&selected.origin.node))
     }
 

@@ -15,10 +15,11 @@ use iceoryx2::service::port_factory::request_response;
 
 use crate::layouts;
 use crate::shared_memory::{OpenError, check_room_to_subscribe, node, service_name};
+use crate::shows;
 use bench_dragon_messages::control::{Code, Command, PLAYING_RATE, RATES};
 use bench_dragon_messages::sentence::number;
 use bench_dragon_messages::state::PlaybackState;
-use bench_dragon_messages::{ControlRequest, ControlResponse, FrameHeader, HandlePose};
+use bench_dragon_messages::{ControlRequest, ControlResponse};
 
 /// The interval of polls for a response.
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
@@ -37,7 +38,7 @@ pub enum ControlError {
     #[error(transparent)]
     Open(#[from] OpenError),
     /// There is no publisher.
-    #[error("no publisher has the name \"{0}\"")]
+    #[error("no publisher has the name \"{0}\" ({instead})", instead = shows::instead(.0, &shows::running()))]
     NoPublisher(String),
     /// Frames come, and no show on this machine takes commands.
     #[error(
@@ -81,7 +82,9 @@ impl Controller {
         let service = service_name(name, "control")?;
         check_room_to_subscribe()?;
         let node = node()?;
-        let no_publisher = || match has_frames(&node, name) {
+        let no_publisher = || match shows::frames(&node, name)
+            .is_some_and(|service| service.dynamic_config().number_of_publishers() > 0)
+        {
             true => ControlError::Elsewhere(name.to_owned()),
             false => ControlError::NoPublisher(name.to_owned()),
         };
@@ -258,13 +261,6 @@ impl Vigil {
         }
         Ok(())
     }
-}
-
-/// Returns true if a publisher of frames exists under a name.
-fn has_frames(node: &Node<ipc::Service>, name: &str) -> bool {
-    let Ok(poses) = service_name(name, "poses") else { return false };
-    let builder = node.service_builder(&poses).publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>();
-    builder.open().is_ok_and(|service| service.dynamic_config().number_of_publishers() > 0)
 }
 
 fn failed(name: &str, reason: String) -> OpenError {

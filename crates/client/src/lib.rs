@@ -11,3 +11,4 @@ pub mod hermite;
 pub mod layouts;
 pub mod polling;
 pub mod shared_memory;
+pub mod shows;

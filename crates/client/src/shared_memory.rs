@@ -2,9 +2,11 @@
 
 mod error;
 mod memory;
+mod own_files;
 pub mod stale_files;
 
 use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 use ::iceoryx2::config::Config;
 use ::iceoryx2::prelude::*;
@@ -31,6 +33,12 @@ pub fn service_name(name: &str, service: &str) -> Result<ServiceName, OpenError>
         return Err(refused());
     }
     ServiceName::new(&format!("{name}/{service}")).map_err(|_| refused())
+}
+
+/// Returns the entries of a folder; none of one that cannot be read.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    std::fs::read_dir(folder)
+        .map_or_else(|_| Vec::new(), |entries| entries.flatten().map(|entry| entry.path()).collect())
 }
 
 /// Creates a node that leaves signals to this program.

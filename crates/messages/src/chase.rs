@@ -59,7 +59,7 @@ pub enum ChaseState {
     Lost,
     /// The show is held: the chase waits.
     Held,
-    /// Another client, or a cue, has paused the show: the chase waits until it plays.
+    /// The show is paused, by another client or a cue, now or before the chase began: the chase waits until it plays.
     Paused,
     /// Another client has sent the show to another time: the chase waits until the show is paused and resumed.
     Sought,
@@ -111,7 +111,7 @@ impl ChaseState {
             Self::Backward => "runs backward: the show is paused",
             Self::Lost => "lost: the show is paused",
             Self::Held => "waits: the show is held",
-            Self::Paused => "waits: another client or a cue has paused the show; a resume ends that",
+            Self::Paused => "waits: the show is paused, by another client or a cue; a resume ends that",
             Self::Sought => "waits: another client has sent a seek; a pause and a resume end that",
             Self::Ended => "the chase has ended",
         }

@@ -300,7 +300,8 @@ impl<'de> Deserialize<'de> for SceneName {
 /// Figures that end in `_second` are of the last second alone. Figures that end in `_total` are since the start of the
 /// run. All durations are in nanoseconds.
 ///
-/// Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
+/// Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames,
+/// layout 3 the lost files.
 ///
 /// # Examples
 ///
@@ -312,7 +313,7 @@ impl<'de> Deserialize<'de> for SceneName {
 /// assert!(keeps_up, "{}", status.scene.as_str());
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/LoopStatus/2")]
+#[type_name("bench_dragon/LoopStatus/3")]
 #[repr(C)]
 pub struct LoopStatus {
     /// The run, as [`FrameHeader::run_id`].
@@ -369,6 +370,9 @@ pub struct LoopStatus {
     pub step_max_total: u64,
     /// Resident memory of the publisher, bytes.
     pub resident_bytes: u64,
+    /// Files of the publisher in shared memory that another program has removed; subscribers that come later do not find
+    /// the show then.
+    pub lost_files: u64,
     /// Subscribers of the frames that are connected over iceoryx2.
     pub subscribers: u32,
     /// Open file descriptors of the publisher.

@@ -31,6 +31,13 @@ pub fn cue_sentence(cue: &Cue) -> String {
     format!("cue {} \"{}\"{waits}", cue.number, cue.name.as_str())
 }
 
+/// Returns the warning that another program has removed files of a running show.
+pub fn lost_files_sentence(files: u64) -> String {
+    format!(
+        "{files} of the show's files were removed by another program: nobody else can connect until it is restarted"
+    )
+}
+
 /// Returns the status of a chase as a sentence: the source, its label or tracker, the state and the error.
 pub fn chase_sentence(status: &ChaseStatus) -> String {
     let source = status.chase_source().map_or("unknown source", ChaseSource::title);

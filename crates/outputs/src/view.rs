@@ -39,6 +39,7 @@ pub use authorization::Token;
 use bench_dragon_client::connection::Wake;
 use bench_dragon_client::feed::{Delivery, Feed, FeedOptions};
 use bench_dragon_client::shared_memory::{OpenError, service_name};
+use bench_dragon_client::shows;
 pub use certificates::{Certificate, Proofs, SceneHash};
 pub use facts::{ClearanceCurve, Facts, LeastOfShow, SceneFacts};
 use origin::Admission;
@@ -68,7 +69,7 @@ struct Picture {
 impl Picture {
     /// Returns the picture without a publisher, with the reason if a publisher cannot be used.
     fn waiting(reason: Option<&str>) -> Self {
-        Self { waiting: wire::waiting(reason).into(), ..Self::default() }
+        Self { waiting: wire::waiting(reason, &shows::running()).into(), ..Self::default() }
     }
 }
 
@@ -208,7 +209,7 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         let mut files = ServeDir::new(folder);
         let own = Router::new().fallback(move |request: Request| own_file(files.try_call(request)));
         let own = own.layer(from_fn_with_state(server.clone(), own_page));
-        router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("/pages/") }));
+        router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("pages/") }));
     }
     router
         .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))

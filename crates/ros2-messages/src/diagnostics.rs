@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{HasStamp, Header, Time, level_of};
 use crate::settings::DiagnosticLimits;
 use bench_dragon_messages::chase::{ChaseSource, ChaseState};
-use bench_dragon_messages::sentence::{chase_sentence, keep_out, name_in, number, obstacle_name};
+use bench_dragon_messages::sentence::{chase_sentence, keep_out, lost_files_sentence, name_in, number, obstacle_name};
 use bench_dragon_messages::state::{EventKind, Severity};
 use bench_dragon_messages::{ChaseStatus, CollisionAlert, LoopStatus, Stage};
 
@@ -72,6 +72,7 @@ impl LoopSecond<'_> {
         let lateness = status.lateness_p99_second as f64 * 1e-9;
         let graded = |warn: bool, error: bool| if error { ERROR } else { u8::from(warn) * WARN };
         let findings = [
+            (u8::from(status.lost_files > 0) * ERROR, lost_files_sentence(status.lost_files)),
             (
                 u8::from(status.unforeseen_contacts > before.unforeseen_contacts) * ERROR,
                 "a contact that no search had found".to_owned(),

@@ -56,8 +56,8 @@ pub struct Fleet {
     publisher: Child,
     /// The exit status of the publisher, if it has ended.
     publisher_ended: Option<ExitStatus>,
-    /// True if the publisher ended without a signal from the soak test.
-    publisher_ended_early: bool,
+    /// The time after which the publisher ended without a signal from the soak test.
+    publisher_ended_early: Option<Duration>,
     summary: Option<RunSummary>,
     members: Vec<Member>,
     conducting: Option<Conducting>,
@@ -101,7 +101,7 @@ impl Fleet {
         let mut fleet = Self {
             publisher: plan.spawn_publisher(&sender)?,
             publisher_ended: None,
-            publisher_ended_early: false,
+            publisher_ended_early: None,
             summary: None,
             members: Vec::new(),
             conducting: None,
@@ -175,6 +175,7 @@ impl Fleet {
         self.receive(time);
         if self.publisher_ended.is_none() {
             self.publisher_ended = self.publisher.try_wait()?;
+            self.publisher_ended_early = self.publisher_ended.map(|_| self.began.elapsed());
         }
         for (index, member) in self.members.iter_mut().enumerate() {
             if member.role == Role::Flaky && member.spawned.elapsed() >= FLAKY_LIFETIME {
@@ -289,9 +290,20 @@ impl Fleet {
     /// Returns true if the publisher ended without a signal, with an error, or not at all. Call it after the fleet has
     /// finished.
     pub fn publisher_failed(&self) -> bool {
-        self.publisher_ended_early
+        self.publisher_ended_early.is_some()
             || self.summary.is_none()
             || self.publisher_ended.is_none_or(|status| !status.success())
+    }
+
+    /// Returns the exit status of the publisher, if it has ended, and the time after which it ended without a signal
+    /// from the soak test.
+    pub(super) fn publisher_end(&self) -> (Option<ExitStatus>, Option<Duration>) {
+        (self.publisher_ended, self.publisher_ended_early)
+    }
+
+    /// Returns the moment at which all steady subscribers had received a frame.
+    pub(super) fn began(&self) -> Instant {
+        self.began
     }
 
     /// Returns the summary of the publisher, after it has ended without an error.
@@ -310,7 +322,8 @@ impl Fleet {
             self.receive(Duration::from_millis(20));
         }
         self.publisher_ended = self.publisher.try_wait()?;
-        self.publisher_ended_early = self.publisher_ended.is_some();
+        let early = self.publisher_ended.map(|_| self.began.elapsed());
+        self.publisher_ended_early = self.publisher_ended_early.or(early);
         signal(&self.publisher, Signal::SIGINT);
         let deadline = Instant::now() + END_TIMEOUT;
         while self.publisher_ended.is_none() && Instant::now() < deadline {
@@ -326,6 +339,9 @@ impl Fleet {
         let ending = |members: &[Member]| members.iter().any(|member| member.state == ProcessState::Ending);
         while ending(&self.members) && Instant::now() < deadline {
             self.receive(Duration::from_millis(20));
+        }
+        for member in self.members.iter_mut().filter(|member| member.state == ProcessState::EndedByItself) {
+            member.exit = member.child.try_wait()?;
         }
         Ok(())
     }

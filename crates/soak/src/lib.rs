@@ -5,6 +5,7 @@
 //! bounded size, a [`verdict`] checks [`limits`], and a [`report`] shows them. The checks use the frames that
 //! subscribers received, the publisher's status stream and summary, and /proc.
 
+pub mod causes;
 pub mod conduct;
 pub mod conducting;
 mod conformance;
@@ -12,6 +13,7 @@ pub mod figures;
 pub mod fleet;
 pub mod histograms;
 pub mod history;
+mod junit;
 pub mod limits;
 pub mod member;
 pub mod observation;

@@ -1,11 +1,12 @@
 //! One subscriber of a soak test: its role, its present process, and the observations of all its starts.
 
-use std::process::Child;
-use std::time::Instant;
+use std::process::{Child, ExitStatus};
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
 use super::observation::{Latencies, Observation};
+use bench_dragon_publisher::live::statistics::RunSummary;
 
 /// The role of a subscriber.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -56,6 +57,10 @@ pub struct Member {
     pub state: ProcessState,
     /// Former processes that had ended by themselves.
     lost: u64,
+    /// The moment of the end of the present process.
+    ended: Option<Instant>,
+    /// Its exit status, once the fleet has finished.
+    pub(super) exit: Option<ExitStatus>,
     pub(super) child: Child,
     pub(super) spawned: Instant,
     /// The observation of its former processes.
@@ -75,6 +80,8 @@ impl Member {
             starts: 1,
             state: ProcessState::Running,
             lost: 0,
+            ended: None,
+            exit: None,
             child,
             spawned: Instant::now(),
             past: Observation::default(),
@@ -90,6 +97,7 @@ impl Member {
         self.present = Observation::default();
         self.starts += 1;
         self.state = ProcessState::Running;
+        (self.ended, self.exit) = (None, None);
         self.spawned = Instant::now();
         self.child = child;
     }
@@ -109,6 +117,7 @@ impl Member {
                 ProcessState::Ending => ProcessState::Ended,
                 _ => ProcessState::EndedByItself,
             };
+            self.ended.get_or_insert_with(Instant::now);
         }
     }
 
@@ -125,6 +134,23 @@ impl Member {
     /// Returns the latencies since the last call.
     pub fn take_fresh(&mut self) -> Option<Latencies> {
         self.fresh.take()
+    }
+
+    /// Returns the time from `began` to the end of the present process, if it has ended.
+    pub(super) fn ended_after(&self, began: Instant) -> Option<Duration> {
+        self.ended.map(|ended| ended.saturating_duration_since(began))
+    }
+
+    /// Returns the number of its former processes that ended by themselves.
+    pub(super) fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Returns the number of frames of the publisher after the last one that this subscriber received; 0 for a
+    /// subscriber that need not keep up.
+    pub fn missed_after_last(&self, summary: Option<&RunSummary>) -> u64 {
+        let frames = summary.filter(|_| self.role == Role::Steady).map_or(0, |summary| summary.frames);
+        frames.saturating_sub(self.seen().last_sequence + 1)
     }
 
     /// Returns the number of its processes that ended without a signal from the soak test, or did not end after one.

@@ -12,7 +12,7 @@ use super::history::History;
 use super::member::{Member, Role};
 use super::observation::{Latencies, Observation};
 use super::plots::{PlotLine, Scale, escaped, plot};
-use super::verdict::LimitCheck;
+use super::verdict::{ENDED, LATE, LimitCheck};
 use bench_dragon_drawing::palette::dark_rules;
 use bench_dragon_publisher::live::TransportCounters;
 use bench_dragon_publisher::live::statistics::RunSummary;
@@ -28,6 +28,8 @@ pub struct Report {
     pub schema: &'static str,
     /// `PASS` or `FAIL`.
     pub verdict: &'static str,
+    /// The processes that ended before their time, in words, the first one first.
+    pub causes: Vec<String>,
     /// Each limit and its value.
     pub checks: Vec<LimitCheck>,
     /// The command line.
@@ -36,6 +38,8 @@ pub struct Report {
     pub version: &'static str,
     /// The machine of the test.
     pub machine: Machine,
+    /// The load average of the machine during the test.
+    pub load: LoadAverage,
     /// CLOCK_REALTIME in seconds when the test began.
     pub began_at: u64,
     /// The wall time from the first frame of all subscribers to the end, in seconds.
@@ -62,8 +66,33 @@ pub struct SubscriberReport {
     /// The number of its processes.
     #[serde(rename = "incarnations")]
     pub processes: u64,
+    /// Frames of the publisher after the last one that it received, if it must keep up.
+    pub missed_after_last: u64,
     /// Counts and latencies since the start; `second` is null.
     pub seen: Observation,
+}
+
+/// The load average of the machine over one minute, sampled each second.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct LoadAverage {
+    /// The mean of the samples; 0 without any.
+    pub mean: f64,
+    /// The greatest sample.
+    pub most: f64,
+    #[serde(skip)]
+    samples: u64,
+}
+
+impl LoadAverage {
+    /// Takes a sample, if the system has one.
+    pub fn sample(&mut self) {
+        // Linux has this file; proc(5): the first number is of one minute.
+        let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        let Some(load) = text.split(' ').next().and_then(|load| load.parse::<f64>().ok()) else { return };
+        self.samples += 1;
+        self.mean += (load - self.mean) / self.samples as f64;
+        self.most = self.most.max(load);
+    }
 }
 
 /// The machine of a soak test.
@@ -99,6 +128,7 @@ impl SubscriberReport {
             label: member.label.clone(),
             role: member.role,
             processes: member.starts,
+            missed_after_last: member.missed_after_last(fleet.summary()),
             seen: Observation { second: None, ..member.seen() },
         };
         fleet.members().iter().map(report).collect()
@@ -106,9 +136,10 @@ impl SubscriberReport {
 }
 
 impl Report {
-    /// Returns lines of text: the verdict, each limit, each subscriber.
+    /// Returns lines of text: the verdict, the processes that ended early, each limit, each subscriber.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = vec![format!("{} after {:.1} s", self.verdict, self.seconds)];
+        lines.extend(self.causes.iter().map(|cause| format!("  {cause}")));
         lines.extend(self.checks.iter().map(|check| format!("  {}", check.line())));
         lines.extend(self.subscribers.iter().map(|subscriber| {
             let seen = &subscriber.seen;
@@ -126,10 +157,43 @@ impl Report {
                 1 => String::new(),
                 several => format!(" by {several} processes"),
             };
-            format!("  {}: {} received{processes}, {} missed{latency}", subscriber.label, seen.received, seen.missed)
+            let missed = seen.missed + subscriber.missed_after_last;
+            format!("  {}: {} received{processes}, {missed} missed{latency}", subscriber.label, seen.received)
         }));
-        lines.extend(self.transport_counters().chain(self.conducting()).map(|sentence| format!("  {sentence}")));
+        let others = self.transport_counters().chain(self.conducting()).chain([self.load_sentence()]);
+        lines.extend(others.map(|sentence| format!("  {sentence}")));
+        lines.extend(self.hints().into_iter().map(|hint| format!("  hint: {hint}")));
         lines
+    }
+
+    fn load_sentence(&self) -> String {
+        let (LoadAverage { mean, most, .. }, cores) = (self.load, self.machine.cores);
+        format!("load average {mean:.1}, at most {most:.1}, on {cores} logical processors")
+    }
+
+    /// Returns the error of a test that failed: the processes that ended early, and the broken limits with their values.
+    pub fn failure(&self) -> String {
+        let broken = self.checks.iter().filter(|check| !check.passed);
+        // What is not known follows from a process that ended.
+        let broken = broken.filter(|check| self.causes.is_empty() || !(check.value.is_nan() || check.name == ENDED));
+        let found: Vec<_> = self.causes.iter().cloned().chain(broken.map(LimitCheck::sentence)).collect();
+        found.join("; ")
+    }
+
+    /// Returns the ways to pass where frames or periods were lost or late.
+    pub(super) fn hints(&self) -> Vec<String> {
+        let is_late = |check: &LimitCheck| !check.passed && LATE.contains(&check.name);
+        if !self.checks.iter().any(is_late) || !self.causes.is_empty() {
+            return Vec::new();
+        }
+        let is_given = |option: &str| self.command.iter().any(|argument| argument.split('=').next() == Some(option));
+        let priority = (!is_given("--realtime")).then(|| "--realtime 80 gives the loop a priority".to_owned());
+        let busy = (self.load.mean > self.machine.cores as f64).then(|| {
+            "other programs kept the processors busy: test without them, or give the limits of this machine \
+             (--max-skipped, --max-lateness-p999, --max-missed)"
+                .to_owned()
+        });
+        priority.into_iter().chain(busy).collect()
     }
 
     /// Returns sentences about the commands, and the first fault that each subscriber found.
@@ -148,7 +212,7 @@ impl Report {
     fn transport_counters(&self) -> impl Iterator<Item = String> {
         self.publisher.iter().flat_map(|summary| &summary.transport_counters).map(
             |(name, TransportCounters { frames, skipped, discarded })| {
-                format!("{name}: {frames} frames sent, {skipped} skipped, {discarded} messages discarded")
+                format!("{name}: {frames} frames sent, {skipped} not sent by its queue, {discarded} messages discarded")
             },
         )
     }
@@ -163,7 +227,7 @@ impl Report {
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Soak test: {verdict}</title>\n\
              <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}{dark}</style></head><body>\n<h1>Soak test: <span class=\"{verdict}\">{verdict}</span></h1>\n\
              <p><code>{command}</code></p>\n<p>{seconds:.1} s on {processor}, {cores} logical processors, Linux {kernel}; \
-             bench-dragon {version}.</p>\n{limits}{subscribers}{transport_counters}{conducting}{plots}<p>Each point stands for {per_row} s and is the \
+             bench-dragon {version}.</p>\n<p>{load}.</p>\n{causes}{limits}{subscribers}{transport_counters}{conducting}{plots}<p>Each point stands for {per_row} s and is the \
              greatest value of its seconds. All latencies are CLOCK_MONOTONIC; those since the deadline include the \
              periods that were skipped.</p>\n</body></html>\n",
             verdict = self.verdict,
@@ -173,6 +237,13 @@ impl Report {
             cores = self.machine.cores,
             kernel = escaped(&self.machine.kernel),
             version = self.version,
+            load = self.load_sentence(),
+            causes = self
+                .causes
+                .iter()
+                .chain(&self.hints())
+                .map(|sentence| format!("<p>{}.</p>\n", escaped(sentence)))
+                .collect::<String>(),
             limits = self.table_of_limits(),
             subscribers = self.table_of_subscribers(),
             transport_counters =
@@ -187,8 +258,7 @@ impl Report {
     fn table_of_limits(&self) -> String {
         let rows = self.checks.iter().map(|check| {
             let word = if check.passed { "PASS" } else { "FAIL" };
-            let value = if check.value.is_nan() { "not known".to_owned() } else { check.unit.show(check.value) };
-            let limit = check.unit.show(check.limit);
+            let (value, limit) = (check.shown(), check.unit.show(check.limit));
             format!("<tr><td>{}<td>{value}<td>{limit}<td class=\"{word}\">{word}\n", check.name)
         });
         format!("<table><tr><th>limit<th>found<th>at most<th>\n{}</table>\n", rows.collect::<String>())
@@ -208,7 +278,10 @@ impl Report {
             );
             format!(
                 "<tr><td>{label}<td>{processes}<td>{}<td>{}<td>{}<td>{:.1e}{latencies}\n",
-                seen.received, seen.missed, seen.disordered, seen.worst_link_error
+                seen.received,
+                seen.missed + subscriber.missed_after_last,
+                seen.disordered,
+                seen.worst_link_error
             )
         });
         format!(

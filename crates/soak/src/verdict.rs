@@ -13,6 +13,13 @@ use bench_dragon_publisher::live::statistics::RunSummary;
 /// A deadline may be this far from first deadline + tick / rate: both are rounded to whole nanoseconds.
 const ROUNDING_NS: f64 = 2.0;
 
+/// The check of processes that ended early, whose [causes](super::causes) stand before all checks.
+pub(super) const ENDED: &str = "processes that ended by themselves or hung";
+
+/// The checks that a busy machine fails.
+pub(super) const LATE: [&str; 3] =
+    ["frames missed by steady subscribers", "periods skipped", "wake-up lateness, 99.9th percentile"];
+
 /// The unit of a value, for its notation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -60,11 +67,20 @@ impl LimitCheck {
         Self { name, limit, value, unit, passed: value <= limit }
     }
 
+    /// Returns the value with its limit, as a sentence.
+    pub fn sentence(&self) -> String {
+        format!("{}: {} (at most {})", self.name, self.shown(), self.unit.show(self.limit))
+    }
+
+    /// Returns the value found as text.
+    pub fn shown(&self) -> String {
+        if self.value.is_nan() { "not known".to_owned() } else { self.unit.show(self.value) }
+    }
+
     /// Returns the check as a line of text.
     pub fn line(&self) -> String {
-        let value = if self.value.is_nan() { "not known".to_owned() } else { self.unit.show(self.value) };
         let mark = if self.passed { "pass" } else { "FAIL" };
-        format!("{mark}  {:<54} {value:>14}   at most {}", self.name, self.unit.show(self.limit))
+        format!("{mark}  {:<54} {:>14}   at most {}", self.name, self.shown(), self.unit.show(self.limit))
     }
 }
 
@@ -87,15 +103,15 @@ impl SoakVerdict {
         let of_summary = |value: fn(&RunSummary) -> f64| summary.map_or(f64::NAN, value);
         let phase = fleet.members().iter().map(|member| member.seen().phase_error_ns).fold(0.0, f64::max);
         let mut checks = vec![
-            count("frames missed by steady subscribers", limits.missed as f64, missed(fleet, &steady)),
+            count(LATE[0], limits.missed as f64, missed(fleet, &steady)),
             LimitCheck::new(
-                "periods skipped",
+                LATE[1],
                 Unit::Share,
                 limits.skipped_share,
                 of_summary(|summary| summary.skipped as f64 / (summary.frames + summary.skipped) as f64),
             ),
             LimitCheck::new(
-                "wake-up lateness, 99.9th percentile",
+                LATE[2],
                 Unit::Nanoseconds,
                 limits.lateness_p999_ns as f64,
                 of_summary(|summary| summary.wakeup_ns.p999 as f64),
@@ -116,7 +132,7 @@ impl SoakVerdict {
             count("frames with a link of a wrong length", 0.0, of_all(|seen| seen.wrong_links)),
             LimitCheck::new("drift of the tick against CLOCK_MONOTONIC", Unit::Nanoseconds, ROUNDING_NS, phase),
             count("counts that publisher and subscribers disagree on", 0.0, disagreements(fleet, &steady)),
-            count("processes that ended by themselves or hung", 0.0, lost(fleet)),
+            count(ENDED, 0.0, lost(fleet)),
         ]);
         if let Some(conducting) = fleet.conducting() {
             let of_load = |value: fn(&Conducted) -> u64| {
@@ -149,10 +165,7 @@ impl SoakVerdict {
 /// Returns the number of frames that did not come, with the frames after the last received frame.
 fn missed(fleet: &Fleet, steady: &[&Member]) -> f64 {
     let Some(summary) = fleet.summary() else { return f64::NAN };
-    let of = |member: &&Member| {
-        let seen = member.seen();
-        seen.missed + summary.frames.saturating_sub(seen.last_sequence + 1)
-    };
+    let of = |member: &&Member| member.seen().missed + member.missed_after_last(Some(summary));
     steady.iter().map(of).sum::<u64>() as f64
 }
 

@@ -353,10 +353,11 @@ class LoopStatus(Message):
     Figures that end in `_second` are of the last second alone. Figures that end in `_total` are since the start of the
     run. All durations are in nanoseconds.
 
-    Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames.
+    Over iceoryx2 the payload of `<name>/status`. Layout 2 added the unforeseen contacts and the unsolved frames, layout
+    3 the lost files.
     """
 
-    LAYOUT = 2
+    LAYOUT = 3
     # The run, as `FrameHeader.run_id`.
     run_id: int
     # The tick of the latest frame.
@@ -411,6 +412,9 @@ class LoopStatus(Message):
     step_max_total: int
     # Resident memory of the publisher, bytes.
     resident_bytes: int
+    # Files of the publisher in shared memory that another program has removed; subscribers that come later do not find
+    # the show then.
+    lost_files: int
     # Subscribers of the frames that are connected over iceoryx2.
     subscribers: int
     # Open file descriptors of the publisher.
@@ -445,6 +449,7 @@ class LoopStatus(Message):
         ("step_p999_total", ctypes.c_uint64),
         ("step_max_total", ctypes.c_uint64),
         ("resident_bytes", ctypes.c_uint64),
+        ("lost_files", ctypes.c_uint64),
         ("subscribers", ctypes.c_uint32),
         ("file_descriptors", ctypes.c_uint32),
         ("scene", ctypes.c_uint8 * 64),

@@ -15,12 +15,14 @@ use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use ::iceoryx2::config::Config;
 use ::iceoryx2::prelude::*;
 
-use super::SHARED_MEMORY;
+use super::own_files::OwnFiles;
+use super::{SHARED_MEMORY, entries};
 
 /// The mode of an unfinished file below iceoryx2's folder.
 const UNFINISHED: u32 = 0o600;
@@ -30,6 +32,9 @@ const UNFINISHED_MEMORY: u32 = 0o200;
 const LONGEST_MAKING: Duration = Duration::from_secs(2);
 /// The interval of [`spawn_reaper`].
 const INTERVAL: Duration = Duration::from_millis(500);
+
+/// The number of files of this process that another program has removed.
+static LOST: AtomicU64 = AtomicU64::new(0);
 
 /// The state of a listed node's process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,18 +74,26 @@ pub fn remove_unfinished_files() {
     }
 }
 
-/// Starts a thread that removes unfinished shared memory and services of killed processes.
+/// Starts a thread that removes unfinished shared memory and services of killed processes, and keeps the files of this
+/// process, which it touches each hour.
 pub fn spawn_reaper() {
     static STARTED: Once = Once::new();
     STARTED.call_once(|| {
         std::thread::spawn(|| {
-            let mut seen = BTreeMap::new();
+            let (mut seen, mut own) = (BTreeMap::new(), OwnFiles::default());
             loop {
                 remove_what_stays_unfinished(&mut seen);
+                LOST.store(own.look(Instant::now()), Ordering::Relaxed);
                 std::thread::sleep(INTERVAL);
             }
         });
     });
+}
+
+/// Returns the number of files of this process that another program has removed, so that processes that come later do
+/// not find this one. Found within two seconds once [`spawn_reaper`] has been called.
+pub fn lost_files() -> u64 {
+    LOST.load(Ordering::Relaxed)
 }
 
 /// Removes files that have been unfinished for long; `seen` has the moment of the first sight of each, independent of
@@ -102,10 +115,6 @@ fn remove_what_stays_unfinished(seen: &mut BTreeMap<PathBuf, Instant>) {
         }
     }
     remove_all(old);
-}
-
-fn entries(folder: &Path) -> Vec<PathBuf> {
-    fs::read_dir(folder).map_or_else(|_| Vec::new(), |entries| entries.flatten().map(|entry| entry.path()).collect())
 }
 
 /// Returns the files of this mode in a folder.

@@ -144,6 +144,7 @@ impl Families<'_> {
             step_p999_total,
             step_max_total,
             resident_bytes,
+            lost_files,
             subscribers,
             file_descriptors,
             ref scene,
@@ -206,6 +207,11 @@ impl Families<'_> {
                 Some("bytes"),
                 "Resident memory of the publisher.",
                 resident_bytes as f64,
+            ),
+            self.gauge(
+                "bench_dragon_lost_files",
+                "Files of the publisher in shared memory that another program has removed.",
+                lost_files as f64,
             ),
             self.gauge(
                 "bench_dragon_open_file_descriptors",

@@ -48,8 +48,8 @@ export function showSituation({ state, alert, trouble, silent, stale, of, second
 const spokenTransport = new Map();
 
 /**
- * The transport state at a moment: its sign and word, and its detail, in which `keys` lets keys be named. Each change
- * is spoken once; a hold, at once.
+ * The transport state at a moment: its sign and word, and its detail, with the way in which commands are given (`keys`).
+ * Each change is spoken once; a hold, at once.
  */
 export function showTransport(transport, { now, of, keys }) {
   document.body.dataset.transport = transport.kind;

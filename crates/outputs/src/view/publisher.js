@@ -7,7 +7,7 @@ import { Dragon } from "./dragon.js";
 import { Nearest, Overlap, marksOf } from "./marks.js";
 import { Stream } from "./stream.js";
 import { Transport } from "./transport.js";
-import { benchIn, benchesIn, remaining, say } from "./words.js";
+import { benchIn, benchesIn, capital, remaining, say } from "./words.js";
 
 /** The situation without anything to show. */
 const WAITING = { name: "waiting", severity: "ok", happened: false, sentence: null };
@@ -83,6 +83,7 @@ export class Publisher {
     const lost = trouble ?? (newest && stage ? null : "noStage");
     const current = lost ? WAITING : stage.states[newest.state] ?? UNKNOWN;
     const stand = this.stream.facts?.loop_stand ?? null;
+    this.transport.instead = this.instead(lost);
     this.transport.look(now, newest, lost ?? (silent === null ? null : "silent"), (number) => this.cueOf(number),
         stand);
     let [seconds, ahead] = [NaN, null];
@@ -211,11 +212,19 @@ export class Publisher {
     this.counted = received;
   }
 
+  /** Returns the shows that run here instead of this publisher, or how to start it; empty where that is not known. */
+  instead(lost) {
+    const { running } = this.stream;
+    if (lost !== "publisher" || !running) return "";
+    return running.length ? say("runningHere", { names: running.join(", ") }) : say("startOne", { name: this.name });
+  }
+
   /** Returns the reason why no frames come, after the first frame; empty while they come. */
   notice() {
     const { newest, sight } = this, stopped = sight.trouble ?? (sight.silent === null ? null : "silent");
     if (!stopped || !this.isThere) return "";
     const words = { server: "lostServer", silent: "silent" }[stopped] ?? "lostPublisher";
-    return this.own(say(words, { seconds: sight.silent, time: newest.time.toFixed(1) }));
+    const { instead } = this.transport, further = instead ? ` ${capital(instead)}.` : "";
+    return this.own(say(words, { seconds: sight.silent, time: newest.time.toFixed(1) }) + further);
   }
 }

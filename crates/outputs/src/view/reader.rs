@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
@@ -17,6 +17,8 @@ use bench_dragon_proof::ProvedEvent;
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
 /// The time before the next attempt if the services cannot be used.
 const RETRY_INTERVAL: Duration = Duration::from_millis(200);
+/// The interval of looks for other shows while there is no publisher.
+const LOOK_INTERVAL: Duration = Duration::from_secs(2);
 /// The cues kept for a slow browser; a show with more cues keeps all of them.
 const KEPT_CUES: usize = 16;
 
@@ -30,6 +32,7 @@ pub(super) fn read(
 ) {
     let mut reader = Reader::new(name, proofs, facts);
     let mut reason: Option<String> = None;
+    let mut looked = Instant::now();
     sender.send_replace(reader.picture.clone());
     while !stop.load(Ordering::Relaxed) {
         let mut changed = false;
@@ -44,6 +47,12 @@ pub(super) fn read(
                 reader.picture = Picture::waiting(now.as_deref());
             }
             changed = true;
+        }
+        if !reader.picture.waiting.is_empty() && looked.elapsed() >= LOOK_INTERVAL {
+            looked = Instant::now();
+            let picture = Picture::waiting(now.as_deref());
+            changed |= picture.waiting != reader.picture.waiting;
+            reader.picture.waiting = picture.waiting;
         }
         // Known when the publisher is found, thus no later than its stage.
         let shares_clock = feed.shares_clock();

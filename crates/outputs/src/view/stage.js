@@ -219,12 +219,17 @@ function drawNothing() {
   if (!("transparent" in words)) context.fillRect(0, 0, canvas.width, canvas.height);
 }
 
+/** Returns how commands are given here: a phone has no keys. */
+function commandsBy() {
+  return element("conduct").hidden ? "none" : matchMedia("(hover: none) and (pointer: coarse)").matches ? "touch" : "keys";
+}
+
 let figuresAt = 0, countedAt = 0;
 function showText(now) {
   const first = foremost(), { sight } = first;
   const of = isOneOfMany ? first.name : null;
   showSituation({ ...sight, stale: publishers.every((one) => one.sight.stale), of });
-  showTransport(first.transport, { now, of, keys: !element("conduct").hidden });
+  showTransport(first.transport, { now, of, keys: commandsBy() });
   roster.show(first, selected);
   showChase(first.stream.chase, now, of);
   const notices = publishers.map((one) => one.notice()).filter(Boolean);

@@ -116,6 +116,8 @@ export class Stream {
     this.messages = { stage: {}, alert: {}, cue: {}, facts: {}, chase: {} };
     /** The reason why no frames come: a key of the page's words, or the server's reason; null while they come. */
     this.trouble = "server";
+    /** The names of the shows that run on the server's machine instead; null while that is not known. */
+    this.running = null;
     this.received = 0;
     /** The transport times of the last frames, ms. */
     this.ways = [];
@@ -130,9 +132,11 @@ export class Stream {
   }
 
   open() {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
     const whose = this.name === null ? "" : `&name=${encodeURIComponent(this.name)}`;
-    const socket = new WebSocket(`${scheme}://${location.host}/frames?rate=${MOST_FRAMES}${whose}`);
+    // Beside this module, which a proxy may have below a path.
+    const address = new URL(`frames?rate=${MOST_FRAMES}${whose}`, import.meta.url);
+    address.protocol = address.protocol.replace("http", "ws");
+    const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     let requested = null, checked = 0, heard = 0, nearest = Infinity;
@@ -201,7 +205,10 @@ export class Stream {
 
   handle(message) {
     this.onmessage?.(message);
-    if (message.type === "waiting") this.lose(message.reason ?? "publisher");
+    if (message.type === "waiting") {
+      this.lose(message.reason ?? "publisher");
+      this.running = message.running ?? null;
+    }
     message.at = performance.now();
     if (this.messages[message.type]) this.messages[message.type].newest = message;
   }

@@ -20,6 +20,8 @@ export class Transport {
     this.kind = null;
     /** The reason of a disconnection: a key of the words, or the server's sentence; null while frames come. */
     this.reason = null;
+    /** Words on what to do without a publisher; may be empty. */
+    this.instead = "";
     /** The cue at which the show waits, or the cue that it has just passed. */
     this.cue = null;
     /** The moments of the latest change and of the latest passed cue, as this page saw them (ms). */
@@ -86,13 +88,15 @@ export class Transport {
     return say(this.kind === "lost" ? LOST[this.reason] ?? "noPublisher" : `${this.kind}Word`);
   }
 
-  /** Returns the detail at a moment. `keys`: true if the keys of the transport bar work here. */
+  /** Returns the detail at a moment. `keys`: whether commands are given by the "keys", by "touch" of the bar, or "none". */
   detail(now, keys) {
     const { kind, reason, frame, cue } = this, passed = minutes((now - this.since) / 1000),
         named = cue && say("cueNamed", cue);
     if (kind === "lost") return frame
-        ? say("pictureFrom", { time: frame.time.toFixed(1), ago: minutes((now - frame.at) / 1000) }) : say(reason);
-    if (kind === "held") return say(keys ? "heldFor" : "sinceThen", { passed });
+        ? say("pictureFrom", { time: frame.time.toFixed(1), ago: minutes((now - frame.at) / 1000) })
+        : [say(reason), this.instead].filter(Boolean).join("; ");
+    if (kind === "held") return say(keys === "none" ? "sinceThen" : keys === "touch" ? "heldTouch" : "heldFor",
+        { passed });
     if (kind === "go") return say("goDetail", { cue: named, passed });
     if (kind === "paused") return say("sinceThen", { passed });
     if (kind === "ended") {

@@ -135,9 +135,10 @@ pub(super) fn alert(alert: &CollisionAlert, stage: &Stage) -> String {
     json!(message).to_string()
 }
 
-/// Returns the message that there is no publisher, or a publisher that cannot be used for this `reason`.
-pub(super) fn waiting(reason: Option<&str>) -> String {
-    json!({"type": "waiting", "reason": reason}).to_string()
+/// Returns the message that there is no publisher, or a publisher that cannot be used for this `reason`; with the names
+/// of the shows that run here instead.
+pub(super) fn waiting(reason: Option<&str>, running: &[String]) -> String {
+    json!({"type": "waiting", "reason": reason, "running": running}).to_string()
 }
 
 /// Returns the response to `clock`: CLOCK_MONOTONIC, the clock of the frames' stamps; `None` if they have another

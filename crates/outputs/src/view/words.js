@@ -187,6 +187,7 @@ const WORDS = {
   noStageYet: ["NO STAGE", "没有舞台数据"],
   otherVersion: ["OTHER VERSION", "版本不符"],
   sinceThen: ["for {passed}", "已 {passed}"],
+  heldTouch: ["for {passed} · release: the red button", "已 {passed} · 按红色按钮解除"],
   heldFor: ["for {passed} · release: H", "已 {passed} · 按 H 解除"],
   goDetail: ["{cue} · waits {passed}", "{cue} · 已等待 {passed}"],
   endedAt: ["at {time} s", "停于 {time} 秒"],
@@ -213,6 +214,8 @@ const WORDS = {
   // The state of the page, spoken once.
   server: ["waiting for the server", "等待服务器"],
   publisher: ["waiting for a publisher", "等待发布端"],
+  runningHere: ["running here: {names}", "本机正在运行：{names}"],
+  startOne: ["start it with: bench-dragon run --name {name}", "启动命令：bench-dragon run --name {name}"],
   noStage: ["waiting for the stage", "等待舞台数据"],
   version: ["this page is for another version of the server: load it again", "本页面与服务器版本不符：请重新载入"],
   noFramesNow: ["no frames", "没有新帧"],

@@ -3,9 +3,11 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
+use std::os::unix::fs::MetadataExt;
 
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
 use nix::sys::mman::{MlockAllFlags, mlockall};
+use nix::sys::resource::{Resource, getrlimit};
 use nix::unistd::Pid;
 use thread_priority::unix::{
     RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
@@ -56,8 +58,8 @@ fn become_realtime(priority: u8) {
     let set = set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy);
     if let Err(error) = set {
         log::warn!(
-            "no real-time priority ({error:?}): the loop runs as an ordinary thread. To allow it, run as root, or add \
-             \"@realtime - rtprio 99\" to /etc/security/limits.conf, put the user into that group and log in again"
+            "no real-time priority ({error:?}): the loop runs as an ordinary thread. To allow it, {}",
+            remedy(is_root(), greatest_priority(), priority)
         );
     }
     if let Err(error) = mlockall(MlockAllFlags::MCL_CURRENT) {
@@ -65,6 +67,28 @@ fn become_realtime(priority: u8) {
             "memory could not be locked ({error}): a page fault can delay a frame. To allow it, raise the limit with \
              \"ulimit -l unlimited\", or add \"@realtime - memlock unlimited\" to /etc/security/limits.conf"
         );
+    }
+}
+
+/// Returns the greatest real-time priority that the limits of this process admit.
+fn greatest_priority() -> u64 {
+    getrlimit(Resource::RLIMIT_RTPRIO).map_or(0, |(limit, _)| limit)
+}
+
+/// Returns true for a process of root; Linux has its folder with its owner.
+fn is_root() -> bool {
+    std::fs::metadata("/proc/self").is_ok_and(|process| process.uid() == 0)
+}
+
+/// Returns the way to a refused `priority`. Who is root, or within the limit, has been refused by a container or by a
+/// control group whose real-time budget is 0 (Linux, Documentation/scheduler/sched-rt-group.rst).
+fn remedy(is_root: bool, limit: u64, priority: u8) -> &'static str {
+    if is_root || limit >= u64::from(priority) {
+        "give the container the right (docker run --cap-add SYS_NICE --ulimit rtprio=99) and, where the kernel has \
+         real-time budgets for control groups, a budget (cpu.rt_runtime_us; docker run --cpu-rt-runtime=950000)"
+    } else {
+        "run as root, or add \"@realtime - rtprio 99\" to /etc/security/limits.conf, put the user into that group and \
+         log in again"
     }
 }
 
@@ -112,4 +136,20 @@ fn pin_to_cpu(cpu: usize) -> Result<(), CpuError> {
     let mut one = CpuSet::new();
     let pinned = available.contains(&cpu) && one.set(cpu).and_then(|()| sched_setaffinity(this, &one)).is_ok();
     if pinned { Ok(()) } else { Err(CpuError { cpu, available }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_has_the_right_already_is_told_of_the_control_group() {
+        for (is_root, limit, is_of_the_group) in
+            [(true, 0, true), (false, 80, true), (false, 79, false), (false, 0, false)]
+        {
+            let sentence = remedy(is_root, limit, 80);
+            assert_eq!(sentence.contains("cpu.rt_runtime_us"), is_of_the_group, "{sentence}");
+            assert_eq!(sentence.contains("limits.conf"), !is_of_the_group, "{sentence}");
+        }
+    }
 }

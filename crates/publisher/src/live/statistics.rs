@@ -16,7 +16,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Announcement, End, StatusPublisher, TransportCounters};
 use bench_dragon_client::clock::Clock;
+use bench_dragon_client::shared_memory::stale_files::lost_files;
 use bench_dragon_messages::LoopStatus;
+use bench_dragon_messages::sentence::lost_files_sentence;
 
 pub use accumulator::{Accumulator, Durations, Percentiles, Sample, Summary};
 
@@ -26,6 +28,9 @@ const QUEUED_SAMPLES: usize = 1 << 16;
 const QUEUED_ANNOUNCEMENTS: usize = 1 << 10;
 /// The time between two polls of the queues, in nanoseconds.
 const POLL_INTERVAL_NS: u64 = 20_000_000;
+
+/// The interval of the log's lines about lost files, in nanoseconds.
+const WARNING_INTERVAL_NS: u64 = 60_000_000_000;
 
 /// Creates the queues between the loop and this thread.
 pub fn queues() -> (super::Reports, Inbox) {
@@ -140,16 +145,25 @@ impl<'a> Collector<'a> {
 /// Collects until `done` is set and the queues are empty.
 pub fn collect<C: Clock>(clock: &C, inbox: Inbox, run: Run, done: &AtomicBool) -> Summary {
     let mut collector = Collector::new(inbox, run, clock.monotonic_ns());
+    let mut warned_ns = None;
     loop {
         // `done` is read before the queues are emptied: everything pushed before `done` was set is collected.
         let ending = done.load(Ordering::Acquire);
         collector.take();
         let now_ns = clock.monotonic_ns();
-        collector.report(now_ns, ending, |status| LoopStatus {
-            stamp_ns: clock.realtime_ns(),
-            resident_bytes: resident_bytes(),
-            file_descriptors: file_descriptors(),
-            ..status
+        collector.report(now_ns, ending, |status| {
+            let lost_files = lost_files();
+            if lost_files > 0 && warned_ns.is_none_or(|warned_ns| now_ns - warned_ns >= WARNING_INTERVAL_NS) {
+                log::error!("{}", lost_files_sentence(lost_files));
+                warned_ns = Some(now_ns);
+            }
+            LoopStatus {
+                stamp_ns: clock.realtime_ns(),
+                resident_bytes: resident_bytes(),
+                lost_files,
+                file_descriptors: file_descriptors(),
+                ..status
+            }
         });
         if ending {
             return collector.summary();

@@ -18,7 +18,9 @@ const fn history(topic: Topic) -> &'static [(&'static str, &'static str)] {
         ],
         Topic::Handles => &[("FrameHeader/2", "epoch"), ("FrameHeader/1", "deadline_ns")],
         Topic::Alerts => &[("CollisionAlert/2", "event_bench_a"), ("CollisionAlert/1", "time_to_event")],
-        Topic::Status => &[("LoopStatus/2", "unforeseen_contacts"), ("LoopStatus/1", "overruns")],
+        Topic::Status => {
+            &[("LoopStatus/3", "lost_files"), ("LoopStatus/2", "unforeseen_contacts"), ("LoopStatus/1", "overruns")]
+        }
         Topic::Cues => &[("Cue/1", "cue_time")],
         _ => &[],
     }

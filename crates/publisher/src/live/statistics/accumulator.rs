@@ -170,7 +170,7 @@ impl Accumulator {
 
     /// Returns the status once a second, with or without new frames. Returns `None` before the first frame.
     ///
-    /// `stamp_ns`, `resident_bytes` and `file_descriptors` are 0.
+    /// `stamp_ns`, `resident_bytes`, `lost_files` and `file_descriptors` are 0.
     pub fn status_if_due(&mut self, now_ns: u64) -> Option<LoopStatus> {
         if now_ns < self.status_due_ns {
             return None;
@@ -233,6 +233,7 @@ impl Accumulator {
             step_p999_total: step_total.p999,
             step_max_total: step_total.max,
             resident_bytes: 0,
+            lost_files: 0,
             subscribers,
             file_descriptors: 0,
             scene: self.scene,

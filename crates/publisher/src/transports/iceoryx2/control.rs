@@ -18,6 +18,7 @@ use ::iceoryx2::service::builder::request_response::{
 };
 use ::iceoryx2::service::port_factory::server::ServerCreateError;
 
+use super::claim::NameClaim;
 use super::{SPARE_NODES, node, retry_while_incomplete, service_name};
 use crate::live::control::{Answer, CommandSender, MOST_WAITING};
 use bench_dragon_client::shared_memory::{OpenError, failed, incomplete};
@@ -62,9 +63,14 @@ impl ControlThread {
         let (opened, opening) = mpsc::channel();
         let thread = {
             let (name, stop) = (name.to_owned(), Arc::clone(&stop));
-            move || match retry_while_incomplete(|| open(&name)) {
-                // The node is dropped last: the server belongs to it.
-                Ok((_node, server)) => {
+            let claim_and_open = |name: &str| {
+                // Before any file is made: the files of the show that holds the name may be gone.
+                let claim = NameClaim::new(name)?;
+                Ok((claim, retry_while_incomplete(|| open(name))?))
+            };
+            move || match claim_and_open(&name) {
+                // The node is dropped after the server, which belongs to it, and the claim last.
+                Ok((_claim, (_node, server))) => {
                     let _ = opened.send(Ok(()));
                     serve(&server, commands, &stop);
                 }
