@@ -260,13 +260,9 @@ fn certificates_of_the_least_pitch_are_accepted() {
              [path]\nkind = \"spiral\"\npitch = 0.6\nstart_turn = 12.0\n[motion]\nhead_speed = 1.0\n"
         );
         let scene = Scene::parse(&text, "pitch", "pitch").unwrap();
-        let mut found = None;
+        let (team, mut found) = (scene.ensemble.only().unwrap().team(), None);
         let proved = accepted(&text, |write| {
-            found = Some(
-                certify_least_pitch(scene.ensemble.only().unwrap().team(), radius, &text, write, &mut |_| ())
-                    .unwrap()
-                    .unwrap(),
-            );
+            found = Some(certify_least_pitch(team, radius, &text, write, &mut |_| ()).unwrap().unwrap());
         });
         let (claim, found) = (proved.least_pitch.unwrap(), found.unwrap());
         println!("{claim:?} {found:?} {} steps", proved.steps);

@@ -141,7 +141,7 @@ fn every_instruction_set_keeps_every_accuracy_against_the_reference() {
         for (accuracy, velocities) in
             accuracies.flat_map(|accuracy| VELOCITIES.map(|velocities| (accuracy, velocities)))
         {
-            let table = select(&motion, accuracy, velocities).unwrap().table;
+            let table = select(motion, accuracy, velocities).unwrap().table;
             for instructions in Instructions::available() {
                 run.insert((instructions.name(), format!("{velocities:?}"), table.format()));
                 let mut solver = table.clone().with_instructions(instructions).unwrap();
@@ -151,7 +151,7 @@ fn every_instruction_set_keeps_every_accuracy_against_the_reference() {
                     for (k, truth) in truth.iter().enumerate() {
                         let error = truth.x.error_of(chain.x[k]).hypot(truth.y.error_of(chain.y[k]));
                         // On a turnaround the place of the start is itself rounded several times.
-                        let floor = floor(&motion, *time, (chain.x[k], chain.y[k]), truth.speed).max(1e-13);
+                        let floor = floor(motion, *time, (chain.x[k], chain.y[k]), truth.speed).max(1e-13);
                         let at = || {
                             format!("{name} {} {accuracy:e} {velocities:?} at {time}, handle {k}", instructions.name())
                         };
@@ -199,7 +199,7 @@ fn the_choice_is_the_same_every_time() {
         let scene = scene(name);
         let motion = scene.ensemble.only().unwrap();
         for accuracy in ACCURACIES {
-            let [mut one, mut other] = [(), ()].map(|()| select(&motion, accuracy, Velocities::Computed).unwrap());
+            let [mut one, mut other] = [(), ()].map(|()| select(motion, accuracy, Velocities::Computed).unwrap());
             assert_eq!(one.table.format(), other.table.format());
             assert_eq!((one.error, one.allowed, one.test_points), (other.error, other.allowed, other.test_points));
             let [mut first, mut second] = [(), ()].map(|()| Chain::new(motion.team().handles()));

@@ -121,11 +121,11 @@ fn velocities_keep_their_promise_at_the_kinks_of_the_scenes() {
         let scene = Scene::load(&std::path::Path::new("config").join(format!("{name}.toml"))).unwrap();
         let motion = scene.ensemble.only().unwrap();
         let end = scene.ensemble.timeline_without_contact().end().event.travelled;
-        let mut kinks = kinks(&motion, end, usize::MAX);
+        let mut kinks = kinks(motion, end, usize::MAX);
         assert!(kinks.len() > 2 * motion.team().handles(), "{name}: {} kinks", kinks.len());
         kinks.push(known * motion.head_speed());
         for accuracy in ACCURACIES {
-            let (compared, worst) = assert_kept(&motion, accuracy, &kinks);
+            let (compared, worst) = assert_kept(motion, accuracy, &kinks);
             println!("{name} at {accuracy:e} m: {worst:.3} of the promise, {compared} velocities");
             assert!(compared > 100_000, "{compared}");
         }

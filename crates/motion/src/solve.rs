@@ -142,8 +142,8 @@ pub enum Velocities {
 /// use bench_dragon_motion::solve::{Chain, Velocities};
 ///
 /// let scene = Scene::paper();
-/// let mut solver = scene.motion.solver(Velocities::Computed).solver;
-/// let mut chain = Chain::new(scene.team().handles());
+/// let mut solver = scene.ensemble.solver(Velocities::Computed);
+/// let mut chain = Chain::new(scene.ensemble.handles());
 /// solver.solve(300.0, &mut chain)?;
 /// // The head of the paper's dragon after 300 s of true motion, and its speed.
 /// assert!((chain.x[0] - 4.420_274_064_106).abs() < 1e-9 && (chain.y[0] - 2.320_428_674_331).abs() < 1e-9);

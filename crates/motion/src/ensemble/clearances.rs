@@ -1,0 +1,171 @@
+//! The least clearances of an ensemble over its show: of boards of one dragon, of boards of two, and of obstacles.
+//!
+//! In: the end of the show. Out: clearances with the times and numbers of the show.
+
+use bench_dragon_messages::state::EventKind;
+
+use super::{Dragon, Ensemble, pairs};
+use crate::CONTACT_BUDGET;
+use crate::contact::between::{self, Meeting};
+use crate::contact::{LeastClearance, ObstacleClearance};
+use crate::event::Budget;
+use crate::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
+
+/// The least clearances of a show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeastClearances {
+    /// The least clearance of two boards of one dragon; `None` if there are no two, or the search failed.
+    pub own: Option<TimedClearance>,
+    /// The least clearance of boards of two dragons; `None` likewise.
+    pub between: Option<TimedClearance>,
+}
+
+impl LeastClearances {
+    /// Returns the least clearance of the show.
+    pub fn of_show(&self) -> Option<TimedClearance> {
+        self.between.into_iter().fold(self.own, |best, other| Some(nearer(best, other)))
+    }
+}
+
+impl Ensemble {
+    /// Returns the least clearances of any two boards that share no handle, from the start until the show ends at
+    /// `show_end`. `own` is for boards of one dragon, `between` for boards of two dragons. `timeline` is of this
+    /// ensemble.
+    pub fn least_clearances(
+        &self,
+        timeline: &Timeline,
+        show_end: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> LeastClearances {
+        let (own_share, share) = self.shares();
+        let contact = timeline.find(EventKind::Contact);
+        let own =
+            |k: usize| self.own_least_clearance(k, contact, show_end, &mut |part| progress(share * (k as f64 + part)));
+        let own = (0..self.dragons.len()).filter_map(own).fold(None, |best, own| Some(nearer(best, own)));
+        let between =
+            self.least_clearance_between(show_end.time, &mut |part| progress(own_share + (1.0 - own_share) * part));
+        LeastClearances { own, between }
+    }
+
+    /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show. Returns
+    /// `None` if there are no two boards, or the search failed.
+    fn own_least_clearance(
+        &self,
+        dragon: usize,
+        contact: Option<&TimedEvent>,
+        show_end: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<TimedClearance> {
+        let Dragon { delay, motion, .. } = &self.dragons[dragon];
+        let first = self.first_handles[dragon] as u32;
+        // Before the first contact, every clearance is above that at the contact.
+        let is_own =
+            |bench: Option<u32>| bench.is_some_and(|bench| self.handles_of(dragon).contains(&(bench as usize)));
+        let own = contact.filter(|contact| is_own(contact.event.bench_a) && is_own(contact.event.bench_b));
+        let from = own.map_or(0.0, |contact| contact.event.travelled);
+        let to = self.own_end(dragon, show_end);
+        let found = motion.least_clearance((from, to), progress)?;
+        let LeastClearance { value, travelled, bench_a, bench_b } = found.value?;
+        let time_at = |travelled| motion.time_at(travelled) + delay;
+        Some(TimedClearance {
+            least: LeastClearance { value, travelled, bench_a: bench_a + first, bench_b: bench_b + first },
+            time: time_at(travelled),
+            searched_until: (found.searched_until < to).then(|| time_at(found.searched_until)),
+        })
+    }
+
+    /// Returns the least clearance of boards of two dragons, from the start to a time; `None` if there are no two, or
+    /// the search failed.
+    fn least_clearance_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Option<TimedClearance> {
+        if self.dragons.len() < 2 {
+            return None;
+        }
+        let found = self.singularities();
+        let moving = self.moving(&found).ok()?;
+        let mut budget = Budget::new(CONTACT_BUDGET, progress);
+        let mut best: Option<(Meeting, [usize; 2])> = None;
+        // The nearest guess leaves little to prove of the others.
+        for pair in pairs(moving.len()) {
+            let guess = between::guess_least_clearance(pair.map(|k| &moving[k]), (0.0, to), &mut budget).ok()?;
+            best = guess.map(|meeting| (meeting, pair)).into_iter().chain(best).min_by(least);
+        }
+        let mut searched_until = None;
+        for pair in pairs(moving.len()) {
+            let below = best.map(|(meeting, _)| meeting);
+            let found = between::least_clearance(pair.map(|k| &moving[k]), (0.0, to), below, &mut budget).ok()?;
+            searched_until = earlier(searched_until, (found.searched_until < to).then_some(found.searched_until));
+            best = found.value.map(|meeting| (meeting, pair)).into_iter().chain(best).min_by(least);
+        }
+        let (meeting, pair) = best?;
+        let [bench_a, bench_b] = self.numbered(&meeting, pair);
+        let travelled = self.dragons[pair[0]].travelled_at(meeting.time);
+        let least = LeastClearance { value: meeting.value, travelled, bench_a, bench_b };
+        Some(TimedClearance { least, time: meeting.time, searched_until })
+    }
+
+    /// Returns the time at which boards of two dragons are nearest, up to a time of the show. Returns also a bench of
+    /// each dragon, counted within the dragon. Returns `None` if the search failed.
+    pub fn nearest_of(&self, pair: [usize; 2], to: f64) -> Option<(f64, [usize; 2])> {
+        let two = self.pair(pair);
+        let TimedClearance { least, time, .. } = two.least_clearance_between(to, &mut |_| ())?;
+        Some((time, two.within([least.bench_a, least.bench_b])))
+    }
+
+    /// Returns the least clearance of each obstacle over all dragons from the start until the show ends at `show_end`.
+    /// The list is empty without obstacles.
+    pub fn obstacle_clearances(
+        &self,
+        show_end: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Vec<TimedObstacleClearance> {
+        let share = 1.0 / self.dragons.len() as f64;
+        let mut all: Vec<TimedObstacleClearance> = Vec::new();
+        for (k, Dragon { delay, motion, .. }) in self.dragons.iter().enumerate() {
+            let to = self.own_end(k, show_end);
+            let (least, reached) = motion.obstacle_clearances(to, &mut |part| progress(share * (k as f64 + part)));
+            let time_at = |travelled| motion.time_at(travelled) + delay;
+            let searched_until = (reached < to).then(|| time_at(reached));
+            for (obstacle, least) in least.into_iter().enumerate() {
+                let Some(ObstacleClearance { value, travelled, bench }) = least else { continue };
+                let least = ObstacleClearance { value, travelled, bench: bench + self.first_handles[k] as u32 };
+                let own = TimedObstacleClearance { obstacle, least, time: time_at(travelled), searched_until };
+                match all.iter_mut().find(|other| other.obstacle == obstacle) {
+                    Some(other) => {
+                        let until = earlier(other.searched_until, searched_until);
+                        if value < other.least.value {
+                            *other = own;
+                        }
+                        other.searched_until = until;
+                    }
+                    None => all.push(own),
+                }
+            }
+        }
+        all
+    }
+
+    /// Returns the metres that a dragon's head has travelled when the show ends.
+    fn own_end(&self, dragon: usize, show_end: &TimedEvent) -> f64 {
+        match self.only() {
+            // Without the rounding of the time.
+            Some(_) => show_end.event.travelled,
+            None => self.dragons[dragon].travelled_at(show_end.time),
+        }
+    }
+}
+
+/// Compares clearances.
+fn least((one, _): &(Meeting, [usize; 2]), (other, _): &(Meeting, [usize; 2])) -> std::cmp::Ordering {
+    one.value.total_cmp(&other.value)
+}
+
+fn nearer(best: Option<TimedClearance>, other: TimedClearance) -> TimedClearance {
+    let Some(best) = best else { return other };
+    let searched_until = earlier(best.searched_until, other.searched_until);
+    let nearer = if other.least.value < best.least.value { other } else { best };
+    TimedClearance { searched_until, ..nearer }
+}
+
+fn earlier(one: Option<f64>, other: Option<f64>) -> Option<f64> {
+    one.into_iter().chain(other).reduce(f64::min)
+}
