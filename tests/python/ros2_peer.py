@@ -246,7 +246,8 @@ def main():
                 if counts[wanted] == 1:
                     print(json.dumps({"type": "offered", "by": kind, **offered(reader, participants)}), flush=True)
                 sent_ns = sample.sample_info.source_timestamp
-                line = {"type": "message", "topic": wanted, "sent_ns": sent_ns, "message": shortened(kind, sample)}
+                line = {"type": "message", "topic": wanted, "sent_ns": sent_ns, "received_ns": time.time_ns()}
+                line["message"] = shortened(kind, sample)
                 print(json.dumps(line), flush=True)
                 if arguments.until_each and counts[wanted] == 1 and all(counts.values()):
                     end = min(end, time.monotonic() + 1.0)

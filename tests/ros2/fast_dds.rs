@@ -301,14 +301,14 @@ fn a_late_subscriber_gets_the_current_alert_and_a_volatile_one_none_before_it() 
     stopped(publisher);
 }
 
-/// The publisher counts a killed subscriber for its lease, here a day. RustDDS then refuses to write more than the
-/// memory of a topic holds: 64 MB, here some 330 messages.
+/// A stopped subscriber acknowledges nothing and is not dead. RustDDS would refuse to write more than the memory of a
+/// topic holds: 64 MB, here some 330 messages.
 #[test]
-fn a_killed_subscriber_stops_no_other() {
+fn a_stopped_subscriber_stops_no_other() {
     if !can_run(peer_program().map(drop)) {
         return;
     }
-    let name = "killed_lease";
+    let name = "stopped_lease";
     let changes =
         [("benches = 223", "benches = 5000"), ("start_turn = 16", "start_turn = 60"), ("[alerts]", "#[alerts]")];
     let scene = scene_file(name, &changes);
@@ -318,15 +318,16 @@ fn a_killed_subscriber_stops_no_other() {
     fs::write(&scene, format!("{lines}\n[publish.ros2]\ntopics = [\"handles\"]\n")).unwrap();
     let scene = scene.to_str().unwrap();
     let publisher = publisher(name, &["--scene", scene, "run", "--json", "--duration", "6000"]);
-    let mut killed = Process::start(&mut subscriber(name, "handles", &["--seconds", "600", "--lease", "86400"]));
-    killed.lines().until(SAMPLE);
-    killed.signal(Signal::SIGKILL);
+    let mut slow = Process::start(&mut subscriber(name, "handles", &["--seconds", "600", "--lease", "86400"]));
+    slow.lines().until(SAMPLE);
+    slow.signal(Signal::SIGSTOP);
     let mut other =
         Process::start(&mut subscriber(name, "handles", &["--seconds", "180", "--linger", "0", "--samples", "500"]));
     let printed = other.lines().rest();
     let end: Value = serde_json::from_str(printed.last().unwrap()).unwrap();
     assert!(end["samples"].as_u64() >= Some(500), "{end}");
-    stopped(publisher);
+    let ros2 = &stopped(publisher)["ros2"];
+    assert_eq!(ros2["discarded"], 0, "{ros2}");
 }
 
 /// Returns the resident memory of a process, in MB.
@@ -381,8 +382,9 @@ fn visit(name: &str, index: usize) -> Visit {
     Visit::Served
 }
 
-/// Half of the subscribers are killed, the others leave. A subscriber of Fast DDS that is sent an empty change spins,
-/// and would never end. `BENCH_DRAGON_SUBSCRIBERS` is their number, 4,000 by default; 200,000 take a night.
+/// Messages of 223 benches on a busy machine; half of the subscribers are killed, the others leave. A subscriber of Fast
+/// DDS that is sent an empty change spins, and would never end. `BENCH_DRAGON_SUBSCRIBERS` is their number, 2,000 by
+/// default, which take 20 minutes.
 #[test]
 fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_messages() {
     // Beside many other processes a subscriber may discover the publisher later than within its minute.
@@ -392,7 +394,9 @@ fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_mes
     let name = "come_and_go";
     let publisher = publisher(name, &["run", "--json", "--ros2", "--start", "300", "--loop", "--duration", "100000"]);
     let process = child_of(publisher.id()).unwrap();
-    let subscribers = std::env::var("BENCH_DRAGON_SUBSCRIBERS").map_or(4000, |number| number.parse().unwrap());
+    let subscribers = std::env::var("BENCH_DRAGON_SUBSCRIBERS").map_or(2000, |number| number.parse().unwrap());
+    let busy = || Process::start(Command::new("nice").args(["sh", "-c", "while :; do :; done"]));
+    let _load: Vec<Process> = (0..4).map(|_| busy()).collect();
     let (rounds, beside) = (subscribers / 4, 4);
     let undiscovered = AtomicUsize::new(0);
     let mut memories = Vec::new();
@@ -415,7 +419,10 @@ fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_mes
     // The queues fill first, with the messages of some seconds.
     let highest = |memories: &[f64]| memories.iter().copied().fold(0.0, f64::max);
     let (first, rest) = memories.split_at(100_usize.div_ceil(beside).min(rounds / 2));
-    // RustDDS keeps the last 4,096 messages of discovery, two of a subscriber: 8 kB or so each.
+    // RustDDS 0.15.1 keeps the last 4,096 messages of discovery (`discovery/discovery.rs:2014`; the collection of
+    // `structure/dds_cache.rs:102` removes none of them), two of a subscriber. It never clears its tables of topics
+    // (`discovery/discovery_db.rs:76`), of keys (`dds/with_key/simpledatareader.rs:57`) and of instances
+    // (`dds/with_key/datasample_cache.rs:34`). With the gaps in the allocator's pages, 8 kB or so for each subscriber.
     let discovery = 0.009 * (subscribers.min(2048) as f64);
     assert!(highest(rest) < highest(first) + 10.0 + discovery, "{memories:.1?}");
     // The same process still serves, and ends.

@@ -24,7 +24,7 @@ use serde_json::Value;
 /// Starts a Cyclone DDS process that prints its messages of these topics, and waits until it reads.
 fn peer(name: &str, topics: &[&str]) -> (Process, Lines) {
     let mut command = python();
-    command.args(["tests/python/ros2_peer.py", "--name", &unique(name), "--seconds", "300"]);
+    command.args(["tests/python/ros2_peer.py", "--name", &unique(name), "--seconds", "3000"]);
     topics.iter().for_each(|topic| {
         command.args(["--topic", topic]);
     });
@@ -392,32 +392,43 @@ fn the_diagnostics_tell_of_a_chase_and_of_its_end() {
     stopped(publisher);
 }
 
-/// Cyclone DDS takes messages that the first heartbeat of a writer names for old ones, and drops them.
+/// Cyclone DDS takes messages that the first heartbeat of a writer names for old ones, and drops them. Discovery of a
+/// participant is in order, so a subscriber that has got the stage is matched with the handles, on both sides.
 #[test]
 fn a_subscriber_that_is_there_before_a_show_gets_its_frames_from_the_first_on() {
     if !can_run(python_modules(&["cyclonedds"])) {
         return;
     }
-    let name = "from_first";
-    let (_subscriber, lines) = peer(name, &["handles"]);
-    let (mut runs, mut begins) = (BTreeSet::new(), Vec::new());
+    let (name, stage) = ("from_first", "stage:reliable:transient_local");
+    let (_subscriber, lines) = peer(name, &["handles", stage]);
+    let is_of = |line: &Value, topic: &str, runs: &BTreeSet<u64>| {
+        line["topic"] == topic && !runs.contains(&run_of(&line["message"]))
+    };
+    let number = |value: &Value| value.as_u64().unwrap();
+    let (mut runs, mut begins, mut lost) = (BTreeSet::new(), Vec::new(), 0);
     for _ in 0..12 {
         let publisher = Process::start(program(name).args(["run", "--ros2", "--json", "--duration", "600"]));
-        let of_new_run = |runs: &BTreeSet<u64>| loop {
-            let frame = next(&lines, "handles");
-            if !runs.contains(&run_of(&frame)) {
-                return frame;
+        let (mut matched, mut frames) = (None, Vec::new());
+        while matched.is_none() || frames.len() < 6 {
+            let line: Value = serde_json::from_str(&lines.until("\"message\": ")).unwrap();
+            if is_of(&line, stage, &runs) {
+                matched = Some(number(&line["received_ns"]));
+            } else if is_of(&line, "handles", &runs) {
+                frames.push(line["message"].clone());
             }
-        };
-        let first: Vec<Value> = (0..6).map(|_| of_new_run(&runs)).collect();
+        }
         stopped(publisher);
-        runs.insert(run_of(&first[0]));
-        begins.push(first.iter().map(|frame| frame["sequence"].as_u64().unwrap()).collect::<Vec<_>>());
+        runs.insert(run_of(&frames[0]));
+        let numbers: Vec<u64> = frames.iter().map(|frame| number(&frame["sequence"])).collect();
+        // At 60 frames per second: the frame before the first one that has come.
+        let before = number(&frames[0]["stamp_ns"]) - 16_666_667;
+        let is_first_lost = numbers[0] > 0 && matched.is_some_and(|matched| before > matched);
+        lost += u32::from(is_first_lost || !numbers.is_sorted_by(|a, b| a + 1 == *b));
+        begins.push((numbers[0], (before as i64 - matched.unwrap_or(0) as i64) / 1_000_000));
     }
-    // On a busy machine discovery takes longer than a show waits, or the process of ROS 2 skips a frame.
-    let complete = begins.iter().filter(|numbers| numbers[..] == [0, 1, 2, 3, 4, 5]).count();
-    println!("{complete} of {} shows from the first frame on", begins.len());
-    assert!(complete * 3 >= begins.len() * 2, "{begins:?}");
+    println!("{lost} shows lost first frames: first numbers, and ms after the match {begins:?}");
+    // A process of ROS 2 that is behind on a busy machine skips frames.
+    assert!(lost <= 3, "{lost}: {begins:?}");
 }
 
 #[test]

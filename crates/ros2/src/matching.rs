@@ -142,7 +142,7 @@ impl Matches {
     }
 
     /// Notifies all subscribers of a local writer that the writer has written nothing until now, for the reason that
-    /// [`announce`](Self::announce) has. Held by `a_subscriber_that_is_there_before_a_show`.
+    /// [`announce`](Self::announce) has.
     pub(super) fn announce_to_all(&self, writer: GUID) {
         self.subscribers(writer).into_keys().for_each(|reader| self.announce(writer, reader, 0));
     }

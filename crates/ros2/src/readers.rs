@@ -6,7 +6,7 @@
 //! |---|---|---|---|
 //! | new, of a transient-local writer | no message but the latest, or those of the lifespan; a volatile one none | offers all that it keeps, whatever the reader's durability and depth (`Writer::matched_reader_update`, `rtps/writer.rs:2074`) | `a_late_subscriber_gets_the_current_alert`, `a_late_volatile_subscriber`, `a_late_subscriber_of_rosout` |
 //! | best-effort | an acknowledgement of every message, in its name | waits for it without end (`Writer::remove_all_acked_changes_but_keep_depth`, `rtps/writer.rs:1660`) | `subscribers_that_come_and_go` |
-//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones (`WriterSendBuffer::admit_blocking`, `rtps/writer_send_buffer.rs:199`) | `a_killed_subscriber_stops_no_other` |
+//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones (`WriterSendBuffer::admit_blocking`, `rtps/writer_send_buffer.rs:199`) | `a_stopped_subscriber_stops_no_other` |
 //!
 //! A dead reader leaves with its participant ([`departures`](super::departures)), held by
 //! `the_ports_of_a_killed_subscriber`. The tests are those of `tests/ros2/fast_dds`.
