@@ -81,6 +81,6 @@ fn a_command_without_a_publisher_names_those_that_run() {
     assert!(sentence.ends_with("\"amber\" (running here: gold, jade)\n"), "{sentence}");
     let (watched, _) = printed(&place, &["--name", "amber", "watch", "--duration", "1"]);
     assert_eq!(watched, "waiting for a publisher of \"amber\"; running here: gold, jade\n");
-    let (_, sentence) = printed(&place, &["--name", "amber", "record", "show.mcap", "--duration", "0.1"]);
+    let (_, sentence) = printed(&place, &["--name", "amber", "record", "-o", "show.mcap", "--duration", "0.1"]);
     assert!(sentence.contains("nothing came from \"amber\" (running here: gold, jade)"), "{sentence}");
 }
