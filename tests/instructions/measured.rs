@@ -8,7 +8,7 @@ use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
-use bench_dragon::motion::clearance::{ClearanceMonitor, ObstacleMonitor};
+use bench_dragon::motion::clearance::{ClearanceMonitor, Pairs, Precision};
 use bench_dragon::motion::ground::{Ground, Obstacle};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::model::shape::Shape;
@@ -89,12 +89,16 @@ pub fn run() {
         Shape::boundary(square.to_vec()),
     ];
     let obstacles = shapes.map(|shape| Obstacle { name: String::new(), shape, keep_out: 0.2 });
-    let obstacles = ObstacleMonitor::new(team, Ground::new(obstacles.into()), Some(&table));
-    obstacle_clearance("clearance of four obstacles", obstacles, table.for_frames(), team.handles());
     let star = Obstacle { name: String::new(), shape: Shape::polygon(star()), keep_out: 0.2 };
-    let overlap = ObstacleMonitor::new(team, Ground::new(vec![star]), Some(&table));
-    obstacle_clearance("clearance of a star of 16 corners in overlap", overlap, table.for_frames(), team.handles());
-    clearance(ClearanceMonitor::new(path, team, &table), table, team.handles());
+    for (name, obstacles) in [
+        ("clearance", Vec::new()),
+        ("clearance, with four obstacles", obstacles.into()),
+        ("clearance, with a star of 16 corners in overlap", vec![star]),
+    ] {
+        let precision = Precision { link_error: 2.0 * table.accuracy(), seconds_per_link: team.shortest_link() };
+        let monitor = ClearanceMonitor::new(&[team], Pairs::Own, Ground::new(obstacles), precision);
+        clearance(name, monitor, table.for_frames(), team.handles());
+    }
     // A search for the contact would take long.
     let timeline = paper.motion.timeline_without_contact();
     step(&paper, &timeline);
@@ -112,15 +116,15 @@ fn frame(name: &str, solver: &mut dyn Solver, start: f64, handles: usize) {
 }
 
 /// Counts for a head that has travelled as many metres as there are seconds.
-fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
+fn clearance(name: &str, monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
     let mut on = (table, Chain::new(handles), monitor);
     let time = |number: u64| START + number as f64 / 60.0;
     part(
-        "clearance",
+        name,
         &mut on,
         |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
-        |(_, chain, monitor), number| {
-            black_box(monitor.least_clearance(&*black_box(chain), time(number)));
+        |(solver, chain, monitor), number| {
+            black_box(monitor.nearest(&*black_box(chain), time(number), f64::INFINITY, solver));
         },
     );
 }
@@ -132,21 +136,6 @@ fn star() -> Vec<Point> {
         Point::new(3.6 + radius * angle.cos(), -5.4 + radius * angle.sin())
     };
     (0..16).map(corner).collect()
-}
-
-/// Counts the obstacles' share of a frame's clearance. The head is where [`clearance`] has it; the nearest two boards
-/// are a quarter of a metre apart.
-fn obstacle_clearance(name: &str, monitor: ObstacleMonitor, table: FollowerTable, handles: usize) {
-    let mut on = (table, Chain::new(handles), monitor);
-    let time = |number: u64| START + number as f64 / 60.0;
-    part(
-        name,
-        &mut on,
-        |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
-        |(_, chain, monitor), number| {
-            black_box(monitor.nearest(&*black_box(chain), time(number), 0.25));
-        },
-    );
 }
 
 /// State of the loop, and a subscriber that receives its messages.

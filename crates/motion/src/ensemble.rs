@@ -9,7 +9,7 @@ use std::ops::Range;
 use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
-use crate::clearance::{BetweenMonitor, TabledDragon};
+use crate::clearance::{ClearanceMonitor, Pairs, Precision};
 use crate::contact::LeastClearance;
 use crate::contact::between::{self, Meeting, MovingDragon};
 use crate::event::{Budget, Event};
@@ -359,18 +359,16 @@ impl Ensemble {
     }
 
     /// Makes the monitor of the live clearance of different dragons. `choices` has the solver of each dragon's frames,
-    /// in its path's own coordinates.
-    pub fn between_monitor(&self, choices: &[Choice]) -> BetweenMonitor {
+    /// in its path's own coordinates; the chains are on the stage.
+    pub fn between_monitor(&self, choices: &[Choice]) -> ClearanceMonitor {
         let teams: Vec<Team> = self.dragons.iter().map(|dragon| *dragon.motion.team()).collect();
-        let monitor = BetweenMonitor::new(&teams, self.link_tolerance().max(1e-9));
-        let mut dragons = Vec::new();
-        for (Dragon { motion, .. }, choice) in self.dragons.iter().zip(choices) {
-            let Some(table) = &choice.table else { return monitor };
-            let (team, path, placement) = (*motion.team(), motion.path(), *motion.placement());
-            dragons.push(TabledDragon { team, path, placement, table, head_speed: motion.head_speed() });
-        }
-        let end = self.timeline_without_contact().end().time;
-        monitor.with_table(&dragons, end, &|dragon, time| self.dragons[dragon].travelled_at(time))
+        let of = self.dragons.iter().zip(choices).map(|(dragon, choice)| dragon.motion.precision(choice));
+        let first = Precision { link_error: self.link_tolerance(), seconds_per_link: f64::INFINITY };
+        let precision = of.fold(first, |all, of| Precision {
+            link_error: all.link_error.max(of.link_error),
+            seconds_per_link: all.seconds_per_link.min(of.seconds_per_link),
+        });
+        ClearanceMonitor::new(&teams, Pairs::Between, Ground::default(), precision)
     }
 
     /// Makes a solver of all dragons, for the show's time. Its chains are placed on the stage.

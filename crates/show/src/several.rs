@@ -9,10 +9,10 @@ use std::ops::Range;
 use crate::dancer::{Closest, Dancer};
 use crate::scene::Scene;
 use bench_dragon_motion::Choice;
-use bench_dragon_motion::clearance::{BetweenMonitor, Moment, PairClearance};
+use bench_dragon_motion::clearance::{ClearanceMonitor, PairClearance};
 use bench_dragon_motion::ensemble::{Dragon, Ensemble};
 use bench_dragon_motion::linkage::NoFollower;
-use bench_dragon_motion::solve::{Chain, ChainMut};
+use bench_dragon_motion::solve::{Chain, ChainMut, Solver};
 
 /// One of several dragons in play.
 struct Member {
@@ -26,9 +26,7 @@ struct Member {
 /// All dragons of a show in play.
 pub(crate) struct Several {
     members: Vec<Member>,
-    between: Option<BetweenMonitor>,
-    /// By dragon: the metres that its head has travelled in the latest frame.
-    travelled: Vec<f64>,
+    between: Option<ClearanceMonitor>,
 }
 
 impl Several {
@@ -43,7 +41,7 @@ impl Several {
             dragon: dragon.clone(),
         };
         let members: Vec<Member> = ensemble.dragons().iter().enumerate().zip(choices).map(member).collect();
-        Self { travelled: vec![0.0; members.len()], members, between }
+        Self { members, between }
     }
 
     /// Returns the names of the solvers and the reasons for their choice.
@@ -65,7 +63,7 @@ impl Several {
 
     /// Returns the pairs of boards tested so far.
     pub(crate) fn pairs_tested(&self) -> u64 {
-        let between = self.between.as_ref().map_or(0, BetweenMonitor::pairs_tested);
+        let between = self.between.as_ref().map_or(0, |monitor| monitor.counters().pairs);
         self.members.iter().map(|member| member.dancer.pairs_tested()).sum::<u64>() + between
     }
 
@@ -81,16 +79,28 @@ impl Several {
             (one, other) => one.or(other),
         };
         let own = self.members.iter().map(|member| member.closest.boards).fold(None, nearer);
-        let Self { members, between, travelled } = self;
-        let between = between.as_mut().and_then(|monitor| {
-            travelled.clear();
-            travelled.extend(members.iter().map(|member| member.dragon.travelled_at(show_time)));
-            let moment = Moment { time: show_time, travelled };
-            monitor.nearest(chain, own.map_or(f64::INFINITY, |own| own.value), moment)
-        });
+        let Self { members, between } = self;
+        let limit = own.map_or(f64::INFINITY, |own| own.value);
+        let between =
+            between.as_mut().and_then(|monitor| monitor.nearest(&*chain, show_time, limit, &mut AllOf(members)).boards);
         let boards = nearer(own, between);
         let any = self.members.iter().map(|member| member.closest.any).fold(boards, nearer);
         Ok(Closest { boards, any })
+    }
+}
+
+/// The positions of all dragons on the stage at a later time of the show.
+struct AllOf<'a>(&'a mut [Member]);
+
+impl Solver for AllOf<'_> {
+    fn name(&self) -> &'static str {
+        "all dragons"
+    }
+
+    fn solve_in(&mut self, show_time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        self.0.iter_mut().try_for_each(|Member { dragon, dancer, handles, .. }| {
+            dancer.solve_ahead(dragon.own_time(show_time).0, &mut chain.range_mut(handles.clone()))
+        })
     }
 }
 

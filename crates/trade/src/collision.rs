@@ -70,9 +70,10 @@ fn first_overlapping_sample(scene: &Scene, contact: f64, end: f64, interval: f64
 fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
     const RUNS: usize = 20;
     const RUN: usize = 40;
-    let mut choice = scene.motion.solver(scene.velocities);
+    let motion = scene.motion.in_own_frame();
+    let mut choice = motion.solver(scene.velocities);
     let mut chain = Chain::new(scene.team().handles());
-    let mut monitor = scene.motion.clearance_monitor(&choice);
+    let mut monitor = motion.clearance_monitor(&choice);
     let mut times = Vec::with_capacity(RUNS * RUN);
     for run in 0..RUNS {
         for frame in 0..RUN {
@@ -81,7 +82,7 @@ fn live_clearance_ns(scene: &Scene, end: f64) -> f64 {
                 break;
             }
             let began = Instant::now();
-            let _ = std::hint::black_box(monitor.least_clearance(&chain, scene.motion.travelled_at(time)));
+            let _ = std::hint::black_box(monitor.nearest(&chain, time, f64::INFINITY, choice.solver.as_mut()));
             // The first frame of a run follows a jump.
             if frame > 0 {
                 times.push(began.elapsed().as_nanos() as u64);

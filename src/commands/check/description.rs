@@ -24,7 +24,7 @@ pub(super) fn describe(scene: &Scene, warnings: &[String], output: &mut Output) 
     }
     let choice = scene.ensemble.is_none().then(|| scene.motion.solver(scene.velocities));
     solvers(scene, choice.as_ref(), output)?;
-    alerts(scene, choice.as_ref(), output)?;
+    alerts(scene, output)?;
     publishing(scene, output)
 }
 
@@ -60,17 +60,13 @@ fn solvers(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Resul
 }
 
 /// Prints the rules of alerts, and what the show does at a contact and at its end.
-fn alerts(scene: &Scene, choice: Option<&Choice>, output: &mut Output) -> Result<(), CommandError> {
+fn alerts(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
     match scene.alerts {
         Some(rules) => {
             output.line(&format!(
                 "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
                 rules.approach_time, rules.approach_clearance
             ))?;
-            if let Some(choice) = choice {
-                let monitor = scene.motion.clearance_monitor(choice);
-                output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
-            }
         }
         None => output.line(
             "  Alerts: none. `run` computes no rectangle, no clearance, no contact and no stall, and has no alerts \
