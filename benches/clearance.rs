@@ -66,7 +66,7 @@ fn procession() -> Path {
 /// Times a run from `start` metres of travel on, at `rate` frames a second.
 fn run(bencher: Bencher, path: &Path, team: Team, start: f64, rate: f64) {
     let mut table = FollowerTable::new(path, team, 1.0, Velocities::Omitted).expect("these paths have a table");
-    let precision = Precision { link_error: 0.0, seconds_per_link: team.shortest_link() };
+    let precision = Precision { handle_error: 0.0, seconds_per_link: team.shortest_link() };
     let mut monitor = ClearanceMonitor::new(&[team], Pairs::Own, Ground::default(), precision);
     let chains = chains(path, team, start, rate);
     let test = RefCell::new(|frames: &[(Chain, f64)]| {

@@ -34,6 +34,8 @@ pub const PART: &str = "counted: ";
 const CALLS: u64 = 60;
 /// Time of the first call, simulated seconds; the calls continue at 60 Hz.
 const START: f64 = 200.0;
+/// Rate of the steps and of the clearance, in Hz: at a lower rate a frame has a larger share in preparing windows.
+const RATE: f64 = 1_000.0;
 /// The same time on the route, which is shorter.
 const ON_ROUTE: f64 = 100.0;
 /// Steps of the certificate.
@@ -95,7 +97,7 @@ pub fn run() {
         ("clearance, with four obstacles", obstacles.into()),
         ("clearance, with a star of 16 corners in overlap", vec![star]),
     ] {
-        let precision = Precision { link_error: 2.0 * table.accuracy(), seconds_per_link: team.shortest_link() };
+        let precision = Precision { handle_error: table.accuracy(), seconds_per_link: team.shortest_link() };
         let monitor = ClearanceMonitor::new(&[team], Pairs::Own, Ground::new(obstacles), precision);
         clearance(name, monitor, table.for_frames(), team.handles());
     }
@@ -118,7 +120,13 @@ fn frame(name: &str, solver: &mut dyn Solver, start: f64, handles: usize) {
 /// Counts for a head that has travelled as many metres as there are seconds.
 fn clearance(name: &str, monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
     let mut on = (table, Chain::new(handles), monitor);
-    let time = |number: u64| START + number as f64 / 60.0;
+    let time = |number: u64| START + number as f64 / RATE;
+    // The second frame is the first for which a window is made.
+    for number in 0..2 {
+        let (solver, chain, monitor) = &mut on;
+        solver.solve(time(number) - 2.0 / RATE, chain).unwrap();
+        monitor.nearest(&*chain, time(number) - 2.0 / RATE, f64::INFINITY, solver);
+    }
     part(
         name,
         &mut on,
@@ -153,7 +161,7 @@ struct Step {
 
 impl Step {
     fn new(scene: &Scene, timeline: &Timeline) -> Self {
-        let playback = Playback { start: START, ..Playback::of(scene) };
+        let playback = Playback { start: START, rate: RATE, ..Playback::of(scene) };
         let mut show = Show::new(scene, timeline.clone(), playback).unwrap();
         let name = format!("test_{}_instructions", std::process::id());
         let config = PublisherConfig {

@@ -121,11 +121,11 @@ pub struct FrameClearance {
     pub obstacle: Option<PairClearance>,
 }
 
-/// Frames of a motion, as far as a monitor needs to know them.
+/// The frames of a motion. No result depends on these numbers, only the cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Precision {
-    /// The greatest error of a link, in metres, beyond the rounding of exact motion.
-    pub link_error: f64,
+    /// The error of a handle, in metres, that is not the same from frame to frame.
+    pub handle_error: f64,
     /// The time in which the fastest head passes its shortest link, in seconds.
     pub seconds_per_link: f64,
 }
@@ -162,14 +162,15 @@ const SHORT: f64 = 0.125;
 /// Bounds that are compared together, so that vector instructions apply.
 const BOUNDS_AT_ONCE: usize = 64;
 
-/// An upper bound of the error of a link of an exact frame, in metres.
-const EXACT_LINK_ERROR: f64 = 1e-9;
+/// The least assumed error of a handle, in links.
+const LEAST_ERROR: f64 = 1e-5;
 
 impl ClearanceMonitor {
     /// Creates a monitor for chains of these teams, one behind the other, on a ground in the coordinates of the chains.
     pub fn new(teams: &[Team], pairs: Pairs, ground: Ground, precision: Precision) -> Self {
-        let link_error = EXACT_LINK_ERROR.max(precision.link_error);
-        let stage = Stage { teams: Teams::new(teams, pairs), ground, link_error };
+        let teams = Teams::new(teams, pairs);
+        let least_error = LEAST_ERROR * teams.longest_link + 4.0 * precision.handle_error;
+        let stage = Stage { teams, ground, least_error };
         Self {
             live: Window::new(&stage),
             next: Window::new(&stage),

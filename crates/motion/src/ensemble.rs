@@ -363,11 +363,11 @@ impl Ensemble {
     pub fn between_monitor(&self, choices: &[Choice]) -> ClearanceMonitor {
         let teams: Vec<Team> = self.dragons.iter().map(|dragon| *dragon.motion.team()).collect();
         let of = self.dragons.iter().zip(choices).map(|(dragon, choice)| dragon.motion.precision(choice));
-        let first = Precision { link_error: self.link_tolerance(), seconds_per_link: f64::INFINITY };
-        let precision = of.fold(first, |all, of| Precision {
-            link_error: all.link_error.max(of.link_error),
+        let precision = of.reduce(|all, of| Precision {
+            handle_error: all.handle_error.max(of.handle_error),
             seconds_per_link: all.seconds_per_link.min(of.seconds_per_link),
         });
+        let precision = precision.expect("a show has a dragon");
         ClearanceMonitor::new(&teams, Pairs::Between, Ground::default(), precision)
     }
 

@@ -322,19 +322,7 @@ impl Motion {
     /// Returns the precision of this motion's frames.
     pub(crate) fn precision(&self, choice: &Choice) -> Precision {
         let seconds_per_link = self.team.shortest_link() / self.head_speed;
-        Precision { link_error: self.link_error().max(2.0 * choice.accuracy), seconds_per_link }
-    }
-
-    /// Returns the greatest error of a link, metres, beyond rounding. The paper's bisection stops at an angle, and
-    /// along an arc of radius r a chord changes by at most r per radian.
-    pub(crate) fn link_error(&self) -> f64 {
-        match (self.method, self.path.as_spiral()) {
-            (Method::Paper(rules), Some((spiral, start))) => {
-                let outermost = spiral.radius_per_radian() * start.high + self.team.length();
-                rules.bisection_tolerance * (outermost + spiral.radius_per_radian())
-            }
-            _ => 0.0,
-        }
+        Precision { handle_error: choice.accuracy, seconds_per_link }
     }
 
     /// Returns the metres that the head has travelled at a time; NaN if the method does not follow the path exactly.

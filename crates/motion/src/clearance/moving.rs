@@ -1,9 +1,9 @@
 //! Boards that move through a span of time, and bounds of the distance of two of them.
 //!
 //! **The bound.** Time t runs from -1 to 1 over the span. Every handle is a quadratic polynomial of t with an error of
-//! at most `error` metres. The middle of a board is such a polynomial, too, and so is its unit axis u, because its link
-//! is rigid. Take any direction w that is fixed to board a, so that w = p u + q n with p^2 + q^2 = 1 and n the unit
-//! normal of a. Between a and b there is the gap
+//! at most `error` metres. The middle of a board is such a polynomial, too, and so is its unit axis u (see below). Take
+//! any direction w that is fixed to board a, so that w = p u + q n with p^2 + q^2 = 1 and n the unit normal of a. Between
+//! a and b there is the gap
 //!
 //! (c_b - c_a) . w - h_a(w) - L_b |u_b . w| - W_b |n_b . w|,
 //!
@@ -17,17 +17,15 @@
 //!
 //! The distance of any two points, one fixed to each board, bounds the distance of the boards from above.
 //!
-//! **Links that are off.** Let the handles of a frame have errors e and f, and their distance be off the link l by at
-//! most d. Divided by l, the polynomial of the link's vector is then off the unit axis of the frame by at most
-//! (e + f + d) / l, and so is its own length off 1. Half the board's length is off by d / 2 (`slack`). A rigid link that
-//! is next to that of the frame has handles at most d / 2 away, and next to that of the polynomials (e + f + d) / 2.
-//! To these two links applies [`Board::displacement_factor`].
+//! **Links.** No length of a link is assumed. Let v be the polynomial of the link's vector, l its length at 0, and e the
+//! sum of the errors of both handles. Between -1 and 1, | |v|^2 - l^2 | is at most the sum of the coefficients of |v|^2
+//! beyond the constant one, by size. Divided by l, this sum bounds | |v| - l |, because |v| + l is at least l. So the
+//! length of a frame's link is off l by at most d, that bound plus e. Its unit axis is off v / l by at most (d + e) / l,
+//! and half its board's length is off by d / 2 (`slack`).
 
-use super::corner_reach;
 use crate::model::board::Board;
 use crate::model::elementary::hypot;
 use crate::model::separation::closest_points_board_board;
-use crate::model::team::Team;
 use crate::model::{Point, Vector};
 
 /// A vector as a quadratic polynomial of t from -1 to 1, by power.
@@ -96,32 +94,30 @@ pub(super) struct MovingBoard {
 }
 
 impl MovingBoard {
-    /// Creates the board of a kind of bench (0 = head) between two handles, whose distance may be off by `link_error`
-    /// metres.
-    pub(super) fn new([front, rear]: &[Quadratic; 2], team: &Team, bench: usize, link_error: f64) -> Self {
-        let link = team.link(bench);
-        let error = front.error + rear.error;
-        let off = front.travel().max(rear.travel()) + 0.5 * error + link_error;
-        // Off the frame's axis, and off the normalised one.
-        let axis = front.combine(rear, |front, rear| (front - rear) / link, 2.0 * (error + link_error) / link);
-        let (half_length, half_width) = (0.5 * link + team.hole_inset, 0.5 * team.width);
-        Self {
-            centre: front.combine(rear, |front, rear| 0.5 * (front + rear), 0.5 * error),
-            axis,
-            half_length,
-            half_width,
-            slack: 0.5 * link_error,
-            travel: corner_reach(team, bench) * off + 0.5 * link_error,
-            turn: hypot(half_length, half_width) * axis.travel() + 0.5 * link_error,
-        }
+    /// Creates the board between two handles, with `hole_inset` metres of board beyond each and `width` metres across.
+    pub(super) fn new([front, rear]: &[Quadratic; 2], hole_inset: f64, width: f64) -> Self {
+        let vector = rear.to(front);
+        let [middle, slope, square] = &vector.terms;
+        let link = middle.norm();
+        let by_power = [2.0 * middle.dot(slope), slope.dot(slope) + 2.0 * middle.dot(square), 2.0 * slope.dot(square)];
+        let others = by_power.iter().map(|of_power| of_power.abs()).sum::<f64>() + square.dot(square);
+        let off = others / link + vector.error;
+        let axis = Quadratic { terms: vector.terms.map(|term| term / link), error: (off + vector.error) / link };
+        let centre = front.combine(rear, |front, rear| 0.5 * (front + rear), 0.5 * vector.error);
+        let (half_length, half_width, slack) = (0.5 * link + hole_inset, 0.5 * width, 0.5 * off);
+        let turn = hypot(half_length, half_width) * axis.travel() + slack;
+        Self { travel: centre.travel() + turn, centre, axis, half_length, half_width, slack, turn }
     }
 
-    /// Returns the board in the middle of the span, for handles without error. Its axis is a unit vector even if the
-    /// handles' distance is not exactly the link. So a direction w of the bound is a unit vector in the board's frame.
+    /// Returns the board in the middle of the span, for handles without error.
     pub(super) fn middle(&self) -> Board {
         let Self { half_length, half_width, .. } = *self;
-        let axis = self.axis.terms[0].normalize();
-        Board { centre: Point::from(self.centre.terms[0]), axis, half_length, half_width }
+        Board { centre: Point::from(self.centre.terms[0]), axis: self.axis.terms[0], half_length, half_width }
+    }
+
+    /// Returns an upper bound of the radius of the circle about the board, in metres.
+    pub(super) fn radius(&self) -> f64 {
+        hypot(self.half_length, self.half_width) + self.slack
     }
 
     /// Returns the least gap to `other` along the direction (`along`, `across`) of this board's frame.
@@ -157,20 +153,24 @@ impl MovingBoard {
         middle.norm_squared() <= most * most
     }
 
-    /// Returns a lower and an upper bound of the signed distance to `other` throughout the span. `at` and `other_at`
-    /// are the two boards in the middle of the span. The lower bound is the least gap along the direction in which the
-    /// boards are nearest there. The upper bound is the greatest distance of the points that are closest there.
-    pub(super) fn distance_bounds(&self, at: &Board, other: &Self, other_at: &Board) -> (f64, f64) {
+    /// Returns a lower bound of the signed distance to `other` throughout the span: the least gap along the direction in
+    /// which the boards are nearest in the middle. `at` and `other_at` are the two boards there.
+    pub(super) fn least_distance(&self, at: &Board, other: &Self, other_at: &Board) -> f64 {
         let (on_own, on_other) = closest_points_board_board(at, other_at);
         let direction = direction(at, other_at, on_other - on_own);
         let [own, others] = [at, other_at].map(|board| (direction.dot(&board.axis), direction.dot(&board.across())));
         // The bound is tightest if an edge's normal is fixed to the board of that edge.
-        let least = if own.0.abs().min(own.1.abs()) <= others.0.abs().min(others.1.abs()) {
+        if own.0.abs().min(own.1.abs()) <= others.0.abs().min(others.1.abs()) {
             self.least_gap(other, own.0, own.1)
         } else {
             other.least_gap(self, -others.0, -others.1)
-        };
-        (least, self.fixed(at, on_own).to(&other.fixed(other_at, on_other)).greatest_norm())
+        }
+    }
+
+    /// Returns an upper bound of the same: the greatest distance of the points that are closest in the middle.
+    pub(super) fn greatest_distance(&self, at: &Board, other: &Self, other_at: &Board) -> f64 {
+        let (on_own, on_other) = closest_points_board_board(at, other_at);
+        self.fixed(at, on_own).to(&other.fixed(other_at, on_other)).greatest_norm()
     }
 
     /// Returns the point fixed to the board that is at `point` when the board is at `at`.

@@ -59,10 +59,9 @@ impl Teams {
         }
     }
 
-    /// Returns the team of a bench, and its number within the team.
-    pub(super) fn bench(&self, number: usize) -> (&Team, usize) {
-        let (team, first) = &self.parts[self.part(number)];
-        (team, number - first)
+    /// Returns the team of a bench.
+    pub(super) fn team(&self, bench: usize) -> &Team {
+        &self.parts[self.part(bench)].0
     }
 
     /// Returns the numbers of all benches.
@@ -90,7 +89,7 @@ impl Teams {
     }
 
     pub(super) fn board(&self, chain: Positions, number: usize) -> Board {
-        let (team, _) = &self.parts[self.part(number)];
+        let team = self.team(number);
         let handle = |k: usize| Point::new(chain.x[k], chain.y[k]);
         Board::from_handles(handle(number), handle(number + 1), team.hole_inset, team.width)
     }

@@ -25,9 +25,6 @@ pub(super) const ALL: u32 = u32::MAX;
 const MOST_LISTED: usize = 32;
 const MOST_BY_HANDLE: usize = 4;
 
-/// The least assumed error of a handle, in links.
-const LEAST_ERROR: f64 = 1e-5;
-
 /// The distance by which a caller's limit may grow within a window, in links.
 const GROWTH: f64 = 0.25;
 
@@ -39,8 +36,8 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 pub(super) struct Stage {
     pub teams: Teams,
     pub ground: Ground,
-    /// The length, in metres, by which a link of a frame may be off.
-    pub link_error: f64,
+    /// The least assumed error of a handle, in metres.
+    pub least_error: f64,
 }
 
 /// Scratch memory for the window that was opened last, whose lists are being made.
@@ -50,13 +47,16 @@ pub(super) struct Workspace {
     grid: Grid,
     /// By bench: its board throughout the window, and in the middle; `None` for a last handle.
     boards: Vec<Option<(MovingBoard, Board)>>,
-    /// The greatest travel of a board's points from their places in the middle, in metres.
+    /// The greatest travel of a board's points from their places in the middle, and the greatest radius of a board, in
+    /// metres.
     most_travel: f64,
+    most_radius: f64,
 }
 
 impl Workspace {
     pub(super) fn new(handles: usize) -> Self {
-        Self { chain: Chain::new(handles), grid: Grid::new(handles), boards: vec![None; handles], most_travel: 0.0 }
+        let (chain, grid, boards) = (Chain::new(handles), Grid::new(handles), vec![None; handles]);
+        Self { chain, grid, boards, most_travel: 0.0, most_radius: 0.0 }
     }
 }
 
@@ -197,8 +197,7 @@ impl Window {
                 self.errors[handle] = self.errors[handle].max((dx * dx + dy * dy).sqrt());
             }
         }
-        let least = LEAST_ERROR * stage.teams.longest_link + 4.0 * stage.link_error;
-        self.errors.iter_mut().for_each(|error| *error = 2.0 * *error + least);
+        self.errors.iter_mut().for_each(|error| *error = 2.0 * *error + stage.least_error);
         self.move_boards(stage, work);
         // Next to a singular place the bounds are too weak to help.
         let helps = work.most_travel <= stage.teams.longest_link;
@@ -215,11 +214,12 @@ impl Window {
             let term = |power: usize| Vector::new(x[power][handle], y[power][handle]);
             Quadratic { terms: [term(0), term(1), term(2)], error: self.errors[handle] }
         };
-        work.most_travel = 0.0;
+        (work.most_travel, work.most_radius) = (0.0, 0.0);
         for bench in stage.teams.benches() {
-            let (team, number) = stage.teams.bench(bench);
-            let board = MovingBoard::new(&[handle(bench), handle(bench + 1)], team, number, stage.link_error);
+            let team = stage.teams.team(bench);
+            let board = MovingBoard::new(&[handle(bench), handle(bench + 1)], team.hole_inset, team.width);
             work.most_travel = work.most_travel.max(board.travel);
+            work.most_radius = work.most_radius.max(board.radius());
             work.boards[bench] = Some((board, board.middle()));
         }
     }
@@ -242,11 +242,11 @@ impl Window {
         self.limit = limit + GROWTH * stage.teams.longest_link;
         for (a, b) in likely.into_iter().chain(stage.teams.some_pair()) {
             if let [Some((a, a_at)), Some((b, b_at))] = [&work.boards[a], &work.boards[b]] {
-                let (_, most) = a.distance_bounds(a_at, b, b_at);
+                let most = a.greatest_distance(a_at, b, b_at);
                 self.limit = self.limit.min(most + margin(stage, a_at, most));
             }
         }
-        let side = 2.0 * (stage.teams.radius + work.most_travel) + self.limit.max(0.0);
+        let side = 2.0 * (work.most_radius + work.most_travel) + self.limit.max(0.0);
         work.grid.clear(if side.is_finite() { 1.01 * side } else { 1.0 });
         for (bench, board) in work.boards.iter().enumerate() {
             board.iter().for_each(|(_, at)| work.grid.add(bench, at.centre.x, at.centre.y));
@@ -269,7 +269,7 @@ impl Window {
 
     /// Lists the partners of a bench that can be the nearest.
     fn list_partners(&mut self, a: usize, (board, at): (&MovingBoard, &Board), stage: &Stage, work: &Workspace) {
-        let radii = at.circle_radius() + stage.teams.radius + stage.link_error;
+        let radii = board.radius() + work.most_radius;
         let reach = radii + self.limit.max(0.0) + board.travel + work.most_travel;
         // Each bench behind, and this one, has room for one entry.
         let handles = stage.teams.handles;
@@ -282,15 +282,17 @@ impl Window {
                 if !board.may_be_within(radii + self.limit.max(0.0) + margin, other) {
                     return;
                 }
-                let rough = separation_board_board(at, other_at) - board.relative_travel(other);
+                let separation = separation_board_board(at, other_at);
+                let rough = separation - board.relative_travel(other);
                 if rough - margin > self.limit {
                     return;
                 }
-                let (least, greatest) = board.distance_bounds(at, other, other_at);
-                let bound = rough.max(least) - margin;
-                self.limit = self.limit.min(greatest + margin);
+                let bound = rough.max(board.least_distance(at, other, other_at)) - margin;
                 if bound > self.limit {
                     return;
+                }
+                if separation < self.limit {
+                    self.limit = self.limit.min(board.greatest_distance(at, other, other_at) + margin);
                 }
                 if self.pairs.len() < most {
                     self.pairs.push((a as u32, b as u32));
@@ -310,7 +312,7 @@ impl Window {
 
     /// Lists a bench if an obstacle can be nearer than any two boards, and than other obstacles.
     fn list_obstacles(&mut self, bench: usize, (board, at): (&MovingBoard, &Board), stage: &Stage) {
-        let travel = board.travel + stage.link_error;
+        let travel = board.travel;
         let margin = margin(stage, at, 0.0);
         let mut bound = f64::INFINITY;
         for obstacle in stage.ground.obstacles() {
