@@ -4,10 +4,14 @@
 //!
 //! Then the step of the paper's team again, beside the same step with one and with two empty command queues.
 //!
+//! Then whole steps by rate and size of the team, with and without alerts, with two subscribers: the clearance costs more
+//! in some steps than in others.
+//!
 //! And the step of the paper's team at 10 kHz, without and with a log (`run --log`), and the log's work after the step.
 //!
 //! `cargo bench --bench step`, or with some numbers of benches: `cargo bench --bench step -- 223 100000`, or the
-//! command queues alone: `cargo bench --bench step -- queues`, or the log: `cargo bench --bench step -- log`
+//! command queues alone: `cargo bench --bench step -- queues`, or the rates: `cargo bench --bench step -- rates`, or the
+//! log: `cargo bench --bench step -- log`
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -49,6 +53,9 @@ fn main() {
     if std::env::args().any(|argument| argument == "queues") {
         return measure_queues();
     }
+    if std::env::args().any(|argument| argument == "rates") {
+        return measure_rates();
+    }
     if std::env::args().any(|argument| argument == "log") {
         return measure_log();
     }
@@ -61,6 +68,7 @@ fn main() {
         measure(benches);
     }
     measure_queues();
+    measure_rates();
     measure_log();
 }
 
@@ -92,7 +100,7 @@ fn measure(benches: usize) {
     let mut choice = scene.ensemble.only().unwrap().solver(scene.velocities);
     let mut monitor = scene.ensemble.only().unwrap().clearance_monitor(&choice);
     let name = format!("bench_{}_{benches}", std::process::id());
-    let (mut publisher, mut connection) = publisher_and_subscriber(&name, &scene, &show);
+    let (mut publisher, mut connection) = publisher_and_subscriber(&name, &scene, &show, 1);
     let mut frame = show.frame(0).clone();
 
     // Copies as many bytes into samples of a service of the same kind.
@@ -143,8 +151,8 @@ fn measure(benches: usize) {
         for tick in ticks.clone() {
             let time = START + tick as f64 / 60.0;
             choice.solver.solve(time, &mut frame.chain).expect("200 s is before the lock");
-            let travelled = scene.ensemble.only().unwrap().travelled_at(time);
-            timed(&mut times.clearance, || monitor.least_clearance(&frame.chain, travelled));
+            let solver = choice.solver.as_mut();
+            timed(&mut times.clearance, || monitor.nearest(&frame.chain, time, f64::INFINITY, solver));
         }
         for copy in &mut copies {
             timed(&mut times.memcpy, || copy.payload_mut().copy_from_slice(black_box(&poses)));
@@ -153,22 +161,83 @@ fn measure(benches: usize) {
     row(benches, handles, times);
 }
 
-fn publisher_and_subscriber(name: &str, scene: &Scene, show: &Show) -> (SharedMemoryPublisher, Connection) {
+/// Returns a publisher that admits so many subscribers, and one of them.
+fn publisher_and_subscriber(
+    name: &str,
+    scene: &Scene,
+    show: &Show,
+    subscribers: usize,
+) -> (SharedMemoryPublisher, Connection) {
     let config = PublisherConfig {
         name: name.to_owned(),
         handles: scene.ensemble.handles(),
         single_precision: None,
         queue: QUEUE,
-        subscribers: 1,
+        subscribers,
         alerts: true,
         cues: 0,
         scene: String::new(),
         stage: stage(1, 0, [0; 32], &scene.ensemble, show),
     };
     let publisher = SharedMemoryPublisher::open(&config).expect("the name holds this process's number");
+    (publisher, subscriber(name))
+}
+
+fn subscriber(name: &str) -> Connection {
     let subscription = Subscription::new(name, Wake::Never).expect("the publisher has taken this name");
-    let connection = subscription.connect().expect("the publisher is there").expect("the publisher is there");
-    (publisher, connection)
+    subscription.connect().expect("the publisher is there").expect("the publisher is there")
+}
+
+/// Measures whole steps with two subscribers, without alerts and with them, in turn.
+fn measure_rates() {
+    println!(
+        "\n| benches | Hz | step without alerts: median | mean | with alerts: median | mean | 99 % | most |\n\
+         |---|---|---|---|---|---|---|---|"
+    );
+    for (benches, rate) in
+        [(223, 60.0), (223, 1_000.0), (5_000, 60.0), (5_000, 1_000.0), (100_000, 1.0), (100_000, 60.0)]
+    {
+        let scene = scene(benches);
+        let timeline = scene.motion.timeline(&mut |_| ());
+        let playback = Playback { start: START, rate, ..Playback::of(&scene) };
+        let show_of =
+            |scene: &Scene| Show::new(scene, timeline.clone(), playback).expect("200 s is before the contact");
+        let mut shows = [show_of(&Scene { alerts: None, ..scene.clone() }), show_of(&scene)];
+        let name = format!("bench_{}_rates", std::process::id());
+        let (mut publisher, mut first) = publisher_and_subscriber(&name, &scene, &shows[0], 2);
+        let mut second = subscriber(&name);
+        let mut times: [Vec<f64>; 2] = Default::default();
+        let most = ((200.0 * rate) as usize).min(40_000) / BATCH;
+        let began = Instant::now();
+        for round in 0..most {
+            for (times, show) in times.iter_mut().zip(&mut shows) {
+                for tick in (round * BATCH) as u64..((round + 1) * BATCH) as u64 {
+                    timed(times, || {
+                        let frame = show.frame(tick);
+                        let header = frame_header(frame, stamps(tick));
+                        publisher.publish(Outgoing::new(&header, frame)).expect("no other process uses this service");
+                    });
+                    drain(&mut first);
+                    drain(&mut second);
+                }
+            }
+            if round >= WARM_UP && began.elapsed() > TIME {
+                break;
+            }
+        }
+        let [without, with] = times.map(|mut times| {
+            times.drain(..WARM_UP * BATCH);
+            times.sort_by(f64::total_cmp);
+            let mean = times.iter().sum::<f64>() / times.len() as f64;
+            [times[times.len() / 2], mean, times[times.len() * 99 / 100], times[times.len() - 1]]
+        });
+        let [median, mean, ..] = without;
+        let [of_clearance, mean_of_clearance, high, most] = with;
+        println!(
+            "| {benches} | {rate} | {median:.2} us | {mean:.2} us | {of_clearance:.2} us | {mean_of_clearance:.2} us | \
+             {high:.2} us | {most:.2} us |"
+        );
+    }
 }
 
 /// Measures steps with no command queue, one and two, in turn: the same show, so that its work costs all of them the
@@ -179,7 +248,7 @@ fn measure_queues() {
     let timeline = scene.ensemble.timeline(&mut |_| ());
     let show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, mut connection) =
-        publisher_and_subscriber(&format!("bench_{}_queues", std::process::id()), &scene, &show);
+        publisher_and_subscriber(&format!("bench_{}_queues", std::process::id()), &scene, &show, 1);
     let mut show = ShowSource::new(show);
     // The outer ends stay: a queue without a sender behaves differently.
     let (mut queues, outer): (Vec<CommandQueues>, Vec<Vec<CommandSender>>) = (0..3)
@@ -235,7 +304,7 @@ fn measure_log() {
     let timeline = scene.ensemble.timeline(&mut |_| ());
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, mut connection) =
-        publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show);
+        publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show, 1);
     let file = std::env::temp_dir().join(format!("bench_dragon_step_{}.jsonl", std::process::id()));
     let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), show.solver_reason(), (1, 0));
     let (mut log, outcome) = log::open(&file, line, scene.ensemble.handles()).expect("a file in the temporary folder");

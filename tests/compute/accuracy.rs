@@ -240,7 +240,7 @@ fn the_live_clearance_is_that_of_the_frame() {
                 for frame in 0..8 {
                     let time = (0.083 * end * f64::from(run) + f64::from(frame) / 60.0).min(0.9999 * end);
                     choice.solver.solve(time, &mut chain).unwrap();
-                    let live = monitor.least_clearance(&chain, motion.travelled_at(time));
+                    let live = monitor.nearest(&chain, time, f64::INFINITY, choice.solver.as_mut()).boards;
                     assert_eq!(
                         live,
                         least_clearance_all_pairs(&chain, motion.team()),

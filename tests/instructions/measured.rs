@@ -8,7 +8,7 @@ use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
-use bench_dragon::motion::clearance::{ClearanceMonitor, ObstacleMonitor};
+use bench_dragon::motion::clearance::{ClearanceMonitor, Pairs, Precision};
 use bench_dragon::motion::ground::{Ground, Obstacle};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::model::shape::Shape;
@@ -34,6 +34,8 @@ pub const PART: &str = "counted: ";
 const CALLS: u64 = 60;
 /// Time of the first call, simulated seconds; the calls continue at 60 Hz.
 const START: f64 = 200.0;
+/// Rate of the steps and of the clearance, in Hz: at a lower rate a frame has a larger share in preparing windows.
+const RATE: f64 = 1_000.0;
 /// The same time on the route, which is shorter.
 const ON_ROUTE: f64 = 100.0;
 /// Steps of the certificate.
@@ -90,12 +92,16 @@ pub fn run() {
         Shape::boundary(square.to_vec()),
     ];
     let obstacles = shapes.map(|shape| Obstacle { name: String::new(), shape, keep_out: 0.2 });
-    let obstacles = ObstacleMonitor::new(team, Ground::new(obstacles.into()), Some(&table));
-    obstacle_clearance("clearance of four obstacles", obstacles, table.for_frames(), team.handles());
     let star = Obstacle { name: String::new(), shape: Shape::polygon(star()), keep_out: 0.2 };
-    let overlap = ObstacleMonitor::new(team, Ground::new(vec![star]), Some(&table));
-    obstacle_clearance("clearance of a star of 16 corners in overlap", overlap, table.for_frames(), team.handles());
-    clearance(ClearanceMonitor::new(path, team, &table), table, team.handles());
+    for (name, obstacles) in [
+        ("clearance", Vec::new()),
+        ("clearance, with four obstacles", obstacles.into()),
+        ("clearance, with a star of 16 corners in overlap", vec![star]),
+    ] {
+        let precision = Precision { handle_error: table.accuracy(), seconds_per_link: team.shortest_link() };
+        let monitor = ClearanceMonitor::new(&[team], Pairs::Own, Ground::new(obstacles), precision);
+        clearance(name, monitor, table.for_frames(), team.handles());
+    }
     // A search for the contact would take long.
     let timeline = paper.ensemble.timeline_without_contact();
     step(&paper, &timeline);
@@ -113,15 +119,21 @@ fn frame(name: &str, solver: &mut dyn Solver, start: f64, handles: usize) {
 }
 
 /// Counts for a head that has travelled as many metres as there are seconds.
-fn clearance(monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
+fn clearance(name: &str, monitor: ClearanceMonitor, table: FollowerTable, handles: usize) {
     let mut on = (table, Chain::new(handles), monitor);
-    let time = |number: u64| START + number as f64 / 60.0;
+    let time = |number: u64| START + number as f64 / RATE;
+    // The second frame is the first for which a window is made.
+    for number in 0..2 {
+        let (solver, chain, monitor) = &mut on;
+        solver.solve(time(number) - 2.0 / RATE, chain).unwrap();
+        monitor.nearest(&*chain, time(number) - 2.0 / RATE, f64::INFINITY, solver);
+    }
     part(
-        "clearance",
+        name,
         &mut on,
         |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
-        |(_, chain, monitor), number| {
-            black_box(monitor.least_clearance(&*black_box(chain), time(number)));
+        |(solver, chain, monitor), number| {
+            black_box(monitor.nearest(&*black_box(chain), time(number), f64::INFINITY, solver));
         },
     );
 }
@@ -133,21 +145,6 @@ fn star() -> Vec<Point> {
         Point::new(3.6 + radius * angle.cos(), -5.4 + radius * angle.sin())
     };
     (0..16).map(corner).collect()
-}
-
-/// Counts the obstacles' share of a frame's clearance. The head is where [`clearance`] has it; the nearest two boards
-/// are a quarter of a metre apart.
-fn obstacle_clearance(name: &str, monitor: ObstacleMonitor, table: FollowerTable, handles: usize) {
-    let mut on = (table, Chain::new(handles), monitor);
-    let time = |number: u64| START + number as f64 / 60.0;
-    part(
-        name,
-        &mut on,
-        |(solver, chain, _), number| solver.solve(time(number), chain).unwrap(),
-        |(_, chain, monitor), number| {
-            black_box(monitor.nearest(&*black_box(chain), time(number), 0.25));
-        },
-    );
 }
 
 /// State of the loop, and a subscriber that receives its messages.
@@ -165,7 +162,7 @@ struct Step {
 
 impl Step {
     fn new(scene: &Scene, timeline: &Timeline) -> Self {
-        let playback = Playback { start: START, ..Playback::of(scene) };
+        let playback = Playback { start: START, rate: RATE, ..Playback::of(scene) };
         let mut show = Show::new(scene, timeline.clone(), playback).unwrap();
         let name = format!("test_{}_instructions", std::process::id());
         let config = PublisherConfig {

@@ -1,33 +1,26 @@
-//! The nearest two boards of a chain: by all pairs as the reference, and by the live method that tests few of them.
+//! The nearest two boards of a frame, and the nearest board and obstacle: by all pairs as the reference, and by the live
+//! method that tests few of them.
 //!
-//! In: a [`Chain`] and its [`Team`]. Out: the nearest pair. Pairs that share a handle never count. Both methods
-//! evaluate a pair with the same function on the same numbers, so they agree to the last bit.
+//! In: a [`Chain`], its [`Team`]s and the obstacles. Out: the nearest pair. Pairs that share a handle never count. Both
+//! methods evaluate a pair with the same function on the same numbers, so they agree to the last bit.
 
-mod between;
-mod between_table;
-mod bounds;
-mod cells;
 mod grid;
-mod lists;
 mod moving;
-mod obstacles;
-mod search;
+mod teams;
 #[cfg(test)]
 mod tests;
+mod window;
 
+use crate::ground::Ground;
 use crate::model::Point;
 use crate::model::board::Board;
 use crate::model::elementary::hypot;
-use crate::model::path::Path;
-use crate::model::separation::{closest_points_board_board, signed_distance_board_board};
+use crate::model::separation::{closest_points_board_board, separation_board_board, signed_distance_board_board};
 use crate::model::team::Team;
-use crate::solve::table::FollowerTable;
-use crate::solve::{Chain, Positions};
-pub use between::{BetweenMonitor, Moment, nearest_between_all_pairs};
-pub use between_table::TabledDragon;
-use bounds::BoundTable;
-pub use obstacles::ObstacleMonitor;
-use search::{CarriedBounds, ClearanceSearch};
+use crate::solve::{Chain, Positions, Solver};
+pub use teams::Pairs;
+use teams::Teams;
+use window::{Stage, Window, Workspace};
 
 /// The nearest two boards that share no handle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +59,21 @@ pub fn least_clearance_all_pairs(chain: &Chain, team: &Team) -> Option<PairClear
     nearest.finish()
 }
 
+/// Returns the nearest two boards of different dragons by testing all pairs. The dragons stand one behind the other in
+/// the chain.
+pub fn nearest_between_all_pairs(chain: &Chain, teams: &[Team]) -> Option<PairClearance> {
+    let teams = Teams::new(teams, Pairs::Between);
+    let mut nearest = Nearest::NONE;
+    for a in teams.benches() {
+        let board_a = teams.board(chain.into(), a);
+        for b in teams.partners(a) {
+            let board_b = teams.board(chain.into(), b);
+            nearest.consider(signed_distance_board_board(&board_a, &board_b), (a, b), &board_a, &board_b);
+        }
+    }
+    nearest.finish()
+}
+
 /// The nearest pair so far.
 #[derive(Debug, Clone, Copy)]
 struct Nearest {
@@ -98,70 +106,81 @@ pub struct ClearanceCounters {
     pub frames: u64,
     /// Pairs of boards tested for their distance.
     pub pairs: u64,
-    /// Chains that needed a search among all their boards because the table did not apply.
+    /// Windows that were opened and listed within one frame, since no window had been prepared for it.
     pub searches: u64,
 }
 
-/// The live method: the same result as [`least_clearance_all_pairs`], from a few pairs.
+/// The clearance of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameClearance {
+    /// The nearest two boards, of equal ones the lowest (a, b); `None` without a pair that is nearer than the caller's
+    /// limit.
+    pub boards: Option<PairClearance>,
+    /// A board and an obstacle that are nearer than any two boards, and than the caller's limit. `bench_b` is the number
+    /// of handles plus the obstacle's place on the ground, `point_b` a point of the obstacle.
+    pub obstacle: Option<PairClearance>,
+}
+
+/// The frames of a motion. No result depends on these numbers, only the cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Precision {
+    /// The error of a handle, in metres, that is not the same from frame to frame.
+    pub handle_error: f64,
+    /// The time in which the fastest head passes its shortest link, in seconds.
+    pub seconds_per_link: f64,
+}
+
+/// Finds the nearest boards of each frame: the same result as by testing all pairs, from few tests.
 ///
-/// The present clearance of the previous nearest pair is the first limit. With a table, only pairs whose bound is
-/// within the limit are tested, which are most often none. The bounds hold for every frame, so jumps of the show do no
-/// harm. Without a table, every bench carries a bound from frame to frame, lowered by the displacement of the handles.
+/// The time is divided into windows, and each window has a list of the pairs that can be the nearest at any moment of it
+/// (see [`window`]). A frame tests the pairs of its list that are not excluded by their bounds, most often one or two.
+/// The next window is prepared ahead, some benches a frame. After a jump of the time a window is made within one frame.
 /// All memory is reserved by the constructor.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct ClearanceMonitor {
-    team: Team,
-    latest: Option<PairClearance>,
+    stage: Stage,
+    live: Window,
+    next: Window,
+    work: Workspace,
+    /// The length of a window, in seconds.
+    length: f64,
+    /// The time of the previous frame, in seconds.
+    previous: f64,
     last_pair: Option<(usize, usize)>,
-    table: Option<Box<BoundTable>>,
-    carried: CarriedBounds,
-    /// The length, in metres, by which a link of a frame may be off.
-    link_error: f64,
     counters: ClearanceCounters,
 }
 
-/// An upper bound of the error of a link of an exact frame, in metres.
-const EXACT_LINK_ERROR: f64 = 1e-9;
+/// The length of a window, in the time in which the fastest head passes its shortest link.
+const WINDOW: f64 = 0.25;
+
+/// The share of a window in which the next one is prepared.
+const PREPARED_WITHIN: f64 = 0.75;
+
+/// The part of a window's length that is tried next to a singular place.
+const SHORT: f64 = 0.125;
+
+/// Bounds that are compared together, so that vector instructions apply.
+const BOUNDS_AT_ONCE: usize = 64;
+
+/// The least assumed error of a handle, in links.
+const LEAST_ERROR: f64 = 1e-5;
 
 impl ClearanceMonitor {
-    /// Creates a monitor for chains of `team` that follow `path` as exactly as `table` promises.
-    ///
-    /// The monitor makes a table of bounds from `table`, of at most 128 MB and in at most about five seconds. If these
-    /// limits do not suffice, the monitor works without a table of bounds.
-    pub fn new(path: &Path, team: Team, table: &FollowerTable) -> Self {
-        let table_of_bounds = BoundTable::new(path, &team, table).map(Box::new);
-        Self { table: table_of_bounds, ..Self::without_table(team, 2.0 * table.accuracy()) }
-    }
-
-    /// Creates a monitor for chains of `team` with any handles. The error of every link must be at most `link_error`
-    /// metres or the rounding of exact motion.
-    pub fn without_table(team: Team, link_error: f64) -> Self {
+    /// Creates a monitor for chains of these teams, one behind the other, on a ground in the coordinates of the chains.
+    pub fn new(teams: &[Team], pairs: Pairs, ground: Ground, precision: Precision) -> Self {
+        let teams = Teams::new(teams, pairs);
+        let least_error = LEAST_ERROR * teams.longest_link + 4.0 * precision.handle_error;
+        let stage = Stage { teams, ground, least_error };
         Self {
-            team,
-            latest: None,
+            live: Window::new(&stage),
+            next: Window::new(&stage),
+            work: Workspace::new(stage.teams.handles),
+            stage,
+            length: WINDOW * precision.seconds_per_link,
+            previous: f64::INFINITY,
             last_pair: None,
-            table: None,
-            carried: CarriedBounds::new(team.benches),
-            link_error: EXACT_LINK_ERROR.max(link_error),
             counters: ClearanceCounters::default(),
         }
-    }
-
-    /// Describes how the nearest pair is found, for people.
-    pub fn description(&self) -> String {
-        match &self.table {
-            Some(table) => format!(
-                "by a table of bounds, {} kB, made in {:.0} ms",
-                table.memory_bytes().div_ceil(1000),
-                1e3 * table.made_in().as_secs_f64()
-            ),
-            None => "by a search among all boards in every frame, since there is no table of bounds".to_owned(),
-        }
-    }
-
-    /// Returns the clearance of the latest frame.
-    pub fn latest(&self) -> Option<PairClearance> {
-        self.latest
     }
 
     /// Returns the work done so far.
@@ -169,34 +188,148 @@ impl ClearanceMonitor {
         self.counters
     }
 
-    /// Returns the nearest two boards of `chain`, of equal ones the lowest (a, b). The head has travelled `travelled`
-    /// metres of the path; NaN if it does not follow the path. `None` for fewer than three benches.
-    pub fn least_clearance<'a>(&mut self, chain: impl Into<Positions<'a>>, travelled: f64) -> Option<PairClearance> {
-        self.least(chain.into(), travelled)
+    /// Returns the nearest boards of a chain, and the nearest board and obstacle, if they are nearer than `limit`
+    /// metres. `solver` has made the chain, for `time`.
+    pub fn nearest<'a>(
+        &mut self,
+        chain: impl Into<Positions<'a>>,
+        time: f64,
+        limit: f64,
+        solver: &mut dyn Solver,
+    ) -> FrameClearance {
+        self.nearest_of(chain.into(), time, limit, solver)
     }
 
     // A function of one type is compiled here, where the functions that it calls are inlined.
-    fn least(&mut self, chain: Positions, travelled: f64) -> Option<PairClearance> {
+    fn nearest_of(&mut self, chain: Positions, time: f64, limit: f64, solver: &mut dyn Solver) -> FrameClearance {
         self.counters.frames += 1;
-        self.latest = None;
-        if self.team.benches < 3 {
-            return None;
+        if self.live.holds(chain, time) {
+            self.prepare_next(time, limit, solver);
+        } else {
+            self.enter(chain, time, limit, solver);
         }
-        let mut search = ClearanceSearch::new(chain, &self.team, self.link_error, self.last_pair);
-        let located = self.table.as_ref().and_then(|table| Some((table, table.locate(travelled, self.team.benches)?)));
-        let unsettled = match located {
-            Some((table, located)) => search.by_table(table, located),
-            None => Some(0),
-        };
-        if let Some(from) = unsettled {
-            search.by_carried_bounds(&mut self.carried, from);
-            self.counters.searches += 1;
+        self.previous = time;
+        let mut nearest = self.nearest_boards(chain, limit);
+        if nearest.value > self.live.limit {
+            // The caller's limit has grown.
+            self.enter_at(chain, time, limit);
+            nearest = self.nearest_boards(chain, limit);
         }
-        self.counters.pairs += search.tested;
-        self.latest = search.nearest.finish();
-        self.last_pair = self.latest.map(|latest| (latest.bench_a, latest.bench_b));
-        self.latest
+        let boards = nearest.finish();
+        self.last_pair = boards.map(|found| (found.bench_a, found.bench_b)).or(self.last_pair);
+        FrameClearance { boards, obstacle: self.nearest_obstacle(chain, nearest.value) }
     }
+
+    /// Makes a window for a frame.
+    fn enter(&mut self, chain: Positions, time: f64, limit: f64, solver: &mut dyn Solver) {
+        if self.next.holds(chain, time) {
+            self.next.list_up_to(self.stage.teams.handles, &self.stage, &self.work);
+            std::mem::swap(&mut self.live, &mut self.next);
+            self.next.close();
+            return;
+        }
+        // A window of a single frame is cheaper if the next frame will not be in it.
+        let serves_others = (time - self.previous).abs() <= 0.5 * self.length;
+        for length in [1.0, SHORT].map(|part| part * self.length).into_iter().filter(|_| serves_others) {
+            let is_open = self.live.open((time, time + length), &self.stage, solver, &mut self.work);
+            if is_open && self.live.holds(chain, time) {
+                return self.list_all(limit);
+            }
+        }
+        self.enter_at(chain, time, limit);
+    }
+
+    /// Makes a window for a single frame.
+    fn enter_at(&mut self, chain: Positions, time: f64, limit: f64) {
+        self.live.open_at(chain, time, &self.stage, &mut self.work);
+        self.list_all(limit);
+    }
+
+    fn list_all(&mut self, limit: f64) {
+        self.counters.searches += 1;
+        self.live.begin_lists(&self.stage, &mut self.work, limit, self.last_pair);
+        self.live.list_up_to(self.stage.teams.handles, &self.stage, &self.work);
+        self.next.close();
+    }
+
+    /// Prepares the next window as far as it should be at a time of the present one.
+    fn prepare_next(&mut self, time: f64, limit: f64, solver: &mut dyn Solver) {
+        let (begin, end) = (self.live.begin(), self.live.end());
+        let share = (time - begin) / (PREPARED_WITHIN * (end - begin));
+        // Also false for a window without length.
+        if share > 0.0 {
+            if self.next.begin() != end {
+                if !self.next.open((end, end + self.length), &self.stage, solver, &mut self.work) {
+                    return self.next.close_at(end);
+                }
+                self.next.begin_lists(&self.stage, &mut self.work, limit, self.last_pair);
+            }
+            let number = share * self.stage.teams.handles as f64;
+            self.next.list_up_to(number as usize, &self.stage, &self.work);
+        }
+    }
+
+    /// Returns the nearest two boards of the list that are nearer than a limit.
+    fn nearest_boards(&mut self, chain: Positions, limit: f64) -> Nearest {
+        let Self { stage, live, counters, last_pair, .. } = self;
+        let mut nearest = Nearest { value: limit, ..Nearest::NONE };
+        let mut test = |nearest: &mut Nearest, (a, b): (usize, usize)| {
+            counters.pairs += 1;
+            let [board_a, board_b] = [a, b].map(|bench| stage.teams.board(chain, bench));
+            if separation_board_board(&board_a, &board_b) <= nearest.value {
+                nearest.consider(signed_distance_board_board(&board_a, &board_b), (a, b), &board_a, &board_b);
+            }
+        };
+        if let Some(pair) = *last_pair {
+            test(&mut nearest, pair);
+        }
+        for (bounds, pairs) in live.pair_bounds.chunks(BOUNDS_AT_ONCE).zip(live.pairs.chunks(BOUNDS_AT_ONCE)) {
+            if !any_within(bounds, (nearest.value as f32).next_up()) {
+                continue;
+            }
+            for (bound, (a, b)) in bounds.iter().zip(pairs) {
+                let (a, b) = (*a as usize, *b);
+                if f64::from(*bound) > nearest.value {
+                    continue;
+                }
+                if b == window::ALL {
+                    stage.teams.partners(a).for_each(|b| test(&mut nearest, (a, b)));
+                } else if Some((a, b as usize)) != *last_pair {
+                    test(&mut nearest, (a, b as usize));
+                }
+            }
+        }
+        nearest
+    }
+
+    /// Returns the board and the obstacle of the list that are nearer than a limit.
+    fn nearest_obstacle(&self, chain: Positions, limit: f64) -> Option<PairClearance> {
+        let Self { stage, live, .. } = self;
+        let (mut value, mut found) = (limit, None);
+        for (bound, bench) in live.bench_bounds.iter().zip(&live.benches) {
+            if f64::from(*bound) >= value {
+                continue;
+            }
+            let bench = *bench as usize;
+            let board = stage.teams.board(chain, bench);
+            for (number, obstacle) in stage.ground.obstacles().iter().enumerate() {
+                if obstacle.coarse_clearance(&board) < value {
+                    let clearance = obstacle.clearance_below(&board, value);
+                    if clearance < value {
+                        (value, found) = (clearance, Some((bench, number, board)));
+                    }
+                }
+            }
+        }
+        let (bench_a, number, board) = found?;
+        let (point_a, point_b) = stage.ground.obstacles()[number].shape.nearest_points(&board);
+        Some(PairClearance { value, bench_a, bench_b: stage.teams.handles + number, point_a, point_b })
+    }
+}
+
+/// Returns true if any of these bounds is within a limit.
+fn any_within(bounds: &[f32], limit: f32) -> bool {
+    bounds.iter().fold(0, |near, bound| near | u32::from(*bound <= limit)) != 0
 }
 
 fn circle_radius(team: &Team, bench: usize) -> f64 {

@@ -11,7 +11,7 @@ use std::ops::Range;
 use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
-use crate::clearance::{BetweenMonitor, TabledDragon};
+use crate::clearance::{ClearanceMonitor, Pairs, Precision};
 use crate::contact::between::{self, Meeting, MovingDragon};
 use crate::event::{Budget, Event};
 use crate::ground::{Ground, Obstacle};
@@ -309,20 +309,17 @@ impl Ensemble {
 
     /// Makes the monitor of the live clearance of different dragons; `None` if there is one dragon. `choices` has the
     /// solver of each dragon's frames, in its path's own coordinates.
-    pub fn between_monitor(&self, choices: &[Choice]) -> Option<BetweenMonitor> {
+    pub fn between_monitor(&self, choices: &[Choice]) -> Option<ClearanceMonitor> {
         if self.dragons.len() < 2 {
             return None;
         }
         let teams: Vec<Team> = self.dragons.iter().map(|dragon| *dragon.motion.team()).collect();
-        let monitor = BetweenMonitor::new(&teams, self.link_tolerance().max(1e-9));
-        let mut dragons = Vec::new();
-        for (Dragon { motion, .. }, choice) in self.dragons.iter().zip(choices) {
-            let Some(table) = &choice.table else { return Some(monitor) };
-            let (team, path, placement) = (*motion.team(), motion.path(), *motion.placement());
-            dragons.push(TabledDragon { team, path, placement, table, head_speed: motion.head_speed() });
-        }
-        let end = self.timeline_without_contact().end().time;
-        Some(monitor.with_table(&dragons, end, &|dragon, time| self.dragons[dragon].travelled_at(time)))
+        let of = self.dragons.iter().zip(choices).map(|(dragon, choice)| dragon.motion.precision(choice));
+        let precision = of.reduce(|all, of| Precision {
+            handle_error: all.handle_error.max(of.handle_error),
+            seconds_per_link: all.seconds_per_link.min(of.seconds_per_link),
+        })?;
+        Some(ClearanceMonitor::new(&teams, Pairs::Between, Ground::default(), precision))
     }
 
     /// Makes a solver of all dragons, for the show's time. Its chains are placed on the stage.

@@ -30,7 +30,7 @@ use crate::solve::selection::{self, Selection};
 use crate::solve::table::{FollowerTable, Instructions};
 use crate::solve::{Solver, Velocities};
 
-use clearance::{ClearanceMonitor, ObstacleMonitor};
+use clearance::{ClearanceMonitor, Pairs, Precision};
 use contact::{ConservativeAdvancement, Found, LeastClearance, ObstacleClearance, Touch};
 use event::{Budget, Event};
 use ground::Ground;
@@ -56,8 +56,8 @@ pub struct Choice {
     pub solver: Box<dyn Solver>,
     /// Its name, its settings and the reason, for people.
     pub reason: String,
-    /// The table of the solver, if it has one.
-    table: Option<FollowerTable>,
+    /// The accuracy of the solver's table, in metres; 0 without a table.
+    accuracy: f64,
 }
 
 impl Choice {
@@ -66,7 +66,7 @@ impl Choice {
     pub fn clearance_error(&self, team: &Team) -> f64 {
         let factor = |link| Board::displacement_factor(link, team.hole_inset, team.width);
         let factor = factor(team.link(0)).max(factor(team.link(1)));
-        2.0 * factor * self.table.as_ref().map_or(0.0, FollowerTable::accuracy)
+        2.0 * factor * self.accuracy
     }
 }
 
@@ -129,9 +129,6 @@ const SINGULARITIES_BUDGET: u64 = 50_000_000;
 
 /// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
 const CONTACT_BUDGET: u64 = 100_000_000;
-
-/// The accuracy, metres, of the table that the clearance makes if an exact one is too large.
-const CLEARANCE_ACCURACY: f64 = 1e-4;
 
 const NO_TABLE: &str = "there is no table for this team and path";
 
@@ -284,7 +281,7 @@ impl Motion {
     fn solver_in_own_frame(&self, velocities: Velocities) -> Choice {
         let newton = |reason: String| {
             let newton = Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
-            Choice { solver: Box::new(newton), reason, table: None }
+            Choice { solver: Box::new(newton), reason, accuracy: 0.0 }
         };
         match (self.method, self.path.as_spiral()) {
             (Method::Accuracy(accuracy), _) => {
@@ -307,7 +304,7 @@ impl Motion {
             (Method::Paper(rules), Some((spiral, start))) => {
                 let paper = Paper::new(*spiral, start.high, self.team, self.head_speed, velocities, rules);
                 let reason = "paper: named by the scene; its head is too fast by sqrt(1 + 1/theta^2)".to_owned();
-                Choice { solver: Box::new(paper), reason, table: None }
+                Choice { solver: Box::new(paper), reason, accuracy: 0.0 }
             }
             (Method::Newton | Method::Paper(_), _) => newton("newton: named by the scene".to_owned()),
         }
@@ -320,55 +317,20 @@ impl Motion {
             String::new()
         };
         let reason = format!("follower_table ({}, {}){valid}: {why}", table.instructions().name(), table.format());
-        Choice { solver: Box::new(table.for_frames()), reason, table: Some(table) }
+        Choice { solver: Box::new(table.for_frames()), reason, accuracy: table.accuracy() }
     }
 
-    /// Makes the monitor of the live clearance of this motion's frames. `choice` is the solver of the same frames,
-    /// whose table it shares.
+    /// Makes the monitor of the live clearance of this motion's frames, with its obstacles, in the path's own
+    /// coordinates. `choice` is the solver of the same frames.
     pub fn clearance_monitor(&self, choice: &Choice) -> ClearanceMonitor {
-        let made_here = match (&choice.table, self.method) {
-            (Some(_), _) | (None, Method::Paper(_)) => None,
-            (None, _) => self.table_for_clearance(),
-        };
-        match choice.table.as_ref().or(made_here.as_ref()) {
-            Some(table) => ClearanceMonitor::new(&self.path, self.team, table),
-            None => ClearanceMonitor::without_table(self.team, self.link_error()),
-        }
-    }
-
-    /// Makes the monitor of the clearance of the obstacles in this motion's frames, in the path's own coordinates;
-    /// `None` without obstacles. `choice` is as in [`Motion::clearance_monitor`].
-    pub fn obstacle_monitor(&self, choice: &Choice) -> Option<ObstacleMonitor> {
         let ground = self.ground.in_own_frame(&self.placement);
-        (!ground.is_empty()).then(|| ObstacleMonitor::new(self.team, ground, choice.table.as_ref()))
+        ClearanceMonitor::new(&[self.team], Pairs::Own, ground, self.precision(choice))
     }
 
-    /// Returns the greatest error of a link, metres, beyond rounding. The paper's bisection stops at an angle, and
-    /// along an arc of radius r a chord changes by at most r per radian.
-    pub(crate) fn link_error(&self) -> f64 {
-        match (self.method, self.path.as_spiral()) {
-            (Method::Paper(rules), Some((spiral, start))) => {
-                let outermost = spiral.radius_per_radian() * start.high + self.team.length();
-                rules.bisection_tolerance * (outermost + spiral.radius_per_radian())
-            }
-            _ => 0.0,
-        }
-    }
-
-    /// Makes a table for the clearance of frames from another solver. The table is the most exact one, or a coarse one
-    /// if that would be too large.
-    fn table_for_clearance(&self) -> Option<FollowerTable> {
-        let exact = || FollowerTable::new(&self.path, self.team, self.head_speed, Velocities::Omitted);
-        let coarse = || {
-            let (path, team, speed) = (&self.path, self.team, self.head_speed);
-            selection::cheapest(path, team, speed, Velocities::Omitted, CLEARANCE_ACCURACY).filter(Selection::meets)
-        };
-        let coarse = || coarse().map(|selection| selection.table);
-        match self.method {
-            // For these methods an exact table has already failed.
-            Method::Accuracy(_) | Method::FollowerTable => coarse(),
-            Method::Newton | Method::Paper(_) => exact().or_else(coarse),
-        }
+    /// Returns the precision of this motion's frames.
+    pub(crate) fn precision(&self, choice: &Choice) -> Precision {
+        let seconds_per_link = self.team.shortest_link() / self.head_speed;
+        Precision { handle_error: choice.accuracy, seconds_per_link }
     }
 
     /// Returns the metres that the head has travelled at a time; NaN if the method does not follow the path exactly.

@@ -198,6 +198,12 @@ impl Solver for Placed {
         self.placement.chain(chain);
         Ok(())
     }
+
+    fn solve_ahead(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        self.solver.solve_ahead(time, chain)?;
+        self.placement.chain(chain);
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -167,4 +167,13 @@ pub trait Solver: Send {
     /// # Errors
     /// As [`solve`](Self::solve).
     fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower>;
+
+    /// Fills the positions with those of a time that is not the next one, by a prediction if that is cheaper. Frames that
+    /// are solved afterwards have the same bits and the same cost.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    fn solve_ahead(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        self.solve_in(time, chain)
+    }
 }

@@ -3,7 +3,7 @@
 //! In: a motion and its own time. Out: the chain and its clearance.
 
 use crate::scene::Scene;
-use bench_dragon_motion::clearance::{ClearanceMonitor, ObstacleMonitor, PairClearance};
+use bench_dragon_motion::clearance::{ClearanceMonitor, FrameClearance, PairClearance};
 use bench_dragon_motion::linkage::NoFollower;
 use bench_dragon_motion::placement::Placement;
 use bench_dragon_motion::solve::{Chain, ChainMut, Positions, Solver, Velocities};
@@ -14,10 +14,7 @@ pub(crate) struct Dancer {
     /// Solves in the path's own coordinates, where the clearance has more digits.
     solver: Box<dyn Solver>,
     velocities: Velocities,
-    /// The travel of the head per second, in metres; NaN if the method does not follow the path exactly.
-    metres_per_second: f64,
     clearance: Option<ClearanceMonitor>,
-    obstacles: Option<ObstacleMonitor>,
     placement: Placement,
     /// The own time of the latest solution, and true if the dragon moved then.
     pub solved: Option<(f64, bool)>,
@@ -47,9 +44,7 @@ impl Dancer {
         let own = motion.in_own_frame();
         Self {
             velocities: scene.velocities,
-            metres_per_second: motion.travelled_at(1.0),
             clearance: scene.alerts.map(|_| own.clearance_monitor(&choice)),
-            obstacles: scene.alerts.and_then(|_| own.obstacle_monitor(&choice)),
             placement: *motion.placement(),
             solved: None,
             clearance_error: choice.clearance_error(own.team()),
@@ -91,17 +86,21 @@ impl Dancer {
 
     fn measure(&mut self, solved_at: f64, chain: Positions) -> Closest {
         let Some(clearance) = &mut self.clearance else { return Closest { boards: None, any: None } };
-        let travelled = self.metres_per_second * solved_at;
         let placed = |PairClearance { value, bench_a, bench_b, point_a, point_b }| {
             let [point_a, point_b] = [point_a, point_b].map(|point| self.placement.point(point));
             PairClearance { value, bench_a, bench_b, point_a, point_b }
         };
-        let own = clearance.least_clearance(chain, travelled);
-        let boards = own.map(placed);
-        let limit = own.map_or(f64::INFINITY, |own| own.value);
-        let obstacles = self.obstacles.as_mut();
-        let nearer = obstacles.and_then(|monitor| monitor.nearest(chain, travelled, limit));
-        Closest { boards, any: nearer.map(placed).or(boards) }
+        let FrameClearance { boards, obstacle } =
+            clearance.nearest(chain, solved_at, f64::INFINITY, self.solver.as_mut());
+        let boards = boards.map(placed);
+        Closest { boards, any: obstacle.map(placed).or(boards) }
+    }
+
+    /// Fills `chain` with the positions on the stage at a later time, its own time. Later solutions stay the same.
+    pub(crate) fn solve_ahead(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        self.solver.solve_ahead(time, chain)?;
+        self.placement.chain(chain);
+        Ok(())
     }
 }
 
@@ -153,7 +152,7 @@ mod tests {
         let scene = Scene::paper();
         let motion = scene.ensemble.only().unwrap();
         let whole = Dancer::new(&scene, motion, Dancer::choice(&scene, motion));
-        let mut dancer = Dancer { solver: Box::new(EndsAtTen), clearance: None, obstacles: None, ..whole };
+        let mut dancer = Dancer { solver: Box::new(EndsAtTen), clearance: None, ..whole };
         let mut chain = Chain::new(scene.ensemble.handles());
         assert!(dancer.solve(3.0, true, &mut chain.all_mut()).is_ok());
         for time in [20.0, 21.0] {

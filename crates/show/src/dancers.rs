@@ -8,10 +8,10 @@ use std::ops::Range;
 use crate::dancer::{Closest, Dancer};
 use crate::scene::Scene;
 use bench_dragon_motion::Choice;
-use bench_dragon_motion::clearance::{BetweenMonitor, Moment, PairClearance};
+use bench_dragon_motion::clearance::{ClearanceMonitor, PairClearance};
 use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::linkage::NoFollower;
-use bench_dragon_motion::solve::{Chain, ChainMut};
+use bench_dragon_motion::solve::{Chain, ChainMut, Solver};
 
 /// A dragon in play, at its place in the show.
 struct Member {
@@ -25,9 +25,7 @@ struct Member {
 /// All dragons of a show in play.
 pub(crate) struct Dancers {
     members: Vec<Member>,
-    between: Option<BetweenMonitor>,
-    /// By dragon: the metres that its head has travelled in the latest frame.
-    travelled: Vec<f64>,
+    between: Option<ClearanceMonitor>,
 }
 
 impl Dancers {
@@ -43,7 +41,7 @@ impl Dancers {
             dragon: dragon.clone(),
         };
         let members: Vec<Member> = ensemble.dragons().iter().enumerate().zip(choices).map(member).collect();
-        Self { travelled: vec![0.0; members.len()], members, between }
+        Self { members, between }
     }
 
     /// Returns the names of the solvers and the reasons for their choice.
@@ -67,7 +65,7 @@ impl Dancers {
 
     /// Returns the pairs of boards tested so far.
     pub(crate) fn pairs_tested(&self) -> u64 {
-        let between = self.between.as_ref().map_or(0, BetweenMonitor::pairs_tested);
+        let between = self.between.as_ref().map_or(0, |monitor| monitor.counters().pairs);
         self.members.iter().map(|member| member.dancer.pairs_tested()).sum::<u64>() + between
     }
 
@@ -78,15 +76,12 @@ impl Dancers {
         for member in &mut self.members {
             member.solve(show_time, moves, all_handles, &mut all)?;
         }
-        let Self { members, between, travelled } = self;
-        let own = nearest(members.iter().filter_map(|member| member.closest.boards.as_ref()));
-        let between = between.as_mut().and_then(|monitor| {
-            travelled.clear();
-            travelled.extend(members.iter().map(|member| member.dragon.travelled_at(show_time)));
-            let moment = Moment { time: show_time, travelled };
-            monitor.nearest(chain, own.map_or(f64::INFINITY, |own| own.value), moment)
-        });
-        let boards = nearest(own.into_iter().chain(&between));
+        let Self { members, between } = self;
+        let own = nearest(members.iter().filter_map(|member| member.closest.boards.as_ref())).copied();
+        let limit = own.map_or(f64::INFINITY, |own| own.value);
+        let between =
+            between.as_mut().and_then(|monitor| monitor.nearest(&*chain, show_time, limit, &mut AllOf(members)).boards);
+        let boards = nearest(own.iter().chain(&between));
         let any = members.iter().filter_map(|member| member.closest.any.as_ref());
         let any = nearest(boards.into_iter().chain(any));
         Ok(Closest { boards: boards.copied(), any: any.copied() })
@@ -96,6 +91,21 @@ impl Dancers {
 /// Returns the nearest of some pairs, the first of equals.
 fn nearest<'a>(pairs: impl Iterator<Item = &'a PairClearance>) -> Option<&'a PairClearance> {
     pairs.reduce(|nearest, pair| if pair.value < nearest.value { pair } else { nearest })
+}
+
+/// The positions of all dragons on the stage at a later time of the show.
+struct AllOf<'a>(&'a mut [Member]);
+
+impl Solver for AllOf<'_> {
+    fn name(&self) -> &'static str {
+        "all dragons"
+    }
+
+    fn solve_in(&mut self, show_time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        self.0.iter_mut().try_for_each(|Member { dragon, dancer, handles, .. }| {
+            dancer.solve_ahead(dragon.own_time(show_time).0, &mut chain.range_mut(handles.clone()))
+        })
+    }
 }
 
 impl Member {

@@ -70,9 +70,10 @@ fn first_overlapping_sample(subject: &Subject, contact: f64, end: f64, interval:
 fn live_clearance_ns(subject: &Subject, end: f64) -> f64 {
     const RUNS: usize = 20;
     const RUN: usize = 40;
-    let mut choice = subject.motion.solver(subject.velocities);
-    let mut chain = Chain::new(subject.motion.team().handles());
-    let mut monitor = subject.motion.clearance_monitor(&choice);
+    let motion = subject.motion.in_own_frame();
+    let mut choice = motion.solver(subject.velocities);
+    let mut chain = Chain::new(motion.team().handles());
+    let mut monitor = motion.clearance_monitor(&choice);
     let mut times = Vec::with_capacity(RUNS * RUN);
     for run in 0..RUNS {
         for frame in 0..RUN {
@@ -81,7 +82,7 @@ fn live_clearance_ns(subject: &Subject, end: f64) -> f64 {
                 break;
             }
             let began = Instant::now();
-            let _ = std::hint::black_box(monitor.least_clearance(&chain, subject.motion.travelled_at(time)));
+            let _ = std::hint::black_box(monitor.nearest(&chain, time, f64::INFINITY, choice.solver.as_mut()));
             // The first frame of a run follows a jump.
             if frame > 0 {
                 times.push(began.elapsed().as_nanos() as u64);

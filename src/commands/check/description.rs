@@ -25,7 +25,7 @@ pub(super) fn describe(scene: &Scene, warnings: &[String], output: &mut Output) 
     let choices: Vec<Choice> =
         scene.ensemble.dragons().iter().map(|dragon| dragon.motion.solver(scene.velocities)).collect();
     solvers(scene, &choices, output)?;
-    alerts(scene, &choices, output)?;
+    alerts(scene, output)?;
     publishing(scene, output)
 }
 
@@ -57,17 +57,13 @@ fn solvers(scene: &Scene, choices: &[Choice], output: &mut Output) -> Result<(),
 }
 
 /// Prints the rules of alerts, and what the show does at a contact and at its end.
-fn alerts(scene: &Scene, choices: &[Choice], output: &mut Output) -> Result<(), CommandError> {
+fn alerts(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
     match scene.alerts {
         Some(rules) => {
             output.line(&format!(
                 "  Alerts: the clearance of every frame, contact and stall; a warning {} s or {} m ahead.",
                 rules.approach_time, rules.approach_clearance
             ))?;
-            if let (Some(motion), [choice]) = (scene.ensemble.only(), choices) {
-                let monitor = motion.clearance_monitor(choice);
-                output.line(&format!("  Nearest boards of a frame: found {}.", monitor.description()))?;
-            }
         }
         None => output.line(
             "  Alerts: none. `run` computes no rectangle, no clearance, no contact and no stall, and has no alerts \

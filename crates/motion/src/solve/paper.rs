@@ -95,6 +95,13 @@ impl EulerHead {
         self.steps = steps;
         self.theta
     }
+
+    /// Returns nearly the same angle without the steps: each lessens the angle's square by 2 v dt / a, and next to
+    /// nothing more.
+    fn predicted(&self, time: f64) -> f64 {
+        let steps = (time / self.time_step).round() + 1.0 - self.steps as f64;
+        (self.theta * self.theta - 2.0 * self.advance * steps).max(0.0).sqrt()
+    }
 }
 
 /// Returns the seconds after which the paper's head comes from the polar angle `start` to `theta`, as dt goes to 0.
@@ -173,5 +180,9 @@ impl Solver for Paper {
             chain.speed[handle] = if turning < 0.0 { -hypot(vx, vy) } else { hypot(vx, vy) };
         }
         Ok(())
+    }
+
+    fn solve_ahead(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
+        place_chain(&self.spiral, &self.team, self.rules.bisection_tolerance, self.head.predicted(time), chain)
     }
 }

@@ -26,8 +26,8 @@ use head::{HeadBuilder, HeadTable};
 use kernel::{FrameInput, within_half_turn};
 use packed::PackedRows;
 pub(crate) use packed::{Allowed, Format};
+use rows::Rows;
 pub(crate) use rows::Tolerance;
-use rows::{Alpha, Rows};
 use track::Track;
 
 use super::newton::Newton;
@@ -217,15 +217,10 @@ impl FollowerTable {
         self.bytes_per_handle() / self.exact_bytes_per_handle
     }
 
-    /// Returns the same solver without the data that its frames do not read. No clearance can be computed from it.
+    /// Returns the same solver without the data that its frames do not read.
     pub fn for_frames(&self) -> Self {
         let rows = if self.packed.is_some() { Arc::new(Rows::empty()) } else { self.rows.clone() };
         Self { rows, ..self.clone() }
-    }
-
-    /// Returns the same solver without any rows, for [`FollowerTable::second_handle`] alone.
-    pub(crate) fn without_rows(&self) -> Self {
-        Self { rows: Arc::new(Rows::empty()), packed: None, ..self.clone() }
     }
 
     /// Returns the instructions that it uses.
@@ -249,18 +244,6 @@ impl FollowerTable {
     /// Returns the number of frames beyond the table.
     pub fn fallbacks(&self) -> u64 {
         self.fallbacks
-    }
-
-    /// Returns the places of the handles behind the head, for the clearance.
-    pub(crate) fn rows(&self) -> &Rows {
-        &self.rows
-    }
-
-    /// Returns the place of the second handle when the head has travelled `travelled` metres, and its derivative by
-    /// these metres; `None` beyond the table.
-    pub(crate) fn second_handle(&self, travelled: f64) -> Option<(Alpha, f64)> {
-        let sample = (0.0..=self.head.valid_until()).contains(&travelled).then(|| self.head.at(travelled))?;
-        Some((sample.alpha, sample.alpha_per_metre))
     }
 
     /// Fills the chain for `travelled` metres of the head, within the table.
