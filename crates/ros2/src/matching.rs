@@ -132,8 +132,7 @@ impl Matches {
     /// (`Writer::update_reader_proxy`, `rtps/writer.rs:1971`), but the reader may not know the writer yet. The next
     /// heartbeat may name an answer that RustDDS has not sent: it counts a message from the call that writes it, and
     /// answers an ACKNACK before it sends (`Writer::handle_ack_nack`, `rtps/writer.rs:1137`). The client would then
-    /// wait without end. So this heartbeat, just before an answer is written, names the earlier answers. Held by
-    /// `a_hundred_new_clients_of_each_kind`.
+    /// wait without end. So this heartbeat, just before an answer is written, names the earlier answers.
     pub(super) fn announce(&self, writer: GUID, reader: GUID, written: u32) {
         self.with(|ends| {
             let addresses = ends.addresses.get(&reader).into_iter().flatten().copied();
