@@ -161,7 +161,7 @@ fn measure(benches: usize) {
     row(benches, handles, times);
 }
 
-/// Returns a publisher that admits so many subscribers, and one of them.
+/// Returns a publisher that admits `subscribers` of them, and one subscriber.
 fn publisher_and_subscriber(
     name: &str,
     scene: &Scene,
@@ -198,7 +198,7 @@ fn measure_rates() {
         [(223, 60.0), (223, 1_000.0), (5_000, 60.0), (5_000, 1_000.0), (100_000, 1.0), (100_000, 60.0)]
     {
         let scene = scene(benches);
-        let timeline = scene.motion.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut |_| ());
         let playback = Playback { start: START, rate, ..Playback::of(&scene) };
         let show_of =
             |scene: &Scene| Show::new(scene, timeline.clone(), playback).expect("200 s is before the contact");

@@ -6,7 +6,7 @@ use harness::{Place, Process, answering, http_get, json_lines, summary, text, wa
 use nix::sys::signal::Signal::{SIGINT, SIGTERM};
 
 const SENTENCE: &str =
-    "of the show's files were removed by another program: nobody else can connect until it is restarted";
+    "of the show's files were removed by another program: no other process can connect until it is restarted";
 
 #[test]
 fn a_show_goes_on_without_its_files_says_so_and_keeps_its_name() {
@@ -46,7 +46,7 @@ fn a_show_goes_on_without_its_files_says_so_and_keeps_its_name() {
     assert!(second["lost_files"].as_u64() > Some(10) && second["missed"] == 0, "{second}");
     assert!(monitored.until("removed by another program").contains(SENTENCE));
     wait_until("Prometheus reads it", || lost(&http_get(&url, "*/*")) > Some(10.0));
-    // The connected go on.
+    // Connected processes continue.
     let received = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["received"].as_u64().unwrap();
     let before = received(&seconds.until("\"second\""));
     assert!(received(&seconds.until("\"second\"")) > before);

@@ -1,4 +1,4 @@
-//! What a soak test tells people and test servers: its progress, what ended first, the limits beside the values, and
+//! The words of a soak test for people and test servers: its progress, what ended first, the limits beside the values, and
 //! JUnit XML. It runs beside a show of the usual name.
 
 use crate::harness;

@@ -23,7 +23,7 @@ PREFIX = "/dragon"
 def proxy(url):
     """A proxy that has a server below PREFIX and nothing beside it. Returns its address, and the paths that it has not."""
     host, port = re.fullmatch(r"http://([^:]+):(\d+)/", url).groups()
-    astray = []
+    misplaced = []
 
     class Handler(socketserver.BaseRequestHandler):
         def handle(self):
@@ -35,7 +35,7 @@ def proxy(url):
                 head += more
             method, path, rest = head.split(b" ", 2)
             if not path.startswith(f"{PREFIX}/".encode()):
-                astray.append(path.decode())
+                misplaced.append(path.decode())
                 self.request.sendall(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
                 return
             # One request a connection, unless it becomes a WebSocket.
@@ -58,7 +58,7 @@ def proxy(url):
 
     with Server(("127.0.0.1", 0), Handler) as outer:
         threading.Thread(target=outer.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{outer.server_address[1]}", astray
+        yield f"http://127.0.0.1:{outer.server_address[1]}", misplaced
         outer.shutdown()
 
 
@@ -68,10 +68,10 @@ def below_a_path():
         with open(f"{folder}/index.html", "w", encoding="utf-8") as file:
             file.write("own")
         url = json.loads(child.stdout.readline())["url"]
-        with publisher(*STILL), browser() as (page, complaints), proxy(url) as (outside, astray):
+        with publisher(*STILL), browser() as (page, complaints), proxy(url) as (outside, misplaced):
             page.goto(f"{outside}{PREFIX}/")
             until(page, "picture.received > 3 && picture.drawn > 0", "a picture through the proxy")
-            assert not complaints and not astray, (complaints, astray)
+            assert not complaints and not misplaced, (complaints, misplaced)
             with urllib.request.urlopen(f"{outside}{PREFIX}/pages") as own:
                 assert (own.url, own.read()) == (f"{outside}{PREFIX}/pages/", b"own"), own.url
 

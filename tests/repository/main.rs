@@ -1,5 +1,6 @@
 //! The repository itself: pages, generated files, manifests, dependencies, words.
 
+mod circles;
 mod command_table;
 mod features;
 #[path = "../harness/mod.rs"]

@@ -391,7 +391,7 @@ mod tests {
         }
     }
 
-    /// Its distance from the source is nobody's error, and the pause nobody's command to the chase.
+    /// Its distance from the source is no error, and the pause no command to the chase.
     #[test]
     fn a_show_that_was_paused_before_the_chase_begins_without_an_error() {
         let mut steering = Steering::new(Limits { take_up: 0.1, seek_above: 0.5, seeks_back: true });

@@ -22,7 +22,7 @@ const CONTROL: &str = "/control";
 /// # Examples
 ///
 /// ```
-/// assert!(!bench_dragon_client::shows::running().contains(&"a show that nobody has started".to_owned()));
+/// assert!(!bench_dragon_client::shows::running().contains(&"a show that was never started".to_owned()));
 /// ```
 pub fn running() -> Vec<String> {
     // Its creation also removes what killed processes have left.

@@ -34,7 +34,7 @@ pub fn cue_sentence(cue: &Cue) -> String {
 /// Returns the warning that another program has removed files of a running show.
 pub fn lost_files_sentence(files: u64) -> String {
     format!(
-        "{files} of the show's files were removed by another program: nobody else can connect until it is restarted"
+        "{files} of the show's files were removed by another program: no other process can connect until it is restarted"
     )
 }
 

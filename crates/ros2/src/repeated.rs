@@ -6,9 +6,9 @@
 //! messages first. Held by the tests of transient-local topics in the table of [`readers`](super::readers).
 //!
 //! The first requests of a new Fast DDS client are requested again. RustDDS drops a request that comes before its
-//! discovery thread has matched the client's writer (`Reader::process_received_data`, `rtps/reader.rs:744`), and then
-//! sends an ACKNACK without requests, which Fast DDS answers after its heartbeat period of 3 s
-//! (`Reader::send_preemptive_acknack_to`, `rtps/reader.rs:1426`). Without this half of all first calls take 3 s, and a
+//! discovery thread has matched the client's writer (`Reader::process_received_data`, `rtps/reader.rs:744`). It then
+//! sends an ACKNACK without requests (`Reader::send_preemptive_acknack_to`, `rtps/reader.rs:1426`), which Fast DDS
+//! answers after its heartbeat period of 3 s. Without this half of all first calls take 3 s, and a
 //! `hold` must not. A writer retransmits the messages that it has and that are not acknowledged; RustDDS
 //! drops a message that comes twice. NACK_FRAG and the ACKNACKs of RustDDS have separate counters. Held by
 //! `a_hundred_new_clients_each_get_the_answer_to_their_first_call`.

@@ -10,6 +10,7 @@ mod mend;
 pub mod path;
 mod piece;
 pub mod precision;
+mod reading;
 mod require;
 pub mod ros2;
 mod source;

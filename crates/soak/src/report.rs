@@ -174,7 +174,7 @@ impl Report {
     /// Returns the error of a test that failed: the processes that ended early, and the broken limits with their values.
     pub fn failure(&self) -> String {
         let broken = self.checks.iter().filter(|check| !check.passed);
-        // What is not known follows from a process that ended.
+        // A process that ended explains a value that is unknown.
         let broken = broken.filter(|check| self.causes.is_empty() || !(check.value.is_nan() || check.name == ENDED));
         let found: Vec<_> = self.causes.iter().cloned().chain(broken.map(LimitCheck::sentence)).collect();
         found.join("; ")

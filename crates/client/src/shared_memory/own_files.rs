@@ -1,9 +1,9 @@
 //! The files of this process in shared memory and in iceoryx2's folder, which are kept from programs that clean up. In:
 //! the open files of this process. Out: new times of these files, and the number of those that are gone.
 //!
-//! Programs such as systemd-tmpfiles remove files by their age, which is that of the latest change, reading or writing;
-//! logind removes the shared memory of a user who has logged out. iceoryx2 keeps all files of a node open, so that
-//! Linux lists them, and marks a removed one.
+//! Programs such as systemd-tmpfiles remove files by their age, which is that of the latest change, reading or writing.
+//! The service logind removes the shared memory of a user who has logged out. All files of a node stay open in iceoryx2.
+//! Linux lists open files, and marks those that were removed.
 
 use std::collections::BTreeSet;
 use std::fs;

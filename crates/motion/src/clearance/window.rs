@@ -137,13 +137,13 @@ impl Window {
         let count = self.errors.len();
         let [x0, x1, x2, y0, y1, y2] = [x0, x1, x2, y0, y1, y2].map(|numbers| &numbers[..count]);
         let (x, y) = (&chain.x[..count], &chain.y[..count]);
-        let mut astray = 0u64;
+        let mut holds = 1u64;
         for k in 0..count {
             let (dx, dy) = (x[k] - (x0[k] + t * (x1[k] + t * x2[k])), y[k] - (y0[k] + t * (y1[k] + t * y2[k])));
-            // Also true for NaN.
-            astray |= u64::from(!(dx * dx + dy * dy <= self.errors[k] * self.errors[k]));
+            // Zero for NaN too.
+            holds &= u64::from(dx * dx + dy * dy <= self.errors[k] * self.errors[k]);
         }
-        astray == 0
+        holds == 1
     }
 
     /// Opens the window for the frame of one moment.
@@ -324,7 +324,8 @@ impl Window {
             self.obstacle_limit = self.obstacle_limit.min(most + margin);
         }
         // Also true for NaN.
-        if !(bound > self.limit.min(self.obstacle_limit)) {
+        let is_far = bound > self.limit.min(self.obstacle_limit);
+        if !is_far {
             self.benches.push(bench as u32);
             self.bench_bounds.push((bound as f32).next_down());
         }

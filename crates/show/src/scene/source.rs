@@ -5,21 +5,20 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Accepted, Scene, SceneError, mend};
+use super::{Accepted, SceneError};
 use bench_dragon_motion::model::Vector;
 
 /// The text being read, for line numbers.
 #[derive(Clone)]
 pub(super) struct Source<'a> {
-    text: &'a str,
-    file: &'a str,
+    pub(super) text: &'a str,
+    pub(super) file: &'a str,
     /// The dragon whose tables are checked, if it has a name.
     dragon: Option<&'a str>,
-    /// The sentences of [`Scene::doubts`].
-    doubts: Rc<RefCell<Vec<String>>>,
+    /// The sentences of [`Scene::doubts`](super::Scene::doubts).
+    pub(super) doubts: Rc<RefCell<Vec<String>>>,
 }
 
 impl<'a> Source<'a> {
@@ -32,51 +31,15 @@ impl<'a> Source<'a> {
         Self { dragon: Some(name), ..self.clone() }
     }
 
-    /// Reads and checks a scene. An error that follows doubts may come from the first of them.
-    pub fn scene<T: for<'de> Deserialize<'de>>(
-        &self,
-        validated: impl FnOnce(T) -> Result<Scene, SceneError>,
-    ) -> Result<Scene, SceneError> {
-        let result = validated(self.read()?);
-        let doubts = self.doubts.take();
-        match (result, doubts.first()) {
-            (Ok(scene), _) => Ok(Scene { doubts, ..scene }),
-            (Err(SceneError(sentence)), Some(doubt)) => Err(SceneError(format!("{sentence} ({doubt})"))),
-            (Err(error), None) => Err(error),
-        }
-    }
-
     /// Notes that a number is accepted, and hardly meant.
     pub fn doubt<T>(&self, value: &Spanned<T>, sentence: &str) {
         let SceneError(sentence) = self.field_error(value, sentence);
         self.doubts.borrow_mut().push(sentence);
     }
 
-    fn read<T: for<'de> Deserialize<'de>>(&self) -> Result<T, SceneError> {
-        let deserializer = toml::Deserializer::parse(self.text).map_err(|error| self.toml_error(&error, ""))?;
-        serde_path_to_error::deserialize(deserializer)
-            .map_err(|error| self.toml_error(error.inner(), &error.path().to_string()))
-    }
-
-    fn line(&self, offset: usize) -> usize {
+    /// Returns the number of the line with a byte, from 1.
+    pub fn line(&self, offset: usize) -> usize {
         self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
-    }
-
-    /// Converts an error of the TOML reader into one sentence.
-    fn toml_error(&self, error: &toml::de::Error, field: &str) -> SceneError {
-        let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
-        // `Spanned` values are wrapped in a field that no user wrote.
-        let field = field.replace(".$__serde_spanned_private_value", "");
-        let line = error.span().map(|span| self.line(span.start));
-        let line = line.and_then(|line| self.text.lines().nth(line - 1)).unwrap_or_default();
-        if let Some(sentence) = mend::sentence(error.message(), &field, line) {
-            return SceneError(format!("{}{place}: {sentence}", self.file));
-        }
-        let field = if field.is_empty() || field == "." { String::new() } else { format!("{field}: ") };
-        let message = error.message().trim().replace('\n', ", ");
-        let message =
-            message.replace("expected i64", "expected an integer").replace("expected f64", "expected a number");
-        SceneError(format!("{}{place}: {field}{message}", self.file))
     }
 
     pub fn field_error<T>(&self, value: &Spanned<T>, sentence: &str) -> SceneError {
