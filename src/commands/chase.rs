@@ -48,6 +48,9 @@ enum Kind {
         /// The address to listen at; other programs of this machine may listen too
         #[arg(long, value_name = "ADDR:PORT", default_value_t = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, artnet::PORT))]
         listen: SocketAddrV4,
+        /// The StreamId to follow; without it 0, or the first stream that comes if there is no stream 0
+        #[arg(long, value_name = "N")]
+        stream: Option<u8>,
         #[command(flatten)]
         timecode: TimecodeArguments,
     },
@@ -82,7 +85,7 @@ struct TimecodeArguments {
     /// The time for which the show continues when timecode stops, before it is paused
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = wall_seconds)]
     freewheel: f64,
-    /// The frame rate: auto, 24, 25, 29.97, 29.97df or 30
+    /// The frame rate: auto, 23.976, 24, 25, 29.97, 29.97df or 30
     #[arg(long, value_name = "RATE", default_value = "auto", value_parser = fps)]
     fps: Fps,
 }
@@ -136,18 +139,18 @@ fn fps(text: &str) -> Result<Fps, String> {
 pub fn chase(common: &Common, arguments: &ChaseArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
     match &arguments.kind {
-        Kind::Artnet { listen, timecode } => {
+        Kind::Artnet { listen, stream, timecode } => {
             let inputs = sources::artnet(*listen, &stop)?;
-            let leader = timecode.leader(ChaseSource::ArtNet)?;
+            let leader = Leader::Timecode(timecode.leader(ChaseSource::ArtNet)?.of_stream(*stream));
             follow(common, &stop, ChaseSource::ArtNet, leader, inputs, &format!("ArtTimeCode at {listen}"))
         }
         Kind::Mtc { device, timecode } => {
-            let leader = timecode.leader(ChaseSource::Mtc)?;
+            let leader = Leader::Timecode(timecode.leader(ChaseSource::Mtc)?);
             let inputs = sources::mtc(device)?;
             follow(common, &stop, ChaseSource::Mtc, leader, inputs, &format!("MIDI timecode of {}", device.display()))
         }
         Kind::Ltc { file, timecode } => {
-            let leader = timecode.leader(ChaseSource::Ltc)?;
+            let leader = Leader::Timecode(timecode.leader(ChaseSource::Ltc)?);
             let inputs = sources::ltc(file)?;
             follow(common, &stop, ChaseSource::Ltc, leader, inputs, &format!("LTC of {}", file.display()))
         }
@@ -156,14 +159,14 @@ pub fn chase(common: &Common, arguments: &ChaseArguments) -> Result<(), CommandE
 }
 
 impl TimecodeArguments {
-    fn leader(&self, source: ChaseSource) -> Result<Leader, CommandError> {
+    fn leader(&self, source: ChaseSource) -> Result<TimecodeLeader, CommandError> {
         let Self { offset, speed, freewheel, fps: Fps(rate) } = *self;
         if let Some(rate) = rate.filter(|rate| rate.frame(offset).is_none()) {
             let sentence =
                 format!("--offset {offset} is no label at {rate} frames per second, expected one that exists");
             return Err(CommandError::BadInput(sentence));
         }
-        Ok(Leader::Timecode(TimecodeLeader::new(source, Schedule { offset, speed }, rate, freewheel)))
+        Ok(TimecodeLeader::new(source, Schedule { offset, speed }, rate, freewheel))
     }
 }
 

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::harness::{Lines, Process, can_run, long, not_run, program, python, text, unique};
+use crate::harness::{Lines, Process, can_run, json_lines, long, not_run, program, python, text, unique};
 use nix::sys::signal::Signal;
 
 /// Returns a port that no other test has.
@@ -102,6 +102,8 @@ fn piped(name: &str, kind: &str, option: &str) {
     assert!(text.contains("\"state\":\"locked\"") && text.contains("\"frame_rate\":\"25\""), "{text}");
     // The chase ends by itself after the end of its source, when the show is paused.
     assert!(text.contains("\"state\":\"lost\"") && text.contains("\"state\":\"ended\""), "{text}");
+    let stands = json_lines(&Process::start(program(name).args(["--json", "control", "state"])).output());
+    assert_eq!(stands[0]["playback"], "paused", "{stands:?}");
     let file = result_file(name);
     let result: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
     let _ = std::fs::remove_file(file);

@@ -60,7 +60,7 @@ pub fn encode(timecode: &TimeCode) -> [u8; BYTES] {
     let TimeCode { stream, label, rate } = *timecode;
     let Label { hours, minutes, seconds, frames } = label;
     let kind = match rate {
-        FrameRate::Film24 => 0,
+        FrameRate::Film24 | FrameRate::Film23976 => 0,
         FrameRate::Ebu25 => 1,
         FrameRate::Drop2997 => 2,
         FrameRate::NonDrop2997 | FrameRate::Smpte30 => 3,

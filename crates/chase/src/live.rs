@@ -47,6 +47,8 @@ pub struct TimecodeLeader {
     was_locked: bool,
     /// The sender and the stream that are followed.
     sender: Option<(IpAddr, u8)>,
+    /// The only stream that may be followed, if the user has given it.
+    stream: Option<u8>,
 }
 
 impl TimecodeLeader {
@@ -65,13 +67,29 @@ impl TimecodeLeader {
             rate: given_rate.unwrap_or(FrameRate::Ebu25),
             was_locked: false,
             sender: None,
+            stream: None,
         }
+    }
+
+    /// Returns the same leader, which follows this stream of a sender alone.
+    pub fn of_stream(self, stream: Option<u8>) -> Self {
+        Self { stream, ..self }
     }
 
     /// Handles a frame of a sender. Returns false if the frame is ignored.
     fn frame(&mut self, label: Label, rate: FrameRate, age: f64, at_ns: u64, sender: Option<(IpAddr, u8)>) -> bool {
-        if self.sender.is_some() && sender != self.sender && self.synchronizer.quiet_for(at_ns) <= self.freewheel {
+        let stream = sender.map(|(_, stream)| stream);
+        if self.stream.is_some() && stream != self.stream {
             return false;
+        }
+        // Stream 0 is the master, and followed before any other.
+        let is_master = stream == Some(0) && self.sender.is_some_and(|(_, followed)| followed != 0);
+        let is_other = self.sender.is_some() && sender != self.sender;
+        if is_other && !is_master && self.synchronizer.quiet_for(at_ns) <= self.freewheel {
+            return false;
+        }
+        if is_other && is_master {
+            self.synchronizer = Synchronizer::new(self.options);
         }
         let Some(reading) = self.reading(label, rate, age, at_ns) else { return false };
         self.sender = sender;
@@ -127,6 +145,8 @@ pub struct Chase<'a> {
     shares_clock: bool,
     status: ChaseStatus,
     next_status: Instant,
+    /// True once the stream of the source has ended.
+    has_ended: bool,
     notify: &'a mut dyn FnMut(Notice),
 }
 
@@ -172,18 +192,27 @@ impl<'a> Chase<'a> {
             shares_clock: true,
             status,
             next_status: Instant::now(),
+            has_ended: false,
             notify,
         })
     }
 
-    /// Ends the chase: the show continues at the rate of its source, without a correction. Returns the last status.
+    /// Ends the chase: the show continues at the rate of its source, without a correction, or is paused after the end
+    /// of the source. Returns the last status.
     pub fn finish(mut self) -> ChaseStatus {
-        if self.status.state == ChaseState::Locked as u32 && self.status.rate > 0.0 {
-            while self.answers.try_recv().is_ok() {}
-            let last = Action::Send(Command::Rate(self.status.rate));
-            if self.commands.request(monotonic_ns(), last).is_ok() {
-                let _ = self.answers.recv_timeout(LAST_COMMAND);
-            }
+        let last = match self.status.chase_state() {
+            Some(ChaseState::Locked) if self.status.rate > 0.0 => Some(Command::Rate(self.status.rate)),
+            // The pause that `steer` has sent may still be on its way.
+            Some(ChaseState::Lost) if self.has_ended => Some(Command::Pause),
+            _ => None,
+        };
+        let sent_ns = monotonic_ns();
+        if let Some(last) = last
+            && self.commands.request(sent_ns, Action::Send(last)).is_ok()
+        {
+            let end = Instant::now() + LAST_COMMAND;
+            let left = || end.saturating_duration_since(Instant::now());
+            while self.answers.recv_timeout(left()).is_ok_and(|(of, _)| of != sent_ns) {}
         }
         self.status.state = ChaseState::Ended as u32;
         self.status.stamp_ns = realtime_ns();
@@ -202,6 +231,7 @@ impl<'a> Chase<'a> {
         let show_time = self.steering.show_time(monotonic_ns());
         let is_used = match (&mut self.leader, input) {
             (_, Input::End) => {
+                self.has_ended = true;
                 (self.notify)(Notice::End);
                 return;
             }
@@ -347,5 +377,33 @@ impl SetLabel for ChaseStatus {
         [self.hours, self.minutes, self.seconds, self.frames] = [hours, minutes, seconds, frames].map(u32::from);
         // The layout's numbers are in the order of `FrameRate::ALL`, from 1.
         self.frame_rate = rate as u32 + 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+
+    use super::*;
+
+    /// Handles a frame of a stream of one sender, one frame after the one before. Returns true if it is used.
+    fn frame(leader: &mut TimecodeLeader, count: u32, stream: u8) -> bool {
+        let (label, sender) = (FrameRate::Ebu25.label(count), (IpAddr::V4(Ipv4Addr::LOCALHOST), stream));
+        leader.frame(label, FrameRate::Ebu25, 0.0, u64::from(count) * 40_000_000, Some(sender))
+    }
+
+    fn leader() -> TimecodeLeader {
+        let offset = Label { hours: 0, minutes: 0, seconds: 0, frames: 0 };
+        TimecodeLeader::new(ChaseSource::ArtNet, Schedule { offset, speed: 1.0 }, None, 2.0)
+    }
+
+    #[test]
+    fn the_master_stream_or_the_given_one_is_followed() {
+        let mut only = leader();
+        assert!((0..10).all(|count| frame(&mut only, count, 3)));
+        assert!(!frame(&mut only, 10, 4), "another stream while one is followed");
+        assert!(frame(&mut only, 11, 0) && !frame(&mut only, 12, 3), "stream 0 takes over");
+        let mut given = leader().of_stream(Some(4));
+        assert_eq!([3, 0, 4, 0, 4].map(|stream| frame(&mut given, 20, stream)), [false, false, true, false, true]);
     }
 }

@@ -226,7 +226,8 @@ mod tests {
 
     #[test]
     fn every_rate_is_decoded_with_the_sample_at_which_its_frames_end() {
-        for rate in FrameRate::ALL {
+        // 23.976 is too near 24 to be told from it, and is given by the user.
+        for rate in FrameRate::ALL.into_iter().filter(|rate| *rate != FrameRate::Film23976) {
             let fps = 1.0 / rate.seconds(1.0);
             let first = rate.frame("01:02:59:20".parse().unwrap()).unwrap();
             let labels: Vec<_> = (first..first + 60).map(|frame| rate.label(frame)).collect();

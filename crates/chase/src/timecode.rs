@@ -24,6 +24,8 @@ pub enum FrameRate {
     Drop2997,
     /// 30 frames per second: SMPTE.
     Smpte30,
+    /// 24000/1001 frames per second, 24 labels per second: film on video.
+    Film23976,
 }
 
 /// A label of timecode. It may name no frame: [`FrameRate::frame`] decides.
@@ -41,7 +43,8 @@ pub struct Label {
 
 impl FrameRate {
     /// Every rate.
-    pub const ALL: [Self; 5] = [Self::Film24, Self::Ebu25, Self::NonDrop2997, Self::Drop2997, Self::Smpte30];
+    pub const ALL: [Self; 6] =
+        [Self::Film24, Self::Ebu25, Self::NonDrop2997, Self::Drop2997, Self::Smpte30, Self::Film23976];
 
     /// Returns the name on the command line.
     pub const fn name(self) -> &'static str {
@@ -51,6 +54,7 @@ impl FrameRate {
             Self::NonDrop2997 => "29.97",
             Self::Drop2997 => "29.97df",
             Self::Smpte30 => "30",
+            Self::Film23976 => "23.976",
         }
     }
 
@@ -69,7 +73,7 @@ impl FrameRate {
     /// Returns the labels of a second.
     pub const fn labels(self) -> u32 {
         match self {
-            Self::Film24 => 24,
+            Self::Film24 | Self::Film23976 => 24,
             Self::Ebu25 => 25,
             Self::NonDrop2997 | Self::Drop2997 | Self::Smpte30 => 30,
         }
@@ -79,6 +83,7 @@ impl FrameRate {
     pub fn seconds(self, frames: f64) -> f64 {
         match self {
             Self::NonDrop2997 | Self::Drop2997 => frames * 1001.0 / 30_000.0,
+            Self::Film23976 => frames * 1001.0 / 24_000.0,
             _ => frames / f64::from(self.labels()),
         }
     }
@@ -141,7 +146,7 @@ impl FromStr for FrameRate {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let named = Self::ALL.into_iter().find(|rate| rate.name() == text);
-        named.ok_or_else(|| "expected auto, 24, 25, 29.97, 29.97df or 30".to_owned())
+        named.ok_or_else(|| "expected auto, 23.976, 24, 25, 29.97, 29.97df or 30".to_owned())
     }
 }
 
@@ -224,7 +229,7 @@ mod tests {
             assert!(text.parse::<Label>().unwrap_err().contains("01:00:00:00"), "{text}");
         }
         assert!(FrameRate::ALL.iter().all(|rate| rate.name().parse() == Ok(*rate)));
-        assert!("23.976".parse::<FrameRate>().unwrap_err().contains("29.97df"));
+        assert!("23.98".parse::<FrameRate>().unwrap_err().contains("29.97df"));
         assert_eq!(
             [0, 1, 2, 3, 4].map(FrameRate::of_type).map(|rate| rate.map(FrameRate::name)),
             [Some("24"), Some("25"), Some("29.97df"), Some("30"), None]

@@ -150,7 +150,7 @@ impl From<&ChaseStatus> for ChaseObject {
             frame_rate,
             tracker,
         } = *status;
-        const RATES: [&str; 5] = ["24", "25", "29.97", "29.97df", "30"];
+        const RATES: [&str; 6] = ["24", "25", "29.97", "29.97df", "30", "23.976"];
         Self {
             run_id: Exact(run_id),
             stamp_ns: Exact(stamp_ns),

@@ -492,7 +492,7 @@ class ChaseStatus(Message):
     seconds: int
     # The label: frames.
     frames: int
-    # The rate of the labels: 0 none, 1 24, 2 25, 3 29.97, 4 29.97 drop frame, 5 30.
+    # The rate of the labels: 0 none, 1 24, 2 25, 3 29.97, 4 29.97 drop frame, 5 30, 6 23.976.
     frame_rate: int
     # The number of the tracker; 0 without a tracker.
     tracker: int

@@ -51,7 +51,7 @@ pub struct ChaseStatus {
     pub seconds: u32,
     /// The label: frames.
     pub frames: u32,
-    /// The rate of the labels: 0 none, 1 24, 2 25, 3 29.97, 4 29.97 drop frame, 5 30.
+    /// The rate of the labels: 0 none, 1 24, 2 25, 3 29.97, 4 29.97 drop frame, 5 30, 6 23.976.
     pub frame_rate: u32,
     /// The number of the tracker; 0 without a tracker.
     pub tracker: u32,
