@@ -48,7 +48,7 @@ def nothing_needed_is_cut_off():
         conduct = re.search(r"http://[^\"]+", conducted.stdout.readline()).group()
         for language in ("en", "zh"):
             for address in (url, conduct):
-                for width, height in [(844, 390), (900, 500), (1120, 630), (1280, 720), (390, 844), (1280, 800)]:
+                for width, height in [(844, 390), (900, 500), (1120, 630), (1280, 720), (390, 844), (1280, 800), (1440, 900), (1920, 1080)]:
                     page.set_viewport_size({"width": width, "height": height})
                     approaching(page, address, f"lang={language}")
                     if address == conduct:
@@ -138,6 +138,9 @@ def frozen_before_it_was_seen():
         for one, other in ((head, body), (body, tail), (head, tail)):
             assert numpy.abs(one - other).max() > 30, f"{head}, {body}, {tail}"
         assert spread(shot(page)[:, 500:]) > 3
+        page.keyboard.press("?")
+        until(page, "parseFloat(getComputedStyle(document.getElementById('keys-title')).fontSize) < 40", "a heading of the keys in its own size")
+        page.keyboard.press("Escape")
         show, seen = opened(page.context.browser, viewport={"width": 1280, "height": 800})
         show.goto(f"{url}#show")
         until(show, "picture.drawn > 0", "the show look of it")
