@@ -133,9 +133,9 @@ pub struct Precision {
 /// Finds the nearest boards of each frame: the same result as by testing all pairs, from few tests.
 ///
 /// The time is divided into windows, and each window has a list of the pairs that can be the nearest at any moment of it
-/// (see [`window`]). A frame tests the pairs of its list that are not excluded by their bounds, most often one or two.
-/// The next window is prepared ahead, some benches a frame. After a jump of the time a window is made within one frame.
-/// All memory is reserved by the constructor.
+/// (see the file `window`). A frame tests the pairs of its list that are not excluded by their bounds, most often one or
+/// two. The next window is prepared ahead, some benches a frame. After a jump of the time a window is made within one
+/// frame. All memory is reserved by the constructor.
 #[derive(Debug)]
 pub struct ClearanceMonitor {
     stage: Stage,

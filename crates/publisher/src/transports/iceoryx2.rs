@@ -8,9 +8,8 @@
 //!
 //! A name belongs to one show, because the service of commands, `<name>/control`, admits one server and is opened
 //! first. The library iceoryx2 detects by a lock of the operating system whether the server's process lives, so a
-//! killed process does not block the name, while a stopped process keeps it. A [`claim`] without a file keeps it too
-//! where another program removes the show's files. The other services admit a second
-//! publisher, for a tunnel to other machines.
+//! killed process does not block the name, while a stopped process keeps it. A claim without a file keeps it too where
+//! another program removes the show's files. The other services admit a second publisher, for a tunnel to other machines.
 
 pub mod chase_status;
 mod claim;
