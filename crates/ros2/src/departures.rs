@@ -1,13 +1,12 @@
 //! Participants that have died without a farewell.
 //!
-//! RustDDS 0.15.1 sends to a killed participant until its lease ends (Fast DDS: 20 s). Meanwhile another participant
-//! may have taken its UDP port, and gets messages that are not meant for it: pushes
-//! (`Writer::send_message_to_readers`, `rtps/writer.rs:1780`), and repairs that name no participant
-//! (`Writer::handle_repair_frags_send_worker`, `rtps/writer.rs:1580`). Parts of a message that a GAP then withdraws
-//! make a reader of Fast DDS 2.14 hang ([`gap`](super::wire::gap)). The readers of the dead participant also hold up
-//! the others until the lease ends, and RustDDS never forgets the endpoints of a participant whose lease has ended
-//! (`DiscoveryDB::remove_participant`, `discovery/discovery_db.rs:228`). So this file finds out who has died, and the
-//! matches say farewell in its name. Held by `the_ports_of_a_killed_subscriber_are_silent_within_seconds`.
+//! RustDDS 0.15.1 sends to a killed participant until its lease ends (Fast DDS: 20 s). Meanwhile another participant may
+//! have taken its UDP port, and gets messages that are not meant for it: pushes (`Writer::send_message_to_readers`), and
+//! repairs that name no participant (`Writer::handle_repair_frags_send_worker`). Parts of a message that a GAP then
+//! withdraws make a reader of Fast DDS 2.14 hang ([`gap`](super::wire::gap)). The readers of the dead participant also
+//! hold up the others until the lease ends, and RustDDS never forgets the endpoints of a participant whose lease has
+//! ended (`DiscoveryDB::remove_participant`). So this file finds out who has died, and the matches say farewell in its
+//! name.
 //!
 //! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants that have
 //! died: on this machine those whose sockets are gone, elsewhere those whose addresses belong to a newer participant.
@@ -16,7 +15,7 @@
 //! bridges, but not all.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
 use super::wire::Prefix;
@@ -24,19 +23,14 @@ use super::wire::Prefix;
 /// The interval at which sockets are read. Reading takes a fraction of a millisecond, and a new process needs longer to
 /// join the network.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// The time after which a second reading confirms a death. A reading can miss a socket that is there, because the
-/// kernel lists them in parts: a socket that is closed between two parts moves the following ones. Two readings hardly
-/// miss the same one.
-const CONFIRMATION: Duration = Duration::from_millis(5);
 /// The UDP sockets of this network namespace. A system without this file only has the rule of the newer participant.
 const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
 
 /// The most participants that are remembered as dead. Datagrams of a dead participant can come for some seconds.
 const REMEMBERED: usize = 1000;
 
-/// The sockets of each port: their inodes, and their local addresses. No two sockets that exist at one time share an
-/// inode.
-type Sockets = BTreeMap<u16, BTreeMap<u64, IpAddr>>;
+/// The sockets of each port, by their inodes. No two sockets that exist at one time share an inode.
+type Sockets = BTreeMap<u16, BTreeSet<u64>>;
 
 /// The remote participants of a network.
 #[derive(Default)]
@@ -52,12 +46,8 @@ pub(super) struct Departures {
 #[derive(Default)]
 struct Participant {
     addresses: BTreeSet<SocketAddr>,
-    /// True if it is on this machine.
-    is_here: bool,
-    /// The sockets that its addresses had when they were first read.
-    sockets: BTreeSet<u64>,
-    /// The time of the first reading without these.
-    missed: Option<Instant>,
+    /// The sockets that its ports had when they were noted, if it is on this machine.
+    sockets: Option<BTreeSet<u64>>,
 }
 
 impl Departures {
@@ -86,11 +76,12 @@ impl Departures {
                 continue;
             }
             let table = table.get_or_insert_with(read_sockets).as_ref();
-            participant.is_here = participant.addresses.iter().all(|address| is_local(*address));
-            participant.sockets.clear();
-            if table.is_some_and(|table| participant.is_here && !participant.has_sockets_of(table)) {
+            let is_here = participant.addresses.iter().all(|address| is_local(*address));
+            let sockets = table.filter(|_| is_here).map(|table| participant.sockets_in(table));
+            if sockets.as_ref().is_some_and(BTreeSet::is_empty) && participant.has_no_socket() {
                 dead.push(prefix);
             }
+            participant.sockets = sockets.filter(|sockets| !sockets.is_empty());
             dead.extend(self.earlier_than_the_latest_at(prefix));
         }
         self.remember(&dead);
@@ -118,32 +109,29 @@ impl Departures {
     /// Returns the participants of this machine whose sockets are gone. Looks at them if a participant has come or some
     /// time has passed.
     pub(super) fn gone(&mut self, has_come: bool, now: Instant) -> Vec<Prefix> {
-        let is_doubtful = self.participants.values().any(|participant| participant.missed.is_some());
-        let interval = if is_doubtful { CONFIRMATION } else { INTERVAL };
-        let is_due = has_come || self.checked.is_none_or(|checked| now.duration_since(checked) >= interval);
+        let is_due = has_come || self.checked.is_none_or(|checked| now.duration_since(checked) >= INTERVAL);
         if !is_due || self.participants.is_empty() {
             return Vec::new();
         }
         self.checked = Some(now);
-        read_sockets().map_or_else(Vec::new, |sockets| self.gone_from(&sockets, now))
+        read_sockets().map_or_else(Vec::new, |sockets| self.gone_from(&sockets))
     }
 
-    fn gone_from(&mut self, table: &Sockets, now: Instant) -> Vec<Prefix> {
-        let mut gone = Vec::new();
-        for (prefix, participant) in self.participants.iter_mut().filter(|(_, participant)| participant.is_here) {
-            if participant.has_sockets_of(table) {
-                participant.missed = None;
-            } else if now.duration_since(*participant.missed.get_or_insert(now)) >= CONFIRMATION {
-                gone.push(*prefix);
-            }
-        }
+    fn gone_from(&mut self, table: &Sockets) -> Vec<Prefix> {
+        let is_gone = |participant: &Participant| {
+            let Some(before) = &participant.sockets else { return false };
+            let now = participant.sockets_in(table);
+            before.is_disjoint(&now) && (!now.is_empty() || participant.has_no_socket())
+        };
+        let gone: Vec<Prefix> =
+            self.participants.iter().filter(|(_, known)| is_gone(known)).map(|(prefix, _)| *prefix).collect();
         self.remember(&gone);
         gone
     }
 
     /// Returns true if a participant is on this machine.
     pub(super) fn is_here(&self, participant: Prefix) -> bool {
-        self.participants.get(&participant).is_some_and(|participant| participant.is_here)
+        self.participants.get(&participant).is_some_and(|participant| participant.sockets.is_some())
     }
 
     /// Forgets participants that have left.
@@ -156,24 +144,15 @@ impl Departures {
 }
 
 impl Participant {
-    /// Returns true if one of its sockets is in this table, or if one of its addresses cannot be bound and the table
-    /// has no socket there. A later socket at its addresses means that its own are gone: two sockets share an address
-    /// only if both allow it, which those for unicast do not.
-    fn has_sockets_of(&mut self, table: &Sockets) -> bool {
-        let at = |address: &SocketAddr| {
-            let sockets = table.get(&address.port()).into_iter().flatten();
-            let ip = address.ip();
-            sockets.filter(move |(_, local)| local.is_unspecified() || **local == ip).map(|(inode, _)| *inode)
-        };
-        let found: BTreeSet<u64> = self.addresses.iter().flat_map(at).collect();
-        if found.is_empty() {
-            // A bound socket prevents another one at its address.
-            return self.addresses.iter().any(|address| UdpSocket::bind(address).is_err());
-        }
-        if self.sockets.is_empty() {
-            self.sockets.clone_from(&found);
-        }
-        !self.sockets.is_disjoint(&found)
+    /// Returns the sockets of its ports.
+    fn sockets_in(&self, table: &Sockets) -> BTreeSet<u64> {
+        self.addresses.iter().filter_map(|address| table.get(&address.port())).flatten().copied().collect()
+    }
+
+    /// Returns true if its addresses are free. The kernel's table can miss a socket: it is read in parts, and a socket
+    /// that is closed meanwhile moves the following ones.
+    fn has_no_socket(&self) -> bool {
+        self.addresses.iter().all(|address| UdpSocket::bind(address).is_ok())
     }
 }
 
@@ -195,23 +174,12 @@ fn sockets(table: &str) -> Sockets {
     for line in table.lines() {
         let columns: Vec<&str> = line.split_whitespace().collect();
         let [_, local, _, _, _, _, _, _, _, inode, ..] = columns[..] else { continue };
-        let Some((local, port)) = local.rsplit_once(':') else { continue };
-        if let (Some(local), Ok(port), Ok(inode)) = (ip(local), u16::from_str_radix(port, 16), inode.parse()) {
-            sockets.entry(port).or_default().insert(inode, local);
+        let port = local.rsplit_once(':').and_then(|(_, port)| u16::from_str_radix(port, 16).ok());
+        if let (Some(port), Ok(inode)) = (port, inode.parse()) {
+            sockets.entry(port).or_default().insert(inode);
         }
     }
     sockets
-}
-
-/// Reads an address: words of 32 bits in the byte order of the machine, one for IPv4, four for IPv6.
-fn ip(digits: &str) -> Option<IpAddr> {
-    let words = digits.as_bytes().chunks(8).map(|word| u32::from_str_radix(str::from_utf8(word).ok()?, 16).ok());
-    let bytes: Vec<u8> = words.collect::<Option<Vec<u32>>>()?.into_iter().flat_map(u32::to_ne_bytes).collect();
-    match bytes.len() {
-        4 => Some(Ipv4Addr::from(<[u8; 4]>::try_from(bytes).ok()?).into()),
-        16 => Some(Ipv6Addr::from(<[u8; 16]>::try_from(bytes).ok()?).to_canonical()),
-        _ => None,
-    }
 }
 
 #[cfg(test)]
@@ -253,9 +221,8 @@ mod tests {
         assert_eq!(departures.gone(false, now), [[0; 12]; 0], "looked at a moment ago");
         // The port may have been taken again.
         let _other = UdpSocket::bind(address);
-        assert_eq!(departures.gone(true, now), [[0; 12]; 0], "not confirmed");
-        assert_eq!(departures.gone(false, now + CONFIRMATION), [OLD]);
-        assert_eq!(departures.gone(true, now + 2 * CONFIRMATION), [[0; 12]; 0], "once");
+        assert_eq!(departures.gone(true, now), [OLD]);
+        assert_eq!(departures.gone(true, now), [[0; 12]; 0], "once");
     }
 
     /// Returns an address of this machine that no socket has.
@@ -294,46 +261,15 @@ mod tests {
         assert_eq!(note(&mut departures, [3; 12], one), [OLD]);
     }
 
-    /// Returns a table of one socket.
-    fn table(inode: u64, socket: &str) -> Sockets {
-        let socket: SocketAddr = socket.parse().unwrap();
-        BTreeMap::from([(socket.port(), BTreeMap::from([(inode, socket.ip())]))])
-    }
-
     /// As when the kernel's table misses a line.
     #[test]
     fn a_socket_that_a_table_misses_is_still_there() {
         let mut departures = Departures::default();
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        let port = socket.local_addr().unwrap().port();
-        let (empty, start) = (table(1, "127.0.0.1:1"), Instant::now());
-        // Another socket has the same port at another address.
-        let elsewhere = table(2, &format!("127.0.0.2:{port}"));
-        let at = |tenths: u32| start + CONFIRMATION * tenths / 10;
         assert_eq!(note(&mut departures, OLD, socket.local_addr().unwrap()), [[0; 12]; 0]);
-        for (tenths, table) in [(0, &empty), (10, &empty), (20, &elsewhere), (30, &elsewhere)] {
-            assert_eq!(departures.gone_from(table, at(tenths)), [[0; 12]; 0], "{tenths}");
-        }
+        assert_eq!(departures.gone_from(&BTreeMap::from([(1, BTreeSet::from([1]))])), [[0; 12]; 0]);
         drop(socket);
-        assert_eq!(departures.gone_from(&elsewhere, at(40)), [[0; 12]; 0]);
-        assert_eq!(departures.gone_from(&elsewhere, at(49)), [[0; 12]; 0]);
-        assert_eq!(departures.gone_from(&elsewhere, at(50)), [OLD]);
-    }
-
-    /// As with two sockets of one port that both allow to be shared.
-    #[test]
-    fn one_reading_without_its_socket_ends_no_participant() {
-        let mut departures = Departures::default();
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        let port = socket.local_addr().unwrap().port();
-        let (own, other) = (table(1, &format!("127.0.0.1:{port}")), table(2, &format!("0.0.0.0:{port}")));
-        let start = Instant::now();
-        departures.participants.entry(OLD).or_default().is_here = true;
-        departures.participants.get_mut(&OLD).unwrap().addresses.insert(socket.local_addr().unwrap());
-        for (times, table) in [(0, &own), (1, &other), (2, &own), (3, &other)] {
-            assert_eq!(departures.gone_from(table, start + CONFIRMATION * times), [[0; 12]; 0], "{times}");
-        }
-        assert_eq!(departures.gone_from(&other, start + CONFIRMATION * 4), [OLD]);
+        assert_eq!(departures.gone_from(&BTreeMap::from([(1, BTreeSet::from([1]))])), [OLD]);
     }
 
     /// Lines of Linux 6.1.
@@ -343,15 +279,9 @@ mod tests {
              \x20 123: 00000000:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4026 2 0000000000000000 0\n\
              \x20 124: 0100007F:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4027 2 0000000000000000 9\n\
              \x20 200: 00000000000000000000000000000000:1CE8 00000000000000000000000000000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 77 2 0000000000000000 0\n";
-        let own: IpAddr = "127.0.0.1".parse().unwrap();
-        let [any, any_of_ipv6] = ["0.0.0.0", "::"].map(|address| address.parse::<IpAddr>().unwrap());
         assert_eq!(
             sockets(table),
-            BTreeMap::from([
-                (7411, BTreeMap::from([(4026, any), (4027, own)])),
-                (7400, BTreeMap::from([(77, any_of_ipv6)]))
-            ])
+            BTreeMap::from([(7411, BTreeSet::from([4026, 4027])), (7400, BTreeSet::from([77]))])
         );
-        assert_eq!(ip("0000000000000000FFFF00000100007F"), Some(own));
     }
 }
