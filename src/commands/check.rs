@@ -77,10 +77,10 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     let found = find_least_clearance(&scene, &timeline, common);
     let beside = obstacle_clearances(&scene, &timeline, common);
-    let least: Found<'_> = (found.of_show(), &beside);
+    let least: Found<'_> = (found.of_show, &beside);
     let prove = || Parts::enclosed((&scene, &text.text), timeline.end(), least, arguments.certify.as_deref(), common);
     let parts = arguments.prove.then(prove).transpose()?;
-    let searched = Searched { timeline: &timeline, boards: found.of_show(), obstacles: &beside };
+    let searched = Searched { timeline: &timeline, boards: found.of_show, obstacles: &beside };
     let verdicts = Verdicts::of(&scene, &searched, parts.as_ref());
     if common.json {
         match &parts {
@@ -90,8 +90,8 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         verdicts.print_lines(&mut output)?;
         return output.finish().and(verdicts.result());
     }
-    output.line(&format!("  {}", least_clearance(&scene, found.of_show())))?;
-    if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show()) {
+    output.line(&format!("  {}", least_clearance(&scene, found.of_show)))?;
+    if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show) {
         output.line(&format!("  {}", least_clearance_between(&scene, &between)))?;
     }
     parts.iter().try_for_each(|parts| parts.print_unnamed(None, &mut output))?;
@@ -181,7 +181,7 @@ fn print_lines(
         bench_b: found.map(|found| found.least.bench_b),
         until: until(found.and_then(|found| found.searched_until)),
     };
-    output.json(&line("clearance", found.of_show()))?;
+    output.json(&line("clearance", found.of_show))?;
     if scene.ensemble.only().is_none() {
         output.json(&line("clearance_between_dragons", found.between))?;
     }

@@ -122,7 +122,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 output.line(&proof_sentence(EventKind::Obstacle, status))?;
             }
         }
-        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).of_show()))?;
+        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).of_show))?;
     }
     output.finish()
 }

@@ -44,7 +44,7 @@ fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
 /// Returns the least clearance of the show; `None` if a search gave up.
 fn least(scene: &Scene, timeline: &Timeline, show_end: &TimedEvent) -> Option<LeastOfShow> {
     let mut silent = |_| ();
-    let boards = scene.ensemble.least_clearances(timeline, show_end, &mut silent).of_show();
+    let boards = scene.ensemble.least_clearances(timeline, show_end, &mut silent).of_show;
     let obstacles = scene.ensemble.obstacle_clearances(show_end, &mut silent);
     let is_whole = boards.is_none_or(|found| found.searched_until.is_none())
         && obstacles.iter().all(|found| found.searched_until.is_none());

@@ -201,7 +201,7 @@ fn heads_that_meet_on_parallel_lines() {
     assert!(contact(&(east.clone() + &beside)).is_none());
     let scene = scene(&(east + &beside));
     let timeline = scene.ensemble.timeline(&mut |_| ());
-    let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).of_show().unwrap();
+    let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).of_show.unwrap();
     assert!((least.least.value - 0.01).abs() < 1e-12, "{}", least.least.value);
 }
 

@@ -11,20 +11,15 @@ use crate::contact::{LeastClearance, ObstacleClearance};
 use crate::event::Budget;
 use crate::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
 
-/// The least clearances of a show.
+/// The least clearances of a show. Where the search of some dragons failed, that of the others is complete up to 0 s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastClearances {
     /// The least clearance of two boards of one dragon; `None` if there are no two, or the search failed.
     pub own: Option<TimedClearance>,
     /// The least clearance of boards of two dragons; `None` likewise.
     pub between: Option<TimedClearance>,
-}
-
-impl LeastClearances {
-    /// Returns the least clearance of the show.
-    pub fn of_show(&self) -> Option<TimedClearance> {
-        self.between.into_iter().fold(self.own, |best, other| Some(nearer(best, other)))
-    }
+    /// The least clearance of any two boards; `None` likewise.
+    pub of_show: Option<TimedClearance>,
 }
 
 impl Ensemble {
@@ -41,10 +36,13 @@ impl Ensemble {
         let contact = timeline.find(EventKind::Contact);
         let own =
             |k: usize| self.own_least_clearance(k, contact, show_end, &mut |part| progress(share * (k as f64 + part)));
-        let own = (0..self.dragons.len()).filter_map(own).fold(None, |best, own| Some(nearer(best, own)));
-        let between =
-            self.least_clearance_between(show_end.time, &mut |part| progress(own_share + (1.0 - own_share) * part));
-        LeastClearances { own, between }
+        let can_meet = |&k: &usize| self.dragons[k].motion.team().benches > 2;
+        let own = (0..self.dragons.len()).filter(can_meet).map(own).reduce(nearer);
+        let between = (self.dragons.len() > 1).then(|| {
+            self.least_clearance_between(show_end.time, &mut |part| progress(own_share + (1.0 - own_share) * part))
+        });
+        let of_show = own.into_iter().chain(between).reduce(nearer).flatten();
+        LeastClearances { own: own.flatten(), between: between.flatten(), of_show }
     }
 
     /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show. Returns
@@ -119,29 +117,32 @@ impl Ensemble {
         progress: &mut dyn FnMut(f64),
     ) -> Vec<TimedObstacleClearance> {
         let share = 1.0 / self.dragons.len() as f64;
-        let mut all: Vec<TimedObstacleClearance> = Vec::new();
-        for (k, Dragon { delay, motion, .. }) in self.dragons.iter().enumerate() {
-            let to = self.own_end(k, show_end);
-            let (least, reached) = motion.obstacle_clearances(to, &mut |part| progress(share * (k as f64 + part)));
-            let time_at = |travelled| motion.time_at(travelled) + delay;
-            let searched_until = (reached < to).then(|| time_at(reached));
-            for (obstacle, least) in least.into_iter().enumerate() {
-                let Some(ObstacleClearance { value, travelled, bench }) = least else { continue };
-                let least = ObstacleClearance { value, travelled, bench: bench + self.first_handles[k] as u32 };
-                let own = TimedObstacleClearance { obstacle, least, time: time_at(travelled), searched_until };
-                match all.iter_mut().find(|other| other.obstacle == obstacle) {
-                    Some(other) => {
-                        let until = earlier(other.searched_until, searched_until);
-                        if value < other.least.value {
-                            *other = own;
-                        }
-                        other.searched_until = until;
-                    }
-                    None => all.push(own),
-                }
-            }
-        }
-        all
+        let own = |k: usize| self.own_obstacle_clearances(k, show_end, &mut |part| progress(share * (k as f64 + part)));
+        let own: Vec<_> = (0..self.dragons.len()).map(own).collect();
+        let of_obstacle =
+            |obstacle: usize| own.iter().map(|own| own.get(obstacle).copied().flatten()).reduce(nearer).flatten();
+        (0..self.ground().obstacles().len()).filter_map(of_obstacle).collect()
+    }
+
+    /// Returns the least clearance of each obstacle and one dragon, with the numbers and at the times of the show. It is
+    /// `None`, or the list is empty, if the search failed.
+    fn own_obstacle_clearances(
+        &self,
+        dragon: usize,
+        show_end: &TimedEvent,
+        progress: &mut dyn FnMut(f64),
+    ) -> Vec<Option<TimedObstacleClearance>> {
+        let Dragon { delay, motion, .. } = &self.dragons[dragon];
+        let to = self.own_end(dragon, show_end);
+        let (least, reached) = motion.obstacle_clearances(to, progress);
+        let time_at = |travelled| motion.time_at(travelled) + delay;
+        let searched_until = (reached < to).then(|| time_at(reached));
+        let of_show = |(obstacle, least): (usize, Option<ObstacleClearance>)| {
+            let ObstacleClearance { value, travelled, bench } = least?;
+            let least = ObstacleClearance { value, travelled, bench: bench + self.first_handles[dragon] as u32 };
+            Some(TimedObstacleClearance { obstacle, least, time: time_at(travelled), searched_until })
+        };
+        least.into_iter().enumerate().map(of_show).collect()
     }
 
     /// Returns the metres that a dragon's head has travelled when the show ends.
@@ -159,13 +160,70 @@ fn least((one, _): &(Meeting, [usize; 2]), (other, _): &(Meeting, [usize; 2])) -
     one.value.total_cmp(&other.value)
 }
 
-fn nearer(best: Option<TimedClearance>, other: TimedClearance) -> TimedClearance {
-    let Some(best) = best else { return other };
-    let searched_until = earlier(best.searched_until, other.searched_until);
-    let nearer = if other.least.value < best.least.value { other } else { best };
-    TimedClearance { searched_until, ..nearer }
+/// The result of a search that may have given up.
+trait Searched: Copy {
+    fn value(&self) -> f64;
+    fn searched_until(&self) -> Option<f64>;
+    fn up_to(self, searched_until: Option<f64>) -> Self;
+}
+
+impl Searched for TimedClearance {
+    fn value(&self) -> f64 {
+        self.least.value
+    }
+
+    fn searched_until(&self) -> Option<f64> {
+        self.searched_until
+    }
+
+    fn up_to(self, searched_until: Option<f64>) -> Self {
+        Self { searched_until, ..self }
+    }
+}
+
+impl Searched for TimedObstacleClearance {
+    fn value(&self) -> f64 {
+        self.least.value
+    }
+
+    fn searched_until(&self) -> Option<f64> {
+        self.searched_until
+    }
+
+    fn up_to(self, searched_until: Option<f64>) -> Self {
+        Self { searched_until, ..self }
+    }
+}
+
+/// Returns the lesser clearance of two searches. One that failed, `None`, has searched nothing.
+fn nearer<T: Searched>(one: Option<T>, other: Option<T>) -> Option<T> {
+    let searched_until = match (one, other) {
+        (Some(one), Some(other)) => earlier(one.searched_until(), other.searched_until()),
+        _ => Some(0.0),
+    };
+    let least = one.into_iter().chain(other).min_by(|one, other| one.value().total_cmp(&other.value()))?;
+    Some(least.up_to(searched_until))
 }
 
 fn earlier(one: Option<f64>, other: Option<f64>) -> Option<f64> {
     one.into_iter().chain(other).reduce(f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(value: f64, searched_until: Option<f64>) -> Option<TimedClearance> {
+        let least = LeastClearance { value, travelled: 7.0, bench_a: 0, bench_b: 5 };
+        Some(TimedClearance { least, time: 7.0, searched_until })
+    }
+
+    #[test]
+    fn what_one_dragon_did_not_search_nobody_has_searched() {
+        assert_eq!(nearer(found(0.3, None), found(0.2, None)), found(0.2, None));
+        assert_eq!(nearer(found(0.2, None), found(0.3, Some(9.0))), found(0.2, Some(9.0)));
+        assert_eq!(nearer(found(0.2, None), None), found(0.2, Some(0.0)));
+        assert_eq!(nearer(None, found(0.2, None)), found(0.2, Some(0.0)));
+        assert_eq!(nearer::<TimedClearance>(None, None), None);
+    }
 }
