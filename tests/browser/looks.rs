@@ -1,7 +1,7 @@
 //! The page's header and its picture as an audience and a crew read them, in the browser: the transport state, the show
 //! look.
 //!
-//! Those that `tests/run` leaves to `--all` (`ignore`) each start a browser and judge pictures, which only a change of the
+//! `ignore` leaves to `tests/run --all` the tests that start a browser and judge a picture, which only a change of the
 //! page's looks can break; `tests/browser/view.rs` has the same page in the short run.
 //!
 //! The tests are in `tests/python/stage_transport.py`, `stage_show.py`, `stage_seat.py`,
