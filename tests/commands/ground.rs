@@ -178,7 +178,7 @@ fn the_first_touch_of_an_obstacle_is_proved_and_verified() {
     assert!(text.contains("obstacle"), "{text}");
 }
 
-/// A plan is about boards alone: obstacles do not change it.
+/// On a path of another kind than the one that is planned, obstacles do not change a plan.
 #[test]
 fn plans_are_those_without_obstacles() {
     let staged = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");

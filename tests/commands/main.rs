@@ -10,6 +10,7 @@ mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod margin;
 mod packages;
 mod placement;
 mod require;

@@ -6,7 +6,7 @@ use super::boards::{MovingBoard, Shape};
 use super::capsule::{Spanned, moved_back};
 use super::grid::{GridPoint, span};
 use super::ground::Barrier;
-use super::interval::Interval;
+use super::interval::{Interval, minus, norm};
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
 use super::path::ExactPath;
@@ -15,7 +15,7 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::path::Path;
-use bench_dragon_motion::model::separation::overlap_centre;
+use bench_dragon_motion::model::separation::{closest_points_board_board, overlap_centre, separation_board_board};
 use bench_dragon_motion::model::team::Team;
 
 /// The statements that a step must show.
@@ -72,6 +72,8 @@ pub(super) struct Chain<'a> {
     pub start: Option<Place>,
     /// The obstacles of the stage.
     pub barriers: Vec<Barrier>,
+    /// The metres that boards must keep from each other to be clear.
+    pub clearance: f64,
 }
 
 /// Length added to both ends of a span, as a multiple of the rounding of doubles.
@@ -92,7 +94,8 @@ pub(super) fn links_of(team: &Team) -> [Interval; 2] {
 
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
-        Self { path, exact, team, links: links_of(team), shape: Shape::new(team), start: None, barriers: Vec::new() }
+        let (links, shape) = (links_of(team), Shape::new(team));
+        Self { path, exact, team, links, shape, start: None, barriers: Vec::new(), clearance: 0.0 }
     }
 
     /// Returns the metres between the handles of a bench.
@@ -160,6 +163,40 @@ impl<'a> Chain<'a> {
         let point: [f64; 2] = overlap_centre(&boards[0], &boards[1]).into();
         let holds = |bench: &usize| self.board(handles, *bench).holds(point.map(Interval::point));
         benches.iter().all(holds).then_some(point)
+    }
+
+    /// Returns a point of each of two boards that is proved to be in it. The two are less than `metres` apart, or one
+    /// point if `metres` is not positive.
+    pub fn near_points(&self, handles: &[Spanned], benches: [usize; 2], metres: Interval) -> Option<[[f64; 2]; 2]> {
+        if !metres.is_positive() {
+            return self.common_point(handles, benches).map(|point| [point; 2]);
+        }
+        let boards = benches.map(|bench| self.board(handles, bench).in_doubles());
+        let inside = |metres: f64| {
+            let [one, other] = boards.map(|board| board.grown(-metres));
+            if separation_board_board(&one, &other) > 0.0 {
+                return closest_points_board_board(&one, &other);
+            }
+            let point = overlap_centre(&one, &other);
+            (point, point)
+        };
+        let most = boards.iter().map(|board| board.half_width.min(board.half_length)).fold(f64::INFINITY, f64::min);
+        // As far inside as the metres allow: handles that are uncertain move the boards.
+        let is_too_far = |metres_inside: f64| {
+            let (one, other) = inside(metres_inside);
+            (other - one).norm() >= metres.lo * (1.0 - 1e-12)
+        };
+        let (mut near, mut far) = (0.0, most);
+        while far - near > 1e-3 * near && far > 1e-15 * most {
+            let middle = 0.5 * (near + far);
+            if is_too_far(middle) { far = middle } else { near = middle }
+        }
+        let (one, other) = inside(near);
+        let points = [one, other].map(<[f64; 2]>::from);
+        let [one, other] = points.map(|point| point.map(Interval::point));
+        let holds = |bench: usize, point| self.board(handles, bench).holds(point);
+        let are_near = norm(minus(other, one)).is_below(metres);
+        (are_near && holds(benches[0], one) && holds(benches[1], other)).then_some(points)
     }
 
     /// Returns the board of a bench from listed handles.
@@ -264,7 +301,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         }
         match claim.links {
             Links::Front if !claim.clear => true,
-            Links::Front if self.chain.exact.begins_inward() => self.is_beyond_front(0.0, last),
+            Links::Front if self.chain.exact.begins_inward() => self.is_beyond_front(self.chain.clearance, last),
             _ => self.is_on_line(last),
         }
     }
@@ -321,14 +358,14 @@ impl<'c, 'a> Listed<'c, 'a> {
         let firsts = if links == Links::All { listed } else { listed.min(2) };
         let innermost: Vec<f64> = (0..=listed).map(|handle| self.innermost(handle)).collect();
         for (a, board) in boards[..firsts].iter().enumerate() {
-            let outermost = chain.shape.outermost(board);
+            let outermost = sum_above(chain.shape.outermost(board), chain.clearance);
             let mut beyond = false;
             for (b, other) in boards.iter().enumerate().skip(a + 2) {
                 beyond = innermost[b] > outermost;
                 if beyond {
                     break;
                 }
-                if !board.is_apart_from(other) {
+                if !board.is_apart_by(chain.clearance, other) {
                     return Err(Obstacle::Pair(a, b));
                 }
             }
@@ -338,7 +375,7 @@ impl<'c, 'a> Listed<'c, 'a> {
                 let apart = if is_spiral {
                     innermost[listed] > outermost
                 } else {
-                    board.is_apart_from(&self.straight_run(next))
+                    board.is_apart_by(chain.clearance, &self.straight_run(next))
                 };
                 if !apart {
                     return Err(Obstacle::Pair(a, next));
@@ -346,7 +383,7 @@ impl<'c, 'a> Listed<'c, 'a> {
             }
         }
         if links == Links::All && !is_spiral && listed < benches {
-            let inset = Interval::point(chain.team.hole_inset) * 2.0;
+            let inset = Interval::point(chain.team.hole_inset) * 2.0 + Interval::point(chain.clearance);
             if !inset.is_below(chain.links[1]) {
                 return Err(Obstacle::Pair(listed, listed + 2));
             }

@@ -41,6 +41,18 @@ impl Team {
         }
     }
 
+    /// Returns the same team with boards that are larger by `metres` on each side.
+    pub fn grown(&self, metres: &Interval) -> Self {
+        let Self { benches, width, hole_inset, head_link, body_link } = *self;
+        Self {
+            benches,
+            width: width + metres * Interval::new(2.0),
+            hole_inset: hole_inset + metres,
+            head_link,
+            body_link,
+        }
+    }
+
     /// Returns the metres of the links from bench `first` to bench `last` in one line.
     pub fn links(&self, first: usize, last: usize) -> Interval {
         self.link(first) + self.link(1) * Interval::new((last - first) as f64)

@@ -5,10 +5,12 @@
 //! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
 
 use std::cell::{Cell, RefCell};
+use std::ops::ControlFlow;
 
 use super::PlanError;
 use super::turn_trial::{Family, Witness};
 use crate::place::Place;
+use crate::spaced::Spaced;
 use crate::turn::{Passage, Turns};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Progress;
@@ -71,6 +73,14 @@ const FEW: usize = 4;
 /// Limit of intervals of radii.
 const MOST_INTERVALS: u64 = 200_000;
 
+/// Limits of work, in all and for the ratio. A unit is about a millisecond: a step of the head, or as many links as a
+/// search solves before it asks whether it is to stop.
+const MOST_WORK: u64 = 40_000;
+const MOST_WORK_ON_RATIO: u64 = 15_000;
+
+/// The benches for which a step of the head is another unit of work.
+const BENCHES_PER_UNIT: usize = 50;
+
 /// The length of an interval in metres, at least and at first; the factors after an interval that is shown and one that
 /// is not.
 const LEAST_INTERVAL: f64 = 1e-12;
@@ -93,23 +103,27 @@ const LEAST_RATIO_STEP: f64 = 2e-3;
 ///
 /// # Errors
 /// The team turns round with the least radius that is tested, or its boards overlap on a straight line.
-pub fn least_turn(
-    team: &Team,
+pub fn least_turn<'a>(
+    asked: impl Into<Spaced<'a>>,
     pitch: f64,
     arc_ratio: Option<f64>,
     progress: Progress<'_>,
 ) -> Result<LeastTurn, PlanError> {
-    if team.benches >= 3 && 2.0 * team.hole_inset >= team.link(1) {
-        return Err(PlanError(format!(
-            "the team turns round with no radius: a bench is as long as two insets or shorter ({} m between its \
-             holes), so that the boards before and after it overlap even on a straight line",
-            team.link(1)
-        )));
+    let asked @ Spaced { team, clearance } = asked.into();
+    if let Some(reason) = asked.too_near_on_a_line() {
+        return Err(PlanError(format!("the team turns round with no radius: {reason}")));
     }
-    let (share, progress) = (Cell::new(0.0), RefCell::new(progress));
-    let ask = || progress.borrow_mut()(share.get());
-    let family = Family { team, pitch, arc_ratio: arc_ratio.unwrap_or(1.0), ask: &ask };
+    let (share, progress) = (Cell::new(0.0_f64), RefCell::new(progress));
+    let (work, most) = (Cell::new(0_u64), Cell::new(MOST_WORK_ON_RATIO));
+    let ask = || {
+        work.set(work.get() + 1);
+        let of_work = work.get() as f64 / MOST_WORK as f64;
+        let go_on = progress.borrow_mut()(share.get().max(of_work.min(1.0)));
+        if work.get() > most.get() { ControlFlow::Break(()) } else { go_on }
+    };
+    let family = Family { team, clearance, pitch, arc_ratio: arc_ratio.unwrap_or(1.0), ask: &ask, work: &work };
     let family = if arc_ratio.is_none() { best(family) } else { family };
+    most.set(MOST_WORK);
     let from = Accepted::LENGTH.least;
     let first = family.event(from);
     if family.is_stopped() {
@@ -138,18 +152,20 @@ pub fn least_turn(
     let closely = shown.is_some_and(|witness| matches!(witness, Witness::Overlap { .. }));
     let mut of_passage = |done| {
         share.set(0.5 + 0.5 * done);
+        family.spend((team.benches / BENCHES_PER_UNIT) as u64);
         ask()
     };
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
-        let passage = |team: &Team| Passage::new(team, (pitch, family.arc_ratio), upper);
+        let passage = |asked: Spaced<'_>| Passage::new(asked, (pitch, family.arc_ratio), upper);
         // The first benches fail as soon as the whole team does, at less cost.
         let few = Team { benches: team.benches.min(FEW), ..*team };
-        if !passage(&few).is_some_and(|passage| passage.is_free(&few, closely, &mut |_| ask())) {
+        let few = Spaced { team: &few, clearance };
+        if !passage(few).is_some_and(|passage| passage.is_free(few, closely, &mut |_| ask())) {
             continue;
         }
-        let Some(passage) = passage(team) else { break };
-        if passage.is_free(team, closely, &mut of_passage) {
+        let Some(passage) = passage(asked) else { break };
+        if passage.is_free(asked, closely, &mut of_passage) {
             found.value_hi = Some(upper);
             found.leads = Some([passage.lead_in, passage.lead_out]);
             found.proved = upper - value_lo <= 1e-8;
@@ -186,6 +202,10 @@ fn best(family: Family<'_>) -> Family<'_> {
             let other = Family { arc_ratio: arc_ratio.clamp(least, greatest), ..best };
             other.event(radius * (1.0 - BETTER)).is_none().then_some(other)
         });
+        // A stopped search finds no event.
+        if family.is_stopped() {
+            break;
+        }
         match better {
             Some(other) => (best, radius) = (other, other.radius().min(radius)),
             None => step *= 0.5,
@@ -282,11 +302,11 @@ impl Blocked<'_> {
 
     /// Returns the turnarounds with all radii up to `width` further on, and the middle radius.
     fn turns(&self, width: f64) -> Option<(Turns<'_>, f64)> {
-        let Family { team, pitch, arc_ratio, .. } = self.family;
+        let Family { team, clearance, pitch, arc_ratio, .. } = self.family;
         let radii = [self.radius, self.radius + width];
         let middle = 0.5 * radii[0] + 0.5 * radii[1];
         let path = self.family.path(middle)?;
-        Some((Turns::new(team, (pitch, arc_ratio), radii, path), middle))
+        Some((Turns::new(Spaced { team, clearance }, (pitch, arc_ratio), radii, path), middle))
     }
 
     /// Returns true if the event is proved for all radii up to `width` further on.

@@ -1,6 +1,7 @@
 //! Events of a team on turnarounds of one pitch and arc ratio, found by the ordinary search, which samples. They
 //! suggest to the proofs of [`crate::turn`] where to search.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 
 use crate::grid::{param, place};
@@ -34,6 +35,7 @@ const BESIDE_JUNCTION: f64 = 1e-13;
 /// is tried. A pivot keeps a share of a fold's depth off the ends of the S.
 const REACHES: [f64; 4] = [0.5, 0.1, 0.01, 1e-3];
 const OFFSETS: i32 = 48;
+const PIVOT_WORK: u64 = 2;
 const ASIDE: f64 = 0.05;
 
 /// The steps between two handles in which the distance is followed.
@@ -58,10 +60,14 @@ const ROOM: f64 = 4.0;
 #[derive(Clone, Copy)]
 pub(super) struct Family<'a> {
     pub team: &'a Team,
+    /// The required clearance of boards, in metres.
+    pub clearance: f64,
     pub pitch: f64,
     pub arc_ratio: f64,
     /// Asks whether the search is to stop. Then events may be missing.
     pub ask: &'a dyn Fn() -> ControlFlow<()>,
+    /// The work so far, about milliseconds.
+    pub work: &'a Cell<u64>,
 }
 
 /// An event, as a proof needs it. On a spiral, the coordinate of its places is the polar angle minus the polar angle at
@@ -70,7 +76,7 @@ pub(super) struct Family<'a> {
 pub(super) enum Witness {
     /// One handle of a link at a pivot, the other one before `end` and on the wrong side of the pivot's normal.
     Fold { kind: EventKind, link: usize, pivot: Place, end: Place },
-    /// Two boards that overlap with the head at a place with this radius. The place's coordinate grows by `rate` per
+    /// Two boards that overlap or are too near with the head at a place with this radius. The place's coordinate grows by `rate` per
     /// metre of the radius.
     Overlap { pair: (u32, u32), head: Place, radius: f64, rate: f64 },
 }
@@ -93,6 +99,11 @@ impl Family<'_> {
 
     fn path_between(&self, radius: f64, lead_in: f64, lead_out: f64) -> Option<Path> {
         Path::turnaround(self.pitch, radius, self.arc_ratio, lead_in, lead_out).ok()
+    }
+
+    /// Adds work that is done without asking.
+    pub fn spend(&self, units: u64) {
+        self.work.set(self.work.get() + units);
     }
 
     /// Returns true if the search is to stop.
@@ -189,6 +200,7 @@ impl Family<'_> {
     /// Returns the fold with the deepest pivot within the distance `reach` of the place `near`. Both are metres along
     /// the path, and the place is counted from the beginning of the S.
     fn pivoted(&self, radius: f64, (kind, link): (EventKind, usize), near: f64, reach: f64) -> Option<Witness> {
+        self.spend(PIVOT_WORK);
         let path = self.path(radius)?;
         let length = self.team.link(link);
         let folded = |pivot: Param| Folded::new(&path, kind, length, pivot);
@@ -226,7 +238,7 @@ impl Family<'_> {
         })
     }
 
-    /// Returns two boards that overlap with this radius, at their deepest.
+    /// Returns the two boards that overlap with this radius or are too near, at their nearest.
     fn touch(&self, radius: f64) -> Option<Witness> {
         let team = self.team;
         let outer = radius.max(team.longest_link()) + BOARDS_BEFORE * self.pitch;
@@ -238,7 +250,7 @@ impl Family<'_> {
         let least = advancement.least_clearance(0.0, path.length(), &mut budget).ok()?.value?;
         let head = self.event_place(radius, path.param_at(least.travelled));
         let pair = (least.bench_a, least.bench_b);
-        (least.value <= 0.0).then_some(Witness::Overlap { pair, head, radius, rate: 0.0 })
+        (least.value <= self.clearance).then_some(Witness::Overlap { pair, head, radius, rate: 0.0 })
     }
 
     /// Returns the same event with another radius, with several pivots, each found on request.
@@ -279,7 +291,7 @@ impl Family<'_> {
         let parts = pairs.flat_map(|pair| parts.map(|part| (*pair, part)));
         let found = parts.map(|(pair, part)| (pair, advancement.minimum_of(pair, part, &mut budget)));
         let (pair, (clearance, travelled)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
-        (clearance < 0.0).then(|| (pair, self.event_place(radius, path.param_at(travelled))))
+        (clearance < self.clearance).then(|| (pair, self.event_place(radius, path.param_at(travelled))))
     }
 }
 

@@ -122,7 +122,7 @@ pub struct FollowerTable {
 }
 
 /// The greatest error of the frames of the most exact table, metres, on any path but the farthest.
-pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
+const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {
     /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve. The
