@@ -90,7 +90,7 @@ fn a_certificate_with_another_clearance_is_refused() {
     let lines: Vec<Value> = certificate.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let proved = check(&changed(&lines, |_| ())[..]).unwrap().least_pitch.unwrap();
     assert!(proved.clearance == 0.2 && proved.value_lo.unwrap() < PITCH && proved.value_hi.unwrap() > PITCH);
-    let (_, said) = run(&scene, &["verify", name]);
+    let said = Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["verify", name]).output().unwrap();
     let said = text(&said.stdout);
     assert!(
         said.contains("two boards are nearer than 0.2 m") && said.contains("come as near as 0.2 m before"),
@@ -150,8 +150,9 @@ fn sampled(pitch: f64, [x, y]: [f64; 2]) -> f64 {
     let newton = Newton::new(path.clone(), team, 1.0, Velocities::Omitted);
     let to = path.length() - Path::spiral(pitch, 4.5 / pitch).length();
     let (mut chain, mut least) = (Chain::new(team.handles()), f64::INFINITY);
-    for k in 0..=20_000 {
-        newton.solve_at(to - 4.0 * f64::from(k) / 20_000.0, &mut chain).unwrap();
+    // From one turn before on.
+    for k in 0..=150_000 {
+        newton.solve_at(to - 30.0 * f64::from(k) / 150_000.0, &mut chain).unwrap();
         for bench in 0..2 {
             let [front, rear] = [bench, bench + 1].map(|handle| [chain.x[handle], chain.y[handle]]);
             let along = [front[0] - rear[0], front[1] - rear[1]];
