@@ -35,6 +35,7 @@ pub mod scene_argument;
 mod scene_facts;
 pub mod send;
 mod service_manager;
+pub mod sheets;
 mod signals;
 pub mod soak;
 pub mod soak_load_generator;

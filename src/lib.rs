@@ -18,6 +18,7 @@
 //! - `chase`: a show follows timecode, or a performer with a tracker.
 //! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
 //! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
+//! - `sheets`: hand-outs for the people who carry the benches.
 
 #![deny(missing_docs)]
 
@@ -46,6 +47,8 @@ pub use bench_dragon_recording as recording;
 pub use bench_dragon_ros2 as ros2;
 #[cfg(feature = "library")]
 pub use bench_dragon_ros2_messages as ros2_messages;
+#[cfg(feature = "library")]
+pub use bench_dragon_sheets as sheets;
 #[cfg(feature = "library")]
 pub use bench_dragon_show as show;
 #[cfg(feature = "library")]
