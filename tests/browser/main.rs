@@ -5,6 +5,7 @@ mod conduct;
 mod harness;
 mod looks;
 mod proved;
+mod scrub;
 mod several;
 mod sheets;
 mod view;

@@ -8,6 +8,7 @@ pub mod clock;
 pub mod convert;
 mod dancer;
 mod dancers;
+pub mod moments;
 mod playback;
 pub mod scene;
 pub mod table;
