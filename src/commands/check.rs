@@ -21,7 +21,8 @@ use description::describe;
 use parts::{Found, Parts};
 use required::{Searched, Verdicts};
 
-use super::events::{bench_name, find_least_clearance, least_clearance, least_clearance_between, sentence};
+use super::events::{bench_name, find_least_clearance, known, least_clearance, least_clearance_between, sentence};
+use super::signals::{gave_up, report, stop_searches_on_signals, unstopped};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
@@ -61,6 +62,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if arguments.prove {
         expect_exact_motion(&scene)?;
     }
+    stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
     let covered = arguments.covered(&scene, &timeline, common)?;
@@ -69,7 +71,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         output.json(&covered.line())?;
     }
     if common.json && covered.is_some() && !arguments.prove {
-        return output.finish();
+        return output.finish().and(unstopped());
     }
     if !common.json {
         describe(&scene, &warnings(&scene, &timeline), &mut output)?;
@@ -88,7 +90,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             None => print_lines(&scene, &timeline, &found, &beside, &mut output)?,
         }
         verdicts.print_lines(&mut output)?;
-        return output.finish().and(verdicts.result());
+        return output.finish().and(unstopped()).and(verdicts.result());
     }
     output.line(&format!("  {}", least_clearance(&scene, found.of_show)))?;
     if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show) {
@@ -111,14 +113,17 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             output.line(&format!("    {sentence}."))?;
         }
     }
-    output.finish().and(verdicts.result())
+    output.finish().and(unstopped()).and(verdicts.result())
 }
 
 /// Prints the events and the cues.
 fn ahead(scene: &Scene, timeline: &Timeline, output: &mut Output) -> Result<(), CommandError> {
     output.line("  Ahead, in simulated time:")?;
-    for timed in &timeline.all() {
+    for timed in &known(timeline) {
         output.line(&format!("  {}", sentence(scene, timed)))?;
+    }
+    if timeline.is_stopped() {
+        return Ok(());
     }
     for cue in cues(scene, timeline) {
         output.line(&format!("  {cue}"))?;
@@ -196,7 +201,7 @@ fn print_lines(
 /// Searches for the least clearance of each obstacle over the whole route.
 fn obstacle_clearances(scene: &Scene, timeline: &Timeline, common: &Common) -> Vec<TimedObstacleClearance> {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
-    let mut progress = |share: f64| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let found = scene.ensemble.obstacle_clearances(timeline.end(), &mut progress);
     bar.finish_and_clear();
     found
@@ -208,7 +213,7 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
     let Obstacle { name, keep_out, .. } = &scene.ensemble.ground().obstacles()[obstacle];
     let (at, bench) = (figure(time), bench_name(scene, least.bench));
     let up_to = searched_until
-        .map_or(String::new(), |until| format!(" up to t = {} s, where the search gave up", figure(until)));
+        .map_or(String::new(), |until| format!(" up to t = {} s, where the search {}", figure(until), gave_up()));
     let distance = figure(least.value + keep_out);
     let beyond = match (*keep_out > 0.0, least.value < 0.0) {
         (false, _) => String::new(),

@@ -3,6 +3,7 @@
 
 use std::time::{Duration, Instant};
 
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::{TimedEvent, Timeline};
 use bench_dragon::outputs::view::{ClearanceCurve, LeastOfShow, SceneFacts};
 use bench_dragon::show::scene::{AlertRules, AtEnd, Scene};
@@ -28,7 +29,7 @@ pub fn scene_facts(text: &str) -> Option<SceneFacts> {
 /// Returns the clearance over the show: of boards, and of boards and obstacles. `None` for fewer than three benches on
 /// empty ground, where a search gave up, or where it takes too long.
 fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show_end = *timeline.show_end(scene.stops_at_contact());
     let least = least(scene, &timeline, &show_end)?;
     let patience = Instant::now() + PATIENCE;
@@ -43,7 +44,7 @@ fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
 
 /// Returns the least clearance of the show; `None` if a search gave up.
 fn least(scene: &Scene, timeline: &Timeline, show_end: &TimedEvent) -> Option<LeastOfShow> {
-    let mut silent = |_| ();
+    let mut silent = unreported;
     let boards = scene.ensemble.least_clearances(timeline, show_end, &mut silent).of_show;
     let obstacles = scene.ensemble.obstacle_clearances(show_end, &mut silent);
     let is_whole = boards.is_none_or(|found| found.searched_until.is_none())

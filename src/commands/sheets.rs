@@ -10,6 +10,7 @@ use bench_dragon::sheets::walk::{MOST_BENCHES, Searched, Walk};
 use bench_dragon::sheets::{Language, csv};
 
 use super::events::find_least_clearance;
+use super::signals::{report, stop_searches_on_signals, unstopped};
 use super::swept::{Benches, benches, ranges};
 use super::{CommandError, Common, Output, expect_exact_motion, progress_bar, search_timeline, warn_of_doubts};
 
@@ -42,6 +43,7 @@ const DIGITS: usize = 8;
 
 /// Writes the sheets.
 pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), CommandError> {
+    stop_searches_on_signals()?;
     let text = common.scene_text()?;
     let scene = text.parse()?;
     expect_exact_motion(&scene)?;
@@ -55,15 +57,15 @@ pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), Comman
     warn_of_doubts(&scene);
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("following every bench");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let obstacles = scene.ensemble.obstacle_clearances(timeline.end(), &mut |_| ());
+    let obstacles = scene.ensemble.obstacle_clearances(timeline.end(), &mut |share| report(&bar, 0.1 * share));
     let searched = Searched { boards: find_least_clearance(&scene, &timeline, common).of_show, obstacles: &obstacles };
     let is_drawn = |bench| {
         let Some((dragon, bench)) = scene.ensemble.owner(bench) else { return false };
         bench == 0 || pages(&chosen[dragon]).any(|(middle, _)| middle == bench)
     };
-    let walk = Walk::new(&scene, &timeline, &searched, is_drawn, &mut progress);
+    let walk = Walk::new(&scene, &timeline, &searched, is_drawn, &mut |share| report(&bar, share));
     bar.finish_and_clear();
+    unstopped()?;
     if let Some(file) = &arguments.csv {
         let mut output = Output::file(file)?;
         output.text(&csv(&walk, arguments.lang, &chosen, &clock))?;

@@ -9,6 +9,7 @@ use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::Scene;
 use serde::Serialize;
 
+use super::signals::{report, unstopped};
 use super::solve::time_of;
 use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar};
 
@@ -85,9 +86,10 @@ pub fn swept(scene: &Scene, timeline: &Timeline, stretch: Stretch<'_>, common: &
     }
     let (stretches, benches, words) = selected(scene, [from, until], stretch.benches)?;
     let bar = progress_bar(1000, common).with_message("uniting the ground");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let area = SweptArea::new(&stretches, &mut progress);
     bar.finish_and_clear();
+    unstopped()?;
     let area = area.map_err(|none| CommandError::Failed(format!("--until {}: {none}", figure(until))))?;
     Ok(Swept { area, from, until, benches, words })
 }

@@ -7,6 +7,7 @@ use bench_dragon::motion::timeline::{TimedClearance, TimedObstacleClearance, Tim
 use bench_dragon::show::scene::{Requirements, Scene, printable};
 use serde::Serialize;
 
+use super::super::signals::gave_up;
 use super::super::{CommandError, Output, figure, number};
 use super::parts::Parts;
 
@@ -97,7 +98,7 @@ fn boards(scene: &Scene, required: f64, searched: &Searched<'_>, parts: Option<&
     let can_meet = dragons.len() > 1 || dragons.iter().any(|dragon| dragon.motion.team().benches > 2);
     let verdict = match found {
         None if !can_meet => Verdict { verdict: Outcome::Pass, ..undecided("") },
-        None => undecided("the search gave up"),
+        None => undecided(&format!("the search {}", gave_up())),
         Some(found) => outcome(required, clearance, found.searched_until, searched, parts, None),
     };
     Verdict { what: "boards", required, clearance, time: found.map(|found| found.time), ..verdict }
@@ -107,7 +108,7 @@ fn boards(scene: &Scene, required: f64, searched: &Searched<'_>, parts: Option<&
 fn outcome(
     required: f64,
     found: Option<f64>,
-    gave_up: Option<f64>,
+    reached: Option<f64>,
     searched: &Searched<'_>,
     parts: Option<&Parts>,
     obstacle: Option<&str>,
@@ -121,12 +122,12 @@ fn outcome(
             _ => undecided("the proof does not decide it"),
         };
     }
-    let until = gave_up.or(searched.timeline.searched_until());
+    let until = reached.or(searched.timeline.searched_until());
     match (found, until) {
         (Some(found), _) if is_below(found) => decided(Outcome::Fail),
         (Some(_), None) => decided(Outcome::Pass),
-        (_, Some(until)) => undecided(&format!("the search gave up at t = {} s", figure(until))),
-        (None, None) => undecided("the search gave up"),
+        (_, Some(until)) => undecided(&format!("the search {} at t = {} s", gave_up(), figure(until))),
+        (None, None) => undecided(&format!("the search {}", gave_up())),
     }
 }
 
