@@ -18,6 +18,7 @@
 //! - `chase`: a show follows timecode, or a performer with a tracker.
 //! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
 //! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
+//! - `fit`: numbers of a scene changed until the show keeps what it must.
 //! - `sheets`: hand-outs for the people who carry the benches.
 
 #![deny(missing_docs)]
@@ -32,6 +33,8 @@ pub use bench_dragon_chase as chase;
 pub use bench_dragon_client as client;
 #[cfg(feature = "library")]
 pub use bench_dragon_drawing as drawing;
+#[cfg(feature = "library")]
+pub use bench_dragon_fit as fit;
 pub use bench_dragon_messages as messages;
 #[cfg(feature = "library")]
 pub use bench_dragon_motion as motion;
