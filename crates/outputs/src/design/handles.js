@@ -15,8 +15,7 @@ const KINDS = { end: "end", middle: "middle", pitch: "pitch", turns: "length alo
 export class Handles {
   /**
    * `acts` has drag(handle, to, { free, alt }, gesture), drop(), cancel(), remove(name) and show(line, handle). It also
-   * has isFree(), false while clicks do something else, isBusy(), true until the last drag is answered, and the camera
-   * and the canvas.
+   * has isBusy(), true until the last drag is answered, and the camera and the canvas.
    */
   constructor(root, acts) {
     Object.assign(this, { root, acts, shown: new Map(), scene: null, held: null, gestures: 0 });
@@ -82,7 +81,7 @@ export class Handles {
   }
 
   grab(one, event) {
-    if (!this.acts.isFree() || event.button > 0) return;
+    if (event.button > 0) return;
     one.node.setPointerCapture(event.pointerId);
     const { camera } = this.acts, [x, y] = camera.toPixel(one.handle.x, one.handle.y);
     // The picture stands still below the pointer.

@@ -53,13 +53,16 @@ const session = new Session({
   stage: (stage) => picture.take(stage),
   events: (events) => {
     results.show("events", events, picture.stage);
-    if (events.state === "exact") line.showEvents(events);
-    note();
+    if (events.state === "computing") return;
+    line.showEvents(events);
+    // The marked event, as it is now; or the first that happens on the way.
+    const { event: marked } = picture, list = events.list ?? [];
+    picture.mark(list.find(({ event, obstacle }) => event === marked?.event && obstacle === marked?.obstacle) ??
+        list.find(({ event }) => event !== "path_end") ?? null);
   },
   facts: (facts) => {
     results.show("facts", facts, picture.stage);
-    if (facts.state === "exact") line.showFacts(facts, picture.stage);
-    note();
+    if (facts.state !== "computing") line.showFacts(facts, picture.stage);
   },
   progress: (id, share) => plans.progress(id, share),
   plan: (id, plan, text) => plans.result(id, plan, text),
@@ -81,7 +84,6 @@ const handles = new Handles(element("handles"), { camera, canvas,
   cancel: () => undo(-1),
   remove: (name) => change({ remove: name }, null),
   show: (number, handle) => text.show(number, handle),
-  isFree: () => !measure.on && !ground.isMoving,
   isBusy: () => session.inFlight !== null,
 });
 window.design = { session, picture, history, handles, get scene() { return scene; } };
@@ -357,8 +359,10 @@ element("scene-text").addEventListener("beforeinput", (event) => {
   undo(by);
 });
 
-/** Moves what lies over and under the picture. */
+/** Moves what lies over and under the picture. Clicks that measure or move go through the handles. */
 function place() {
+  const isInert = measure.on || ground.isMoving;
+  if (handles.root.inert !== isInert) handles.root.inert = isInert;
   handles.place();
   ground.place();
 }
