@@ -315,7 +315,7 @@ def drag_one(page, one, text):
     return now != text
 
 
-# What is kept.
+# Texts and steps that are kept.
 
 def server_restarted():
     """A server that is killed, and a page that is loaded again, lose nothing."""
@@ -328,7 +328,7 @@ def server_restarted():
             set_field(page, "path.pitch", 0.6)
             child.kill()
             until(lambda: page.evaluate("document.documentElement.dataset.connection") == "lost", "the loss")
-            # Typing goes on meanwhile.
+            # Typing continues meanwhile.
             page.locator("#scene-text").press("Control+End")
             page.keyboard.type("# written without a server\n")
             kept = text_of(page)
@@ -503,7 +503,7 @@ def files(page, scene):
     set_field(page, "path.pitch", 0.56)
     page.keyboard.press("Control+s")
     until(lambda: scene.read_text(encoding="utf-8") == text_of(page), "the saved file")
-    other = PAPER + "# somebody else\n"
+    other = PAPER + "# another program\n"
     scene.write_text(other, encoding="utf-8")
     set_field(page, "path.pitch", 0.57)
     page.click("#save")

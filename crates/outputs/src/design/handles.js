@@ -14,8 +14,8 @@ const KINDS = { end: "end", middle: "middle", pitch: "pitch", turns: "length alo
 
 export class Handles {
   /**
-   * `acts` has drag(handle, to, { free, alt }, gesture), drop(), cancel(), remove(name) and show(line, handle). It also
-   * has isBusy(), true until the last drag is answered, and the camera and the canvas.
+   * `acts` has drag(handle, to, { free, alt }, gesture), cancel(gesture), remove(name), show(line), and use(name): the
+   * handle in use, or null. It also has isBusy(), true until the last drag is answered, the camera and the canvas.
    */
   constructor(root, acts) {
     Object.assign(this, { root, acts, shown: new Map(), scene: null, held: null, gestures: 0 });
@@ -55,9 +55,11 @@ export class Handles {
     node.onpointermove = (event) => this.held === one && this.move(one, event);
     node.onpointerup = node.onpointercancel = () => this.held === one && this.release();
     node.onkeydown = (event) => this.press(one, event);
-    node.onkeyup = () => this.acts.drop();
-    node.onfocus = () => this.acts.show(one.handle.line, one.handle);
-    node.onblur = () => this.acts.show(null, null);
+    node.onfocus = () => this.acts.show(one.handle.line);
+    node.onblur = () => {
+      this.acts.show(null);
+      this.acts.use(null);
+    };
   }
 
   name({ handle, node }) {
@@ -97,6 +99,7 @@ export class Handles {
     if (!this.isMoved && Math.hypot(event.clientX - this.from[0], event.clientY - this.from[1]) < 3) return;
     this.isMoved = true;
     one.node.classList.add("held");
+    this.acts.use(one.name);
     const to = this.acts.camera.toStage(event.clientX + this.offset[0], event.clientY + this.offset[1]);
     this.acts.drag(one.handle, to, { free: event.shiftKey, alt: event.altKey }, `drag ${this.gestures}`);
   }
@@ -104,14 +107,14 @@ export class Handles {
   release() {
     this.held?.node.classList.remove("held");
     this.held = null;
-    this.acts.drop();
+    this.acts.use(null);
   }
 
   press(one, event) {
     const { key, shiftKey, altKey, ctrlKey, metaKey, repeat } = event;
     if (ctrlKey || metaKey) return;
     if (key === "Escape") {
-      if (this.held) this.acts.cancel();
+      if (this.held) this.acts.cancel(`drag ${this.gestures}`);
       this.release();
       one.node.blur();
     } else if (key === "Delete" || key === "Backspace") this.acts.remove(removable(one.handle));
@@ -121,6 +124,7 @@ export class Handles {
           [one.handle.x, one.handle.y];
       // Presses add up while answers are on their way.
       one.wanted = [x + right * step, y + up * step];
+      this.acts.use(one.name);
       this.acts.drag(one.handle, one.wanted, { free: shiftKey, alt: altKey }, `drag ${this.gestures}`);
     } else return;
     event.preventDefault();

@@ -34,6 +34,8 @@ const history = new History(), canvas = element("stage");
 /** The newest scene of the server; null before the first. */
 let scene = null;
 let hello = null, typedAt = -Infinity, typing = 0, sentenceAt = 0;
+/** The name of the handle in use, or null. */
+let used = null;
 let isFitted = false, isConnected = false, isPinned = false;
 
 function tell(sentence) {
@@ -63,6 +65,7 @@ const session = new Session({
   facts: (facts) => {
     results.show("facts", facts, picture.stage);
     if (facts.state !== "computing") line.showFacts(facts, picture.stage);
+    beside();
   },
   progress: (id, share) => plans.progress(id, share),
   plan: (id, plan, text) => plans.result(id, plan, text),
@@ -80,10 +83,11 @@ const fields = new Fields(element("fields"), {
 });
 const handles = new Handles(element("handles"), { camera, canvas,
   drag: (handle, to, how, gesture) => change({ drag: { handle: handle.name, to, ...how } }, gesture, handle.name),
-  drop: () => (element("note").hidden = true),
-  cancel: () => undo(-1),
+  use,
+  // Only what this gesture has changed.
+  cancel: (gesture) => history.gesture === gesture ? undo(-1) : session.forget(),
   remove: (name) => change({ remove: name }, null),
-  show: (number, handle) => text.show(number, handle),
+  show: (number) => text.show(number),
   isBusy: () => session.inFlight !== null,
 });
 window.design = { session, picture, history, handles, get scene() { return scene; } };
@@ -102,7 +106,7 @@ function change(request, gesture, about = null) {
     if (session.waiting.some(({ request }) => "text" in request)) return;
     text.set(next.text);
     history.take(next.text, line.time, gesture);
-    show(next, about);
+    show(next);
   });
 }
 
@@ -134,6 +138,7 @@ function typed(whole, isOther) {
 function undo(by) {
   const step = history.go(by);
   if (!step) return;
+  session.forget();
   fields.end();
   text.set(step.text);
   send(step.text);
@@ -142,8 +147,7 @@ function undo(by) {
 }
 
 /** Shows a scene that the server has accepted. */
-function show(next, about = null) {
-  const before = scene;
+function show(next) {
   scene = next;
   root.dataset.stale = "false";
   text.error(null);
@@ -154,7 +158,7 @@ function show(next, about = null) {
   results.computing();
   element("scene-name").textContent = scene.name;
   document.title = `${scene.name}: design`;
-  if (about) beside(about, before);
+  beside();
   if ((scene.doubts ?? []).length) tell(scene.doubts.join(" "));
   if (!isFitted) fit();
   note();
@@ -180,19 +184,22 @@ function refused(id, error) {
   if (!plans.refuse(id, error)) tell(error.sentence);
 }
 
-/** Shows the changed numbers, the first event and the least clearance beside the handle that is dragged. */
-function beside(name, before) {
-  const handle = scene.handles.find((one) => one.name === name), box = element("note");
+/** Shows the numbers of the handle in use, the first event and the least clearance beside it. */
+function beside() {
+  const handle = scene?.handles.find(({ name }) => name === used), box = element("note");
   box.hidden = !handle;
   if (!handle) return;
-  const old = new Map(before?.fields.map((field) => [field.name, field.value]));
-  const names = handle.fields ?? [handle.name], changed = scene.fields.filter(
-      ({ name, value }) => typeof value === "number" && (names.includes(name) || old.get(name) !== value));
-  const values = changed.slice(0, 3).map(
+  const names = handle.fields ?? [handle.name], values = scene.fields.filter(({ name }) => names.includes(name)).map(
       ({ name, value, unit }) => `${name.split(/[.\]]/).findLast(Boolean)} ${value} ${unit ?? ""}`);
   box.textContent = [values.join(", "), results.brief].filter(Boolean).join("\n");
   const [x, y] = camera.toPixel(handle.x, handle.y);
   box.style.transform = `translate(${Math.min(x + 18, camera.width - 220)}px, ${Math.max(4, y - 46)}px)`;
+}
+
+/** Names the handle in use, or null. */
+function use(name) {
+  used = name;
+  beside();
 }
 
 // The server's messages.

@@ -84,6 +84,12 @@ export class Session {
     this.times.delete(next.id - KEPT_TIMES);
   }
 
+  /** Drops the changes that wait, and the answer to the one in flight: another text follows. */
+  forget() {
+    this.waiting = [];
+    if (this.inFlight) this.inFlight.done = () => null;
+  }
+
   /** Sets the time that the picture shows. */
   at(time) {
     if (this.atInFlight !== null && performance.now() - this.atInFlight < FRAME_PATIENCE) return (this.wantedAt = time);
