@@ -17,6 +17,7 @@
 //! - `recording`: MCAP recordings, their replay, and the verification of logs.
 //! - `chase`: a show follows timecode, or a performer with a tracker.
 //! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
+//! - `design`: a scene edited as text and as a picture.
 //! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
 
 #![deny(missing_docs)]
@@ -29,6 +30,8 @@ pub use bench_dragon_certify as certify;
 #[cfg(feature = "library")]
 pub use bench_dragon_chase as chase;
 pub use bench_dragon_client as client;
+#[cfg(feature = "library")]
+pub use bench_dragon_design as design;
 #[cfg(feature = "library")]
 pub use bench_dragon_drawing as drawing;
 pub use bench_dragon_messages as messages;

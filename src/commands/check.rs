@@ -10,18 +10,16 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
-use bench_dragon::motion::ensemble::LeastClearances;
 use bench_dragon::motion::ground::Obstacle;
-use bench_dragon::motion::timeline::{TimedClearance, TimedObstacleClearance, Timeline};
+use bench_dragon::motion::timeline::{TimedObstacleClearance, Timeline};
+use bench_dragon::show::results::{clearance_lines, event_sentence};
 use bench_dragon::show::scene::{Scene, printable};
 use bench_dragon::show::timed_cues;
-use serde::Serialize;
-
 use description::describe;
 use parts::{Found, Parts};
 use required::{Searched, Verdicts};
 
-use super::events::{bench_name, find_least_clearance, least_clearance, least_clearance_between, sentence};
+use super::events::{bench_name, find_least_clearance, least_clearance, least_clearance_between};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
@@ -85,7 +83,10 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if common.json {
         match &parts {
             Some(parts) => parts.print_lines(&mut output)?,
-            None => print_lines(&scene, &timeline, &found, &beside, &mut output)?,
+            None => {
+                let lines = clearance_lines(&scene, &timeline, &found, &beside);
+                lines.iter().try_for_each(|line| output.json(line))?;
+            }
         }
         verdicts.print_lines(&mut output)?;
         return output.finish().and(verdicts.result());
@@ -118,7 +119,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
 fn ahead(scene: &Scene, timeline: &Timeline, output: &mut Output) -> Result<(), CommandError> {
     output.line("  Ahead, in simulated time:")?;
     for timed in &timeline.all() {
-        output.line(&format!("  {}", sentence(scene, timed)))?;
+        output.line(&format!("  {}", event_sentence(scene, timed)))?;
     }
     for cue in cues(scene, timeline) {
         output.line(&format!("  {cue}"))?;
@@ -139,58 +140,6 @@ fn warnings(scene: &Scene, timeline: &Timeline) -> Vec<String> {
     let starts = [(EventKind::Contact, overlap), (EventKind::Obstacle, obstacle)];
     let starts = starts.into_iter().filter(|(kind, _)| begins_with(*kind)).map(|(_, warning)| warning.to_owned());
     scene.doubts.iter().cloned().chain(starts).collect()
-}
-
-/// A line of `check --json`: the least clearance of two boards.
-#[derive(Serialize)]
-struct LeastClearanceLine {
-    check: &'static str,
-    clearance: Option<f64>,
-    time: Option<f64>,
-    bench_a: Option<u32>,
-    bench_b: Option<u32>,
-    /// Simulated seconds up to which the clearance is the least: the end of the motion, or where the search gave up.
-    until: f64,
-}
-
-/// A line of `check --json`: the least clearance of an obstacle.
-#[derive(Serialize)]
-struct ObstacleLine<'a> {
-    check: &'static str,
-    obstacle: &'a str,
-    clearance: f64,
-    time: f64,
-    bench: u32,
-    until: f64,
-}
-
-/// Prints the least clearances of the whole route as JSON lines.
-fn print_lines(
-    scene: &Scene,
-    timeline: &Timeline,
-    found: &LeastClearances,
-    beside: &[TimedObstacleClearance],
-    output: &mut Output,
-) -> Result<(), CommandError> {
-    let until = |searched: Option<f64>| searched.unwrap_or(timeline.end().time);
-    let line = |check, found: Option<TimedClearance>| LeastClearanceLine {
-        check,
-        clearance: found.map(|found| found.least.value),
-        time: found.map(|found| found.time),
-        bench_a: found.map(|found| found.least.bench_a),
-        bench_b: found.map(|found| found.least.bench_b),
-        until: until(found.and_then(|found| found.searched_until)),
-    };
-    output.json(&line("clearance", found.of_show))?;
-    if scene.ensemble.only().is_none() {
-        output.json(&line("clearance_between_dragons", found.between))?;
-    }
-    for TimedObstacleClearance { obstacle, least, time, searched_until } in beside.iter().copied() {
-        let obstacle = &scene.ensemble.ground().obstacles()[obstacle].name;
-        let (check, clearance, bench) = ("obstacle", least.value, least.bench);
-        output.json(&ObstacleLine { check, obstacle, clearance, time, bench, until: until(searched_until) })?;
-    }
-    Ok(())
 }
 
 /// Searches for the least clearance of each obstacle over the whole route.

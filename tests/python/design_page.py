@@ -311,7 +311,7 @@ def drag_one(page, one, text):
     assert now_bones == bones or len(now_bones) > len(bones), f"{one['name']}: more than numbers has changed"
     if now_bones == bones:
         changed = sum(a != b for a, b in zip(numbers, now_numbers))
-        assert changed <= 2 or one["kind"] in ("middle", "placement", "boundary"), (one, changed)
+        assert changed <= 2 or one["kind"] in ("middle", "placement", "centre"), (one, changed)
     return now != text
 
 

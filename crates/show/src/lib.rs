@@ -9,6 +9,7 @@ pub mod convert;
 mod dancer;
 mod dancers;
 mod playback;
+pub mod results;
 pub mod scene;
 pub mod table;
 #[cfg(test)]
