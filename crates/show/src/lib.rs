@@ -9,6 +9,7 @@ pub mod convert;
 pub mod curve;
 mod dancer;
 mod dancers;
+pub mod moments;
 mod playback;
 pub mod requirements;
 pub mod results;
