@@ -12,6 +12,7 @@
 use std::f64::consts::TAU;
 
 use bench_dragon::messages::FrameHeader;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::path::Path;
 use bench_dragon::motion::model::team::Team;
 use bench_dragon::motion::solve::newton::Newton;
@@ -195,7 +196,7 @@ fn show(bencher: Bencher, with: &str) {
         scene.alerts = None;
     }
     scene.velocities = if with.contains("velocities") { Velocities::Computed } else { Velocities::Omitted };
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let playback = Playback { start: 200.0, at_end: AtEnd::Loop, end_hold: 0.0, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let mut tick = 0;
@@ -210,7 +211,7 @@ fn show(bencher: Bencher, with: &str) {
 #[divan::bench(sample_count = 500, sample_size = 4)]
 fn show_where_every_turn_is_as_near(bencher: Bencher) {
     let scene = Scene::paper();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let playback = Playback { start: 156.0, rate: 1000.0, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, timeline, playback).expect("156 s is before the contact");
     let mut tick = 0;
@@ -223,7 +224,7 @@ fn show_where_every_turn_is_as_near(bencher: Bencher) {
 /// The events of the paper scene, contact, stall and lock: found once, before the show.
 #[divan::bench(sample_count = 20, sample_size = 1)]
 fn events() -> Timeline {
-    Scene::paper().ensemble.timeline(&mut |_| ())
+    Scene::paper().ensemble.timeline(&mut unreported)
 }
 
 /// A frame into iceoryx2's shared memory, without solving.
@@ -232,7 +233,7 @@ fn publish_over_iceoryx2(bencher: Bencher) {
     let scene = Scene::paper();
     let playback = Playback { start: 200.0, ..Playback::of(&scene) };
     let mut show =
-        Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), playback).expect("200 s is before the contact");
+        Show::new(&scene, scene.ensemble.timeline(&mut unreported), playback).expect("200 s is before the contact");
     let config = PublisherConfig {
         name: format!("bench_{}_frame", std::process::id()),
         handles: scene.ensemble.handles(),

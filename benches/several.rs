@@ -6,6 +6,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use bench_dragon::motion::event::unreported;
 use bench_dragon::show::scene::Scene;
 use bench_dragon::show::{Playback, Show};
 
@@ -70,7 +71,8 @@ fn show(scene: &Scene, alerts: bool) -> Show {
     let scene = Scene { alerts: scene.alerts.filter(|_| alerts), ..scene.clone() };
     // A search for contacts would take long, and there is none before the end.
     let playback = Playback { start: START, ..Playback::of(&scene) };
-    Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).expect("100 s is before the end")
+    Show::new(&scene, scene.ensemble.timeline_without_contact(&mut unreported), playback)
+        .expect("100 s is before the end")
 }
 
 fn measure(name: &str, dragons: usize, coil: bool) {

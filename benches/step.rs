@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::client::shared_memory::{node, service_name};
 use bench_dragon::messages::{FrameHeader, HandlePose};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::publisher::live::control::{CommandQueues, CommandSender, command_queue};
 use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::{Outgoing, Publisher};
@@ -93,7 +94,7 @@ struct Times {
 fn measure(benches: usize) {
     let scene = scene(benches);
     let handles = scene.ensemble.handles();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let playback = Playback { start: START, ..Playback::of(&scene) };
     let show_of = |scene: &Scene| Show::new(scene, timeline.clone(), playback).expect("200 s is before the contact");
     let (mut show, mut bare_show) = (show_of(&scene), show_of(&Scene { alerts: None, ..scene.clone() }));
@@ -198,7 +199,7 @@ fn measure_rates() {
         [(223, 60.0), (223, 1_000.0), (5_000, 60.0), (5_000, 1_000.0), (100_000, 1.0), (100_000, 60.0)]
     {
         let scene = scene(benches);
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         let playback = Playback { start: START, rate, ..Playback::of(&scene) };
         let show_of =
             |scene: &Scene| Show::new(scene, timeline.clone(), playback).expect("200 s is before the contact");
@@ -245,7 +246,7 @@ fn measure_rates() {
 fn measure_queues() {
     let scene = scene(223);
     let playback = Playback { start: START, ..Playback::of(&scene) };
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_queues", std::process::id()), &scene, &show, 1);
@@ -301,7 +302,7 @@ fn measure_queues() {
 fn measure_log() {
     let scene = scene(223);
     let playback = Playback { start: START, rate: 10_000.0, ..Playback::of(&scene) };
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let mut show = Show::new(&scene, timeline, playback).expect("200 s is before the contact");
     let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show, 1);

@@ -7,13 +7,14 @@ use std::time::Instant;
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::solve::Chain;
 use bench_dragon::show::scene::Scene;
 
 fn main() {
     let scene = Scene::paper();
     let began = Instant::now();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let exact = began.elapsed();
     let contact = timeline.find(EventKind::Contact).map_or(f64::NAN, |contact| contact.time);
 

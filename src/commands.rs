@@ -36,6 +36,8 @@ pub mod scene_argument;
 mod scene_facts;
 pub mod send;
 mod service_manager;
+pub mod sheets;
+mod signals;
 pub mod soak;
 pub mod soak_load_generator;
 pub mod solve;
@@ -48,11 +50,10 @@ pub mod write_manual;
 
 use duration::{seconds, wall_seconds};
 use new_file::NewFile;
+use signals::stop_on_signals;
 use std::ffi::OsString;
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anstyle::AnsiColor;
@@ -279,7 +280,7 @@ pub fn progress_bar(length: u64, common: &Common) -> ProgressBar {
 /// Returns all events of a scene, with a progress bar for the long searches.
 pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     let bar = progress_bar(1000, common).with_message("searching for contact");
-    let timeline = scene.ensemble.timeline(&mut |share| bar.set_position((1000.0 * share) as u64));
+    let timeline = scene.ensemble.timeline(&mut |share| signals::report(&bar, share));
     bar.finish_and_clear();
     warn_of_gap(&timeline);
     timeline
@@ -294,7 +295,8 @@ pub fn warn_of_doubts(scene: &Scene) {
 pub fn warn_of_gap(timeline: &Timeline) {
     if let Some(until) = timeline.searched_until() {
         log::warn!(
-            "the search for events gave up: searched up to t = {} s, later events may be missing",
+            "the search for events {}: searched up to t = {} s, later events may be missing",
+            signals::gave_up(),
             figure(until)
         );
     }
@@ -313,38 +315,6 @@ pub fn expect_exact_motion(scene: &Scene) -> Result<(), CommandError> {
     let sentence = "the scene names the solver \"paper\", whose head is too fast: only exact motion can be certified, \
                     expected motion.accuracy or another solver";
     Err(CommandError::BadInput(sentence.to_owned()))
-}
-
-/// Returns a flag that SIGINT, SIGTERM and SIGHUP set; SIGHUP unless it is ignored, as by `nohup`.
-///
-/// Call it before other threads start: from then on one thread receives these signals. iceoryx2 treats an interrupted
-/// system call as a failure.
-pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CommandError> {
-    use nix::sys::signal::{SigSet, Signal};
-    let stop = Arc::new(AtomicBool::new(false));
-    let hangup = if is_ignored(Signal::SIGHUP as i32) { None } else { Some(Signal::SIGHUP) };
-    let signals: SigSet = [Signal::SIGINT, Signal::SIGTERM].into_iter().chain(hangup).collect();
-    for signal in signals.iter() {
-        signal_hook::flag::register(signal as i32, Arc::clone(&stop))?;
-    }
-    std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-        // A parent such as `soak` may have them blocked, and a mask is inherited.
-        // No panic: this fails only for an unknown way to change the mask.
-        signals.thread_unblock().unwrap();
-        loop {
-            nix::unistd::pause();
-        }
-    })?;
-    signals.thread_block().map_err(io::Error::from)?;
-    Ok(stop)
-}
-
-/// Returns true if the parent process made this one ignore a signal, as `nohup` does.
-fn is_ignored(signal: i32) -> bool {
-    // proc(5): SigIgn is a mask in hexadecimal, the first signal its lowest bit.
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
-    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 /// Ends this program with a sentence if no page of shared memory is available, which Linux signals by SIGBUS. Other

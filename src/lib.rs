@@ -19,6 +19,7 @@
 //! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
 //! - `design`: a scene edited as text and as a picture.
 //! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
+//! - `sheets`: hand-outs for the people who carry the benches.
 
 #![deny(missing_docs)]
 
@@ -49,6 +50,8 @@ pub use bench_dragon_recording as recording;
 pub use bench_dragon_ros2 as ros2;
 #[cfg(feature = "library")]
 pub use bench_dragon_ros2_messages as ros2_messages;
+#[cfg(feature = "library")]
+pub use bench_dragon_sheets as sheets;
 #[cfg(feature = "library")]
 pub use bench_dragon_show as show;
 #[cfg(feature = "library")]

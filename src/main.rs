@@ -63,6 +63,9 @@ pub enum Command {
     /// Draw the stage at a time as an SVG
     #[command(arg = scene_argument())]
     Draw(commands::draw::DrawArguments),
+    /// Write hand-outs for the people who carry the benches, to print
+    #[command(arg = scene_argument())]
+    Sheets(commands::sheets::SheetsArguments),
     /// Measure accuracy against cost for every solver on this scene and machine
     #[command(arg = scene_argument())]
     Trade(commands::trade::TradeArguments),
@@ -143,6 +146,7 @@ fn main() -> ExitCode {
         Command::Solve(arguments) => commands::solve::solve(&common, arguments),
         Command::Events(arguments) => commands::events::events(&common, arguments),
         Command::Draw(arguments) => commands::draw::draw(&common, arguments),
+        Command::Sheets(arguments) => commands::sheets::sheets(&common, arguments),
         Command::Trade(arguments) => commands::trade::trade(&common, arguments),
         Command::Plan(arguments) => commands::plan::plan(&common, arguments),
         Command::Soak(arguments) => commands::soak::soak(&common, arguments),

@@ -13,6 +13,7 @@ use bench_dragon::client::clock::SystemClock;
 use bench_dragon::client::connection::{Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::messages::state::FrameState;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::publisher::live::control::{CommandQueues, command_queue};
 use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::live::statistics::queues;
@@ -106,7 +107,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
         end_hold: 0.0,
         ..Playback::of(&scene)
     };
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show = Show::new(&scene, timeline, playback).unwrap();
     let name = format!("test_{}_allocation", std::process::id());
     let stage = stage(1, 0, [0; 32], &scene.ensemble, &show);

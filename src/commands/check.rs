@@ -12,14 +12,16 @@ use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::timeline::{TimedObstacleClearance, Timeline};
+use bench_dragon::show::requirements::{Bounds, Searched, verdicts};
 use bench_dragon::show::results::{clearance_lines, event_sentence};
 use bench_dragon::show::scene::{Scene, printable};
 use bench_dragon::show::timed_cues;
+
 use description::describe;
 use parts::{Found, Parts};
-use required::{Searched, Verdicts};
 
-use super::events::{bench_name, find_least_clearance, least_clearance, least_clearance_between};
+use super::events::{bench_name, find_least_clearance, known, least_clearance, least_clearance_between};
+use super::signals::{gave_up, report, stop_searches_on_signals, unstopped};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
 use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline};
@@ -59,6 +61,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     if arguments.prove {
         expect_exact_motion(&scene)?;
     }
+    stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
     let covered = arguments.covered(&scene, &timeline, common)?;
@@ -67,7 +70,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         output.json(&covered.line())?;
     }
     if common.json && covered.is_some() && !arguments.prove {
-        return output.finish();
+        return output.finish().and(unstopped());
     }
     if !common.json {
         describe(&scene, &warnings(&scene, &timeline), &mut output)?;
@@ -78,8 +81,9 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     let least: Found<'_> = (found.of_show, &beside);
     let prove = || Parts::enclosed((&scene, &text.text), timeline.end(), least, arguments.certify.as_deref(), common);
     let parts = arguments.prove.then(prove).transpose()?;
-    let searched = Searched { timeline: &timeline, boards: found.of_show, obstacles: &beside };
-    let verdicts = Verdicts::of(&scene, &searched, parts.as_ref());
+    let searched = Searched { timeline: &timeline, boards: found.of_show, obstacles: &beside, gave_up: gave_up() };
+    let bounds = parts.as_ref().map(|parts| |obstacle: Option<&str>| parts.bounds(obstacle));
+    let verdicts = verdicts(&scene, &searched, bounds.as_ref().map(|bounds| bounds as Bounds<'_>));
     if common.json {
         match &parts {
             Some(parts) => parts.print_lines(&mut output)?,
@@ -88,8 +92,8 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
                 lines.iter().try_for_each(|line| output.json(line))?;
             }
         }
-        verdicts.print_lines(&mut output)?;
-        return output.finish().and(verdicts.result());
+        required::print_lines(&verdicts, &mut output)?;
+        return output.finish().and(unstopped()).and(required::result(&verdicts));
     }
     output.line(&format!("  {}", least_clearance(&scene, found.of_show)))?;
     if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show) {
@@ -102,7 +106,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         parts.iter().try_for_each(|parts| parts.print_unnamed(Some(name), &mut output))?;
     }
     parts.iter().try_for_each(|parts| parts.print_named(&mut output))?;
-    verdicts.print(&mut output)?;
+    required::print(&verdicts, &mut output)?;
     if let Some(covered) = covered {
         output.line(&format!("  {}", covered.sentence()))?;
     }
@@ -112,14 +116,17 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             output.line(&format!("    {sentence}."))?;
         }
     }
-    output.finish().and(verdicts.result())
+    output.finish().and(unstopped()).and(required::result(&verdicts))
 }
 
 /// Prints the events and the cues.
 fn ahead(scene: &Scene, timeline: &Timeline, output: &mut Output) -> Result<(), CommandError> {
     output.line("  Ahead, in simulated time:")?;
-    for timed in &timeline.all() {
+    for timed in &known(timeline) {
         output.line(&format!("  {}", event_sentence(scene, timed)))?;
+    }
+    if timeline.is_stopped() {
+        return Ok(());
     }
     for cue in cues(scene, timeline) {
         output.line(&format!("  {cue}"))?;
@@ -145,7 +152,7 @@ fn warnings(scene: &Scene, timeline: &Timeline) -> Vec<String> {
 /// Searches for the least clearance of each obstacle over the whole route.
 fn obstacle_clearances(scene: &Scene, timeline: &Timeline, common: &Common) -> Vec<TimedObstacleClearance> {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance of the obstacles");
-    let mut progress = |share: f64| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let found = scene.ensemble.obstacle_clearances(timeline.end(), &mut progress);
     bar.finish_and_clear();
     found
@@ -157,7 +164,7 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
     let Obstacle { name, keep_out, .. } = &scene.ensemble.ground().obstacles()[obstacle];
     let (at, bench) = (figure(time), bench_name(scene, least.bench));
     let up_to = searched_until
-        .map_or(String::new(), |until| format!(" up to t = {} s, where the search gave up", figure(until)));
+        .map_or(String::new(), |until| format!(" up to t = {} s, where the search {}", figure(until), gave_up()));
     let distance = figure(least.value + keep_out);
     let beyond = match (*keep_out > 0.0, least.value < 0.0) {
         (false, _) => String::new(),

@@ -12,6 +12,7 @@ use bench_dragon::show::scene::{Accepted, Scene};
 use bench_dragon::show::solve_at_or_just_before;
 use serde::Serialize;
 
+use super::signals::{stop_searches_on_signals, unstopped};
 use super::solve::time_of;
 use super::swept::{Benches, Stretch, benches, swept};
 use super::{
@@ -116,7 +117,9 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
     let scene = common.load_scene()?;
     warn_of_doubts(&scene);
     let look = arguments.look.look()?;
+    stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
+    unstopped()?;
     let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);
     let many = &arguments.many;
     match (many.every, &many.until) {
@@ -192,6 +195,7 @@ impl<'a> Session<'a> {
     }
 
     fn solve(&mut self, time: f64) -> Result<(), CommandError> {
+        unstopped()?;
         let solver = self.solver.as_mut();
         let time = solve_at_or_just_before(solver, time, &mut self.chain)
             .map_err(|none| CommandError::Failed(format!("at {} s: {none}", figure(time))))?;

@@ -6,13 +6,14 @@ use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Stat
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ensemble::LeastClearances;
 use bench_dragon::motion::event::Event;
-use bench_dragon::motion::timeline::{TimedClearance, Timeline};
+use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
 pub use bench_dragon::show::results::bench_name;
 use bench_dragon::show::results::{EventLine, event_sentence, obstacle_label};
 use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
 use super::certificate_file::CertificateFile;
+use super::signals::{gave_up, report, stop_searches_on_signals, unstopped};
 use super::{CommandError, Common, Output, expect_exact_motion, figure, progress_bar, search_timeline, warn_of_doubts};
 
 /// Arguments of `events`.
@@ -44,6 +45,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     let text = common.scene_text()?;
     let scene = text.parse()?;
     warn_of_doubts(&scene);
+    stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     let proved = match &arguments.certify {
         Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),
@@ -64,7 +66,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     let outcome = |event: &Event| outcome_of(event.kind, number(event), &dragons_of(&scene, event));
     let status = |event: &Event| Some(&outcome(event)?.status);
     let mut output = Output::standard();
-    for timed in &timeline.all() {
+    for timed in &known(&timeline) {
         if common.json {
             let enclosure = status(&timed.event).map(enclosure);
             output.json(&Line { event: EventLine::new(&scene, timed), enclosure })?;
@@ -77,7 +79,7 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     }
     if !common.json {
         let until = match timeline.searched_until() {
-            Some(time) => format!("up to t = {} s, where the search gave up", figure(time)),
+            Some(time) => format!("up to t = {} s, where the search {}", figure(time), gave_up()),
             None => "before the motion ends".to_owned(),
         };
         let obstacle = (!scene.ensemble.ground().is_empty()).then_some(EventKind::Obstacle);
@@ -108,9 +110,17 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
                 output.line(&proof_sentence(EventKind::Obstacle, status))?;
             }
         }
-        output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).of_show))?;
+        if !timeline.is_stopped() {
+            output.line(&least_clearance(&scene, find_least_clearance(&scene, &timeline, common).of_show))?;
+        }
     }
-    output.finish()
+    output.finish().and(unstopped())
+}
+
+/// Returns the events in order of time; of a search that was stopped, those up to where it came.
+pub fn known(timeline: &Timeline) -> Vec<TimedEvent> {
+    let until = timeline.searched_until().filter(|_| timeline.is_stopped());
+    timeline.all().into_iter().filter(|timed| until.is_none_or(|until| timed.time <= until)).collect()
 }
 
 /// Returns the dragons with names that an event is about, in their order.
@@ -144,7 +154,7 @@ fn certified(
     let mut certificate = CertificateFile::create(file)?;
     let bar = progress_bar(1000, common).with_message("proving");
     let mut write = |line: &certify::CertificateLine| certificate.write(line);
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let (ensemble, most_steps) = (&scene.ensemble, MOST_STEPS);
     let outcomes = certify::certify(ensemble, timeline, text, most_steps, &mut write, &mut progress);
     bar.finish_and_clear();
@@ -184,7 +194,7 @@ fn proof_sentence(kind: EventKind, status: &Status) -> String {
 /// the show stops earlier.
 pub fn find_least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> LeastClearances {
     let bar = progress_bar(1000, common).with_message("searching for the least clearance");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let found = scene.ensemble.least_clearances(timeline, timeline.end(), &mut progress);
     bar.finish_and_clear();
     found
@@ -193,12 +203,12 @@ pub fn find_least_clearance(scene: &Scene, timeline: &Timeline, common: &Common)
 /// Returns a sentence for people on the least clearance of the whole route.
 pub fn least_clearance(scene: &Scene, found: Option<TimedClearance>) -> String {
     let Some(TimedClearance { least, time, searched_until }) = found else {
-        return "The least clearance of the whole route is not computed: there are no two benches that could meet, or the search gave up.".to_owned();
+        return "The least clearance of the whole route is not computed: there are no two benches that could meet, or the search gave up or was stopped.".to_owned();
     };
     let (first, second) = (bench_name(scene, least.bench_a), bench_name(scene, least.bench_b));
     let (value, time) = (figure(least.value), figure(time));
     let of = searched_until.map_or("of the whole route".to_owned(), |until| {
-        format!("up to t = {} s, where the search gave up,", figure(until))
+        format!("up to t = {} s, where the search {},", figure(until), gave_up())
     });
     format!("The least clearance {of} is {value} m, at t = {time} s, between {first} and {second} (counting from 1).")
 }

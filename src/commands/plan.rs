@@ -16,6 +16,7 @@ use serde::Serialize;
 use super::certificate_file::CertificateFile;
 use super::events::bench_name;
 use super::scene_argument::scene_argument;
+use super::signals::{are_searches_stopped, report, stop_searches_on_signals, unstopped};
 use super::{CommandError, Common, Output, expect_exact_motion, number, progress_bar, search_timeline};
 
 /// Arguments of `plan`.
@@ -84,8 +85,23 @@ struct SpeedLine {
     ratio: f64,
 }
 
+/// Returns the status of a JSON line.
+fn status(proved: bool) -> &'static str {
+    match (proved, are_searches_stopped()) {
+        (true, _) => "proved",
+        (false, true) => "stopped",
+        (false, false) => "given_up",
+    }
+}
+
+/// Returns the words for the end of a search that came to no end.
+fn given_up() -> &'static str {
+    if are_searches_stopped() { "was stopped" } else { "was given up" }
+}
+
 /// Plans the pitch, the speed or the turn.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
+    stop_searches_on_signals()?;
     match &arguments.question {
         Question::Pitch { reach_radius, certify } => plan_pitch(common, *reach_radius, certify.as_deref()),
         Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
@@ -99,7 +115,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
     let (scene, motion) = text.parse_only()?;
     warn_of_obstacles(&scene);
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let found = if let Some(file) = file {
         let mut certificate = CertificateFile::create(file)?;
         let mut write = |line: &CertificateLine| certificate.write(line);
@@ -113,7 +129,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
     let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;
     let mut output = Output::standard();
     if common.json {
-        let status = if proved { "proved" } else { "given_up" };
+        let status = status(proved);
         let (bench_a, bench_b) = (overlap.map(|overlap| overlap.bench_a), overlap.map(|overlap| overlap.bench_b));
         let (value, head_radius) = (value_hi, overlap.map(|overlap| overlap.head_radius));
         let value_lo = (intervals > 0).then_some(value_lo);
@@ -128,7 +144,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
             bench_b,
             head_radius,
         })?;
-        return output.finish();
+        return output.finish().and(unstopped());
     }
     if let Some(value_hi) = value_hi {
         output.line(&format!(
@@ -145,7 +161,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
     let blocked = format!(
         "with every pitch from {from} m to {value_lo} m two boards overlap, or a link locks, before {radius} m"
     );
-    let searched = format!("the search was given up after {intervals} intervals of pitches");
+    let searched = format!("the search {} after {intervals} intervals of pitches", given_up());
     output.line(&match value_hi {
         Some(value_hi) if proved => format!(
             "Proved in {intervals} intervals of pitches: the least such pitch is from {value_lo} to {value_hi} m. Pitches below \
@@ -157,9 +173,9 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
         ),
         Some(_) => "Not decided: it could not be proved that no smaller pitch will do.".to_owned(),
         None if intervals > 0 => format!("Not decided: {searched}. What is proved: {blocked}."),
-        None => "Not decided: the search was given up, and nothing is proved.".to_owned(),
+        None => format!("Not decided: the search {}, and nothing is proved.", given_up()),
     })?;
-    output.finish()
+    output.finish().and(unstopped())
 }
 
 fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), CommandError> {
@@ -168,8 +184,9 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
     let (scene, _) = text.parse_only()?;
     expect_exact_motion(&scene)?;
     let timeline = search_timeline(&scene, common);
+    unstopped()?;
     let bar = progress_bar(1000, common).with_message("searching for the fastest handle");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let found = if let Some(file) = file {
         let mut certificate = CertificateFile::create(file)?;
         let mut write = |line: &CertificateLine| certificate.write(line);
@@ -184,10 +201,10 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
     let GreatestSpeed { value_lo, value_hi, time, handle, ratio, proved, steps } = found;
     let mut output = Output::standard();
     if common.json {
-        let status = if proved { "proved" } else { "given_up" };
+        let status = status(proved);
         let value = value_lo;
         output.json(&SpeedLine { plan: "speed", status, value, value_lo, value_hi, time, handle, ratio })?;
-        return output.finish();
+        return output.finish().and(unstopped());
     }
     let limit = number(limit);
     output.line(&format!("No handle is faster than {limit} m/s while the head moves at {value_lo} m/s."))?;
@@ -200,11 +217,12 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
         format!("Proved in {steps} steps of the head: the greatest such speed is from {value_lo} to {value_hi} m/s.")
     } else {
         format!(
-            "Not decided: the search was given up after {steps} steps of the head. What is proved: the greatest such \
-             speed is from {value_lo} to {value_hi} m/s."
+            "Not decided: the search {} after {steps} steps of the head. What is proved: the greatest such \
+             speed is from {value_lo} to {value_hi} m/s.",
+            given_up()
         )
     })?;
-    output.finish()
+    output.finish().and(unstopped())
 }
 
 /// Warns that the obstacles of a scene change nothing.

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
@@ -105,7 +106,7 @@ pub fn run(common: &Common, arguments: &RunArguments) -> Result<(), CommandError
     let timeline = if scene.alerts.is_some() {
         search_timeline(&scene, common)
     } else {
-        let timeline = scene.ensemble.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
         warn_of_gap(&timeline);
         timeline
     };

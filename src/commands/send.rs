@@ -2,6 +2,7 @@
 
 #[cfg(feature = "ros2")]
 mod ros2;
+mod timecode;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::Ordering;
@@ -33,6 +34,8 @@ enum Kind {
     Psn(PsnArguments),
     /// OSC messages for show control: alerts, countdown, state, cues, the head
     Osc(OscArguments),
+    /// Timecode of which the show is the master: over the network, by MIDI, or as sound
+    Timecode(timecode::TimecodeArguments),
     /// ROS 2 topics, and with --control services that conduct the show; the settings are those of the show's scene, or
     /// of --scene
     #[command(arg = scene_argument())]
@@ -123,6 +126,7 @@ pub fn send(common: &Common, arguments: &SendArguments) -> Result<(), CommandErr
     match &arguments.kind {
         Kind::Psn(arguments) => psn(common, arguments),
         Kind::Osc(arguments) => osc(common, arguments),
+        Kind::Timecode(arguments) => timecode::timecode(common, arguments),
         #[cfg(feature = "ros2")]
         Kind::Ros2(arguments) => ros2::ros2(common, arguments),
         #[cfg(not(feature = "ros2"))]

@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use bench_dragon::messages::control::Command;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::show::scene::cue::{Cue, CueAction};
 use bench_dragon::show::scene::{OnContact, Scene};
 use bench_dragon::soak::conduct::ShowFacts;
@@ -55,7 +56,7 @@ pub fn conduct(common: &Common, arguments: &SoakLoadGeneratorArguments) -> Resul
 
 /// Returns the facts of a scene's show. Searches for its events.
 fn facts_of(scene: &Scene) -> ShowFacts {
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let timeline = if scene.alerts.is_some() { timeline } else { timeline.end_only() };
     let stops = scene.alerts.is_some() && scene.on_contact == OnContact::Stop;
     let cue = |cue: &Cue| Some((cue.time(&scene.ensemble, &timeline)?, cue.then == CueAction::Pause));

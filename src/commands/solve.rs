@@ -7,6 +7,7 @@ use bench_dragon::motion::solve::Chain;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::{solve_at_or_just_before, table};
 
+use super::signals::{are_searches_stopped, report, stop_searches_on_signals, unstopped};
 use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline, seconds};
 
 /// Arguments of `solve`.
@@ -35,8 +36,16 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
     let scene = common.load_scene()?;
     let searched = [EventKind::Contact, EventKind::Obstacle];
     let wants_contact = arguments.at.iter().any(|time| searched.iter().any(|kind| time.trim() == kind.name()));
-    let timeline =
-        if wants_contact { search_timeline(&scene, common) } else { scene.ensemble.timeline_without_contact() };
+    stop_searches_on_signals()?;
+    let timeline = if wants_contact {
+        search_timeline(&scene, common)
+    } else {
+        let bar = progress_bar(1000, common).with_message("searching for the end");
+        let timeline = scene.ensemble.timeline_without_contact(&mut |share| report(&bar, share));
+        bar.finish_and_clear();
+        timeline
+    };
+    unstopped()?;
     let (count, times) = arguments.times(&timeline)?;
     let mut solver = scene.ensemble.solver(scene.velocities);
     let mut chain = Chain::new(scene.ensemble.handles());
@@ -49,7 +58,7 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
     }
     let bar = progress_bar(count, common);
     let mut text = String::new();
-    for time in times {
+    for time in times.take_while(|_| !are_searches_stopped()) {
         if solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
             return Err(CommandError::Failed(format!("there is no solution at {} s", figure(time))));
         }
@@ -63,7 +72,11 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
         bar.inc(1);
     }
     bar.finish_and_clear();
-    output.finish()
+    if arguments.output.is_some() {
+        // A file with a part of the table would look complete.
+        unstopped()?;
+    }
+    output.finish().and(unstopped())
 }
 
 impl SolveArguments {

@@ -12,6 +12,7 @@ use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 use serde::Serialize;
 
+use super::signals::{report, stop_searches_on_signals, unstopped};
 use super::{CommandError, Common, Output, progress_bar, seconds, svg_file, warn_of_gap};
 
 /// Arguments of `trade`.
@@ -71,16 +72,19 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     if !scene.ensemble.ground().is_empty() {
         log::warn!("`trade` leaves out the obstacles of the scene: it measures handles and the boards' first contact");
     }
+    stop_searches_on_signals()?;
     let bar = progress_bar(1000, common);
     let mut output = Output::standard();
     let share = 1.0 / parts.len() as f64;
     for (k, part) in parts.iter().enumerate() {
-        let progress = |done: f64| bar.set_position((1000.0 * share * (k as f64 + done)) as u64);
+        let progress = |done: f64| report(&bar, share * (k as f64 + done));
         let Part { subject, .. } = part;
-        let timeline = Ensemble::alone(subject.motion.clone()).timeline(&mut |_| ());
+        let timeline = Ensemble::alone(subject.motion.clone()).timeline(&mut |_| progress(0.0));
         warn_of_gap(&timeline);
+        unstopped()?;
         bar.set_message("measuring");
         let measured = measure(subject, &timeline, &mut |done| progress(SOLVERS * done));
+        unstopped()?;
         let measurements = measured.map_err(CommandError::Failed)?;
         let displayed = if common.json && !arguments.wants_display() {
             Vec::new()
@@ -88,7 +92,9 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
             let frame_ns = publisher_frame_ns(subject, &timeline);
             let display = Display { rate: arguments.display_rate.unwrap_or(60.0), delay: arguments.delay, frame_ns };
             let mut progress = |done| progress(SOLVERS + (1.0 - SOLVERS) * done);
-            display::measure(subject, &timeline, display, &mut progress).map_err(CommandError::Failed)?
+            let displayed = display::measure(subject, &timeline, display, &mut progress);
+            unstopped()?;
+            displayed.map_err(CommandError::Failed)?
         };
         if k + 1 == parts.len() {
             bar.finish_and_clear();

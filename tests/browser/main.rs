@@ -7,6 +7,7 @@ mod harness;
 mod looks;
 mod proved;
 mod several;
+mod sheets;
 mod view;
 
 use std::io::Write;

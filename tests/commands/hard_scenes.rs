@@ -9,6 +9,7 @@ use bench_dragon::certify::plan::{greatest_speed, least_pitch};
 use bench_dragon::messages::state::EventKind::{self, Contact, Lock, PathEnd, Stall};
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
 use bench_dragon::motion::ensemble::Ensemble;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
 use bench_dragon::motion::model::team::Team;
@@ -25,7 +26,7 @@ fn scene(name: &str) -> Scene {
 }
 
 fn timeline(scene: &Scene) -> Timeline {
-    scene.ensemble.timeline(&mut |_| ())
+    scene.ensemble.timeline(&mut unreported)
 }
 
 /// Returns the time of an event and its benches.
@@ -67,7 +68,7 @@ fn a_team_that_is_pushed_back_stays_on_its_route() {
             let least = least_clearance_all_pairs(&chain, scene.ensemble.only().unwrap().team()).unwrap();
             sampled = sampled.min(least.value);
         }
-        let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).own.unwrap();
+        let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut unreported).own.unwrap();
         assert_eq!(least.searched_until, None);
         println!("{name}: least clearance {} m, sampled {sampled} m", least.least.value);
         assert!(least.least.value <= sampled && least.least.value > sampled - 0.05, "{name}: {least:?} {sampled}");
@@ -156,7 +157,7 @@ fn bends_as_wide_as_a_link_are_searched() {
         };
         let team = Team { benches: 4, head_length: link, body_length: link, width: 0.1 * link, hole_inset: 0.0 };
         let motion = Motion::new(description, team, 1.0, Method::Newton).unwrap();
-        let timeline = Ensemble::alone(motion).timeline(&mut |_| ());
+        let timeline = Ensemble::alone(motion).timeline(&mut unreported);
         assert_eq!(timeline.searched_until(), None, "link {link}, offset {offset}");
         // In a bend wider than the link, the rear handle always has a next place; in a narrower bend the link stalls
         // and locks.
@@ -175,7 +176,7 @@ fn bends_as_wide_as_a_link_are_searched() {
 #[test]
 fn a_plan_knows_that_a_scene_without_alerts_runs_into_its_lock() {
     let scene = scene("noalerts");
-    let error = greatest_speed(&scene, &timeline(&scene), 2.0, &mut |_| ()).unwrap_err().to_string();
+    let error = greatest_speed(&scene, &timeline(&scene), 2.0, &mut unreported).unwrap_err().to_string();
     assert!(error.contains("lock"), "{error}");
     let (_, printed, _) = answer(&["--scene", "tests/scenes/noalerts.toml", "check"]);
     let least = printed.lines().find(|line| line.contains("least clearance")).unwrap();
@@ -186,7 +187,7 @@ fn a_plan_knows_that_a_scene_without_alerts_runs_into_its_lock() {
 #[test]
 fn the_fastest_handle_is_the_highest_peak() {
     let scene = scene("plan_speed_wrong");
-    let plan = greatest_speed(&scene, &timeline(&scene), 1.0, &mut |_| ()).unwrap();
+    let plan = greatest_speed(&scene, &timeline(&scene), 1.0, &mut unreported).unwrap();
     assert!((plan.ratio - 3828.99).abs() < 0.1 && (plan.time - 8.325).abs() < 1e-3, "{plan:?}");
     // This near a lock, doubles enclose the peak, but not to a nanometre a second: no proof is claimed.
     let (lo, hi) = (plan.value_lo, plan.value_hi);
@@ -196,14 +197,15 @@ fn the_fastest_handle_is_the_highest_peak() {
 /// N8: boards that touch in a bend far outside with small pitches, and boards that overlap on a straight line.
 #[test]
 fn a_pitch_that_does_not_exist_is_refused_and_one_that_cannot_be_decided_is_not_stated() {
-    let error = least_pitch(scene("pp_16").ensemble.only().unwrap().team(), 4.5, &mut |_| ()).unwrap_err().to_string();
+    let error =
+        least_pitch(scene("pp_16").ensemble.only().unwrap().team(), 4.5, &mut unreported).unwrap_err().to_string();
     assert!(error.contains("no pitch"), "{error}");
     if !harness::long() {
         aloud("a pitch that cannot be decided: not without BENCH_DRAGON_LONG=1, it takes a minute");
         return;
     }
     // With the pitch of the scene, 2.4 m, boards touch (by brute force, as with all others up to 24 m).
-    let plan = least_pitch(scene("plan_pitch_wrong").ensemble.only().unwrap().team(), 1.2, &mut |_| ()).unwrap();
+    let plan = least_pitch(scene("plan_pitch_wrong").ensemble.only().unwrap().team(), 1.2, &mut unreported).unwrap();
     println!("{plan:?}");
     assert!(plan.value_lo > 2.4, "{plan:?}");
     assert!(plan.proved || plan.value_hi.is_none_or(|pitch| pitch > 24.0), "{plan:?}");

@@ -3,6 +3,7 @@
 mod bad_input;
 mod certify;
 mod check_cues;
+mod contest;
 mod draw;
 mod files;
 mod first_scene;
@@ -13,5 +14,6 @@ mod harness;
 mod packages;
 mod placement;
 mod require;
+mod sheets;
 mod swept;
 mod turn;

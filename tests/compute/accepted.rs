@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
 use bench_dragon::certify::{CertificateLine, ClearanceEnclosure, ClearanceHints, certify, certify_clearances};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::proof::{Proved, ProvedClearance, Status, Until, verify};
 use bench_dragon::show::scene::Scene;
 use fastrand::Rng;
@@ -147,9 +148,9 @@ fn certified(text: &str) -> Option<Vec<Status>> {
 /// The same with another limit of steps.
 fn certified_in(text: &str, most_steps: u64) -> Option<Vec<Status>> {
     let scene = Scene::parse(text, "tight", "tight").ok()?;
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let proved = accepted(text, |write| {
-        certify(&scene.ensemble, &timeline, text, most_steps, write, &mut |_| ()).unwrap();
+        certify(&scene.ensemble, &timeline, text, most_steps, write, &mut unreported).unwrap();
     });
     Some(proved.results.into_iter().map(|outcome| outcome.status).collect())
 }
@@ -182,15 +183,16 @@ fn clearance_certified(text: &str) -> Option<Until> {
 /// Returns a show's least clearance as the checker proves it, and as the search encloses it.
 fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosure>)> {
     let scene = Scene::parse(text, "tight", "tight").ok()?;
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show_end = timeline.show_end(scene.stops_at_contact());
-    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut |_| ()).own?.least;
+    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut unreported).own?.least;
     let mut enclosed = None;
     let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
     let proved = accepted(text, |write| {
         let most = MOST_STEPS / 4;
         enclosed =
-            certify_clearances(&scene.ensemble, show_end, hints, text, most, write, &mut |_| ()).unwrap().own[0].boards;
+            certify_clearances(&scene.ensemble, show_end, hints, text, most, write, &mut unreported).unwrap().own[0]
+                .boards;
     });
     Some((proved.least_clearance.unwrap(), enclosed))
 }
@@ -205,9 +207,9 @@ fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound() {
         let text = tight_route(&mut Rng::with_seed(0x10c6 + index));
         index += 1;
         let Ok(scene) = Scene::parse(&text, "tight", "tight") else { continue };
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         let show_end = timeline.show_end(scene.stops_at_contact());
-        let found = scene.ensemble.least_clearances(&timeline, show_end, &mut |_| ()).own;
+        let found = scene.ensemble.least_clearances(&timeline, show_end, &mut unreported).own;
         let lock = show_end.event.travelled;
         let is_at_lock = found.is_some_and(|found| found.least.travelled > lock - 1e-9);
         if show_end.event.kind != EventKind::Lock || !is_at_lock {
@@ -233,11 +235,11 @@ fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound() {
 /// one that is not decided.
 fn speed_certified(text: &str) -> bool {
     let Ok(scene) = Scene::parse(text, "tight", "tight") else { return false };
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let mut found = None;
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    if let Ok(Ok(speed)) = certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, &mut write, &mut |_| ()) {
+    if let Ok(Ok(speed)) = certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, &mut write, &mut unreported) {
         found = Some(speed);
     }
     let Some(speed) = found else { return false };
@@ -262,7 +264,7 @@ fn certificates_of_the_least_pitch_are_accepted() {
         let scene = Scene::parse(&text, "pitch", "pitch").unwrap();
         let (team, mut found) = (scene.ensemble.only().unwrap().team(), None);
         let proved = accepted(&text, |write| {
-            found = Some(certify_least_pitch(team, radius, &text, write, &mut |_| ()).unwrap().unwrap());
+            found = Some(certify_least_pitch(team, radius, &text, write, &mut unreported).unwrap().unwrap());
         });
         let (claim, found) = (proved.least_pitch.unwrap(), found.unwrap());
         println!("{claim:?} {found:?} {} steps", proved.steps);
@@ -412,21 +414,21 @@ fn changed_certificates_of_other_questions_are_refused() {
     let spiral = "[team]\nbenches = 40\nhead_length = 5.0\nbody_length = 1.0\nwidth = 0.1\nhole_inset = 0.1\n\
                   [path]\nkind = \"spiral\"\npitch = 0.6\nstart_turn = 12.0\n[motion]\nhead_speed = 1.0\n";
     let scene = Scene::parse(&route, "route", "route").unwrap();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show_end = timeline.show_end(scene.stops_at_contact());
-    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut |_| ()).own.unwrap().least;
+    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut unreported).own.unwrap().least;
     let clearance = written(|write| {
         let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
         let found =
-            certify_clearances(&scene.ensemble, show_end, hints, &route, MOST_STEPS, write, &mut |_| ()).unwrap();
+            certify_clearances(&scene.ensemble, show_end, hints, &route, MOST_STEPS, write, &mut unreported).unwrap();
         found.own[0].boards.unwrap();
     });
     let speed = written(|write| {
-        certify_greatest_speed(&scene, &timeline, 2.0, &route, 50_000, write, &mut |_| ()).unwrap().unwrap();
+        certify_greatest_speed(&scene, &timeline, 2.0, &route, 50_000, write, &mut unreported).unwrap().unwrap();
     });
     let on_spiral = Scene::parse(spiral, "spiral", "spiral").unwrap();
     let pitch = written(|write| {
-        certify_least_pitch(on_spiral.ensemble.only().unwrap().team(), 1.5, spiral, write, &mut |_| ())
+        certify_least_pitch(on_spiral.ensemble.only().unwrap().team(), 1.5, spiral, write, &mut unreported)
             .unwrap()
             .unwrap();
     });
@@ -465,9 +467,9 @@ fn a_speed_beyond_the_end_of_the_path_is_refused() {
                 [motion]\nhead_speed = 1.0\n[path]\nkind = \"pieces\"\npieces = [\
                 { kind = \"arc\", radius = 1.5, side = \"left\", turns = 0.3 }, { kind = \"line\", length = 2.0 }]\n";
     let scene = Scene::parse(text, "route", "route").unwrap();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let lines = written(|write| {
-        certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, write, &mut |_| ()).unwrap().unwrap();
+        certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, write, &mut unreported).unwrap().unwrap();
     });
     let lines = String::from_utf8(lines).unwrap();
     verify(lines.as_bytes(), &mut |_| ()).unwrap();
@@ -492,9 +494,9 @@ fn a_speed_on_a_circle_hardly_wider_than_the_link_is_accepted() {
                 { kind = \"arc\", radius = 0.3490297751698467, side = \"left\", turns = 0.5 }, \
                 { kind = \"arc\", radius = 0.3612451762601705, side = \"right\", turns = 0.75 }]\n";
     let scene = Scene::parse(text, "route", "route").unwrap();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let lines = written(|write| {
-        certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, write, &mut |_| ()).unwrap().unwrap();
+        certify_greatest_speed(&scene, &timeline, 2.0, text, 50_000, write, &mut unreported).unwrap().unwrap();
     });
     verify(lines.as_slice(), &mut |_| ()).unwrap();
 }

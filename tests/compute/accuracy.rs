@@ -10,6 +10,7 @@ use std::path::Path;
 
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
 use bench_dragon::motion::ensemble::Ensemble;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
 use bench_dragon::motion::model::team::Team;
@@ -105,7 +106,7 @@ fn assert_kept(motion: &Motion, accuracy: f64, solver: &mut dyn Solver, times: &
 fn every_accuracy_is_kept_on_every_scene_and_a_coarser_one_costs_no_more() {
     for name in SCENES {
         let scene = scene(name);
-        let end = scene.ensemble.timeline_without_contact().end().time;
+        let end = scene.ensemble.timeline_without_contact(&mut unreported).end().time;
         let times =
             other_times(scene.ensemble.only().unwrap(), end, if scene.ensemble.benches() > 1000 { 12 } else { 120 });
         let mut cost = (f64::INFINITY, usize::MAX);
@@ -134,7 +135,7 @@ fn every_instruction_set_keeps_every_accuracy_against_the_reference() {
         let scene = scene(name);
         let motion = scene.ensemble.only().unwrap();
         let mut reference = Reference::new(*motion.team(), motion.description(), motion.head_speed()).unwrap();
-        let end = scene.ensemble.timeline_without_contact().end().time;
+        let end = scene.ensemble.timeline_without_contact(&mut unreported).end().time;
         let moments = [0.0, 0.291, 0.613, 0.987].map(|share| (share * end, reference.handles(share * end).unwrap()));
         // The other accuracies select no table in mixed precision of order 3.
         let accuracies = ACCURACIES.into_iter().chain([1e-5]);
@@ -219,7 +220,7 @@ fn events_do_not_depend_on_the_accuracy() {
         let scene = scene(name);
         let timeline = |accuracy| {
             let ensemble = scene.ensemble.try_map(|motion| motion.with_method(Method::Accuracy(accuracy)));
-            ensemble.unwrap().timeline(&mut |_| ())
+            ensemble.unwrap().timeline(&mut unreported)
         };
         assert_eq!(timeline(1e-2), timeline(1e-18), "{name}");
     }
@@ -230,7 +231,7 @@ fn events_do_not_depend_on_the_accuracy() {
 fn the_live_clearance_is_that_of_the_frame() {
     for name in ["paper", "turnaround", "procession", "school"] {
         let scene = scene(name);
-        let end = scene.ensemble.timeline_without_contact().end().time;
+        let end = scene.ensemble.timeline_without_contact(&mut unreported).end().time;
         for accuracy in [1e-2, 1e-4, 1e-6] {
             let motion = scene.ensemble.only().unwrap().with_method(Method::Accuracy(accuracy)).unwrap();
             let mut choice = motion.solver(Velocities::Omitted);
@@ -295,7 +296,7 @@ fn random_paths_keep_every_accuracy() {
     let tables = std::cell::Cell::new(0);
     TestRunner::new(config)
         .run(&motions(), |motion| {
-            let end = Ensemble::alone(motion.clone()).timeline_without_contact().end().time;
+            let end = Ensemble::alone(motion.clone()).timeline_without_contact(&mut unreported).end().time;
             if end > 0.0 {
                 let times = other_times(&motion, end, 30);
                 for accuracy in [1e-9, 1e-6, 1e-4, 1e-2] {

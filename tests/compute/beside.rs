@@ -7,6 +7,7 @@
 use bench_dragon::certify::{
     CertificateLine, ClearanceEnclosures, ClearanceHints, ObstacleEnclosure, certify_clearances,
 };
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::model::shape::ShapeKind;
 use bench_dragon::motion::timeline::TimedObstacleClearance;
@@ -37,17 +38,18 @@ struct Enclosed {
 
 fn enclosed(text: &str) -> Enclosed {
     let scene = Scene::parse(text, "beside", "beside").unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show_end = *timeline.show_end(scene.stops_at_contact());
-    let boards = scene.ensemble.least_clearances(&timeline, &show_end, &mut |_| ()).own.map(|found| found.least);
-    let found = scene.ensemble.obstacle_clearances(&show_end, &mut |_| ());
+    let boards = scene.ensemble.least_clearances(&timeline, &show_end, &mut unreported).own.map(|found| found.least);
+    let found = scene.ensemble.obstacle_clearances(&show_end, &mut unreported);
     let hints = ClearanceHints { boards: boards.as_ref(), obstacles: &found };
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    let enclosures = certify_clearances(&scene.ensemble, &show_end, hints, text, MOST_STEPS, &mut write, &mut |_| ())
-        .unwrap()
-        .own
-        .remove(0);
+    let enclosures =
+        certify_clearances(&scene.ensemble, &show_end, hints, text, MOST_STEPS, &mut write, &mut unreported)
+            .unwrap()
+            .own
+            .remove(0);
     let lines = String::from_utf8(lines).unwrap();
     Enclosed { found, enclosures, end: show_end.event.travelled, lines, scene }
 }

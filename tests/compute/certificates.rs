@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bench_dragon::certify::{CertifiedEvent, MOST_STEPS, Status, certify};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::Scene;
 
@@ -22,8 +23,8 @@ const STEPS_IN_VAIN: u64 = 1000;
 
 /// Returns the outcomes of a scene, contact first, and the ordinary events.
 fn outcomes(scene: &Scene, most_steps: u64) -> (Vec<CertifiedEvent>, Timeline) {
-    let timeline = scene.ensemble.timeline(&mut |_| ());
-    let mut outcomes = certify(&scene.ensemble, &timeline, "", most_steps, &mut |_| Ok(()), &mut |_| ()).unwrap();
+    let timeline = scene.ensemble.timeline(&mut unreported);
+    let mut outcomes = certify(&scene.ensemble, &timeline, "", most_steps, &mut |_| Ok(()), &mut unreported).unwrap();
     // The outcomes of obstacles are compared in `staged`.
     outcomes.retain(|outcome| outcome.event != EventKind::Obstacle);
     assert_eq!(outcomes.iter().map(|outcome| outcome.event).collect::<Vec<_>>(), KINDS);
@@ -243,7 +244,7 @@ fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     // it, they pass, and touch further in.
     const REACH: f64 = 2.0;
     let team = *Scene::paper().ensemble.only().unwrap().team();
-    let least = bench_dragon::certify::plan::least_pitch(&team, REACH, &mut |_| ()).unwrap().value_lo;
+    let least = bench_dragon::certify::plan::least_pitch(&team, REACH, &mut unreported).unwrap().value_lo;
     let contact = |pitch: f64| {
         let scene = paper_with("pitch", &pitch.to_string());
         let (outcomes, timeline) = outcomes(&scene, MOST_STEPS);
@@ -285,7 +286,7 @@ fn the_rounding_mode_of_the_processor_changes_nothing() {
         // SAFETY: the register is set back before anything else runs, and the code in between is meant to hold in any
         // mode.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &changed) };
-        let outcomes = certify(&scene.ensemble, &timeline, "", STEPS, &mut |_| Ok(()), &mut |_| ());
+        let outcomes = certify(&scene.ensemble, &timeline, "", STEPS, &mut |_| Ok(()), &mut unreported);
         // SAFETY: as above.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &usual) };
         let outcomes = outcomes.unwrap();

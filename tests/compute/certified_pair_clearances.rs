@@ -8,6 +8,7 @@ use bench_dragon::certify::{
 };
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ensemble::Ensemble;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::proof::{Proved, ProvedClearance, Refused, Until, verify};
 use bench_dragon::show::scene::Scene;
 use fastrand::Rng;
@@ -23,10 +24,10 @@ const ROUNDING: f64 = 1e-10;
 fn certificate(text: &str, scene: &Scene) -> (EnsembleClearances, String) {
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    let (ensemble, timeline) = (&scene.ensemble, scene.ensemble.timeline(&mut |_| ()));
+    let (ensemble, timeline) = (&scene.ensemble, scene.ensemble.timeline(&mut unreported));
     let show_end = timeline.show_end(scene.stops_at_contact());
     let hints = ClearanceHints { boards: None, obstacles: &[] };
-    let found = certify_clearances(ensemble, show_end, hints, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    let found = certify_clearances(ensemble, show_end, hints, text, MOST_STEPS, &mut write, &mut unreported).unwrap();
     (found, String::from_utf8(lines).unwrap())
 }
 
@@ -103,7 +104,7 @@ fn compare(ensemble: &Ensemble, claim: &ProvedClearance, (end, stated): (f64, Op
 }
 
 fn ends_with_a_contact_of_two(scene: &Scene) -> bool {
-    let end = scene.ensemble.timeline(&mut |_| ()).show_end(true).event;
+    let end = scene.ensemble.timeline(&mut unreported).show_end(true).event;
     let dragon = |bench: Option<u32>| Some(scene.ensemble.owner(bench? as usize)?.0);
     end.kind == EventKind::Contact && dragon(end.bench_a) != dragon(end.bench_b)
 }
@@ -128,7 +129,7 @@ fn least_clearances_of_random_pairs_are_proved() {
         let (found, lines) = certificate(&text, &scene);
         let proved = check(&lines).unwrap_or_else(|refused| panic!("{cases}: {refused}\n{text}"));
         assert_eq!(proved.least_clearances.len(), 3, "{text}");
-        let (ensemble, timeline) = (&scene.ensemble, scene.ensemble.timeline(&mut |_| ()));
+        let (ensemble, timeline) = (&scene.ensemble, scene.ensemble.timeline(&mut unreported));
         let end = timeline.show_end(scene.stops_at_contact()).time;
         let own_time = |dragon: usize| {
             let (boards, dragon) = (found.own[dragon].boards?, &ensemble.dragons()[dragon]);
@@ -251,9 +252,9 @@ fn the_example_scenes_of_several_dragons_have_proved_clearances() {
         let proved = check(&lines).unwrap();
         println!("{name}: {} bytes, {:?}", lines.len(), proved.least_clearances);
         let ensemble = &scene.ensemble;
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         let show_end = timeline.show_end(scene.stops_at_contact());
-        let least = ensemble.least_clearances(&timeline, show_end, &mut |_| ());
+        let least = ensemble.least_clearances(&timeline, show_end, &mut unreported);
         assert!(found.own.iter().all(|own| own.boards.is_some_and(|own| own.until.is_none())), "{:?}", found.own);
         let BetweenEnclosure { lo, hi, until, .. } = found.between[0];
         let (value, room) = (least.between.unwrap().least.value, 1e-9);

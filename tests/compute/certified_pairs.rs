@@ -5,6 +5,7 @@
 
 use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::messages::state::EventKind as Kind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::proof::{EventKind, Proved, ProvedEvent, Refused, Status, verify};
 use bench_dragon::show::scene::Scene;
 use fastrand::Rng;
@@ -17,8 +18,8 @@ const MOST_STEPS: u64 = 20_000;
 fn certificate(text: &str, scene: &Scene) -> String {
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    let timeline = scene.ensemble.timeline(&mut |_| ());
-    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    let timeline = scene.ensemble.timeline(&mut unreported);
+    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut unreported).unwrap();
     String::from_utf8(lines).unwrap()
 }
 
@@ -57,7 +58,7 @@ fn first_contacts_of_random_pairs_are_proved() {
         cases += 1;
         let (scene, proved) = proved(&text);
         assert_eq!((proved.dragons.len(), proved.results.len()), (2, 9), "{text}");
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         let found = timeline.find(Kind::Contact).map(|timed| timed.time);
         let Some(first) = first_contact(&proved) else {
             if contacts(&proved).any(|result| result.status == Status::Undecided) {
@@ -177,7 +178,7 @@ fn the_example_scenes_of_several_dragons_are_proved() {
             println!("{name}: {result:?}");
             assert_ne!(result.status, Status::Undecided, "{name}: {result:?}");
         }
-        let found = scene.ensemble.timeline(&mut |_| ()).find(Kind::Contact).map(|timed| timed.time);
+        let found = scene.ensemble.timeline(&mut unreported).find(Kind::Contact).map(|timed| timed.time);
         match (found, first_contact(&shown)) {
             (Some(time), Some(first)) => {
                 assert!(first.time_lo.unwrap() <= time + 1e-9 && time - 1e-9 <= first.time_hi.unwrap(), "{first:?}");

@@ -1,7 +1,10 @@
 //! The error at the time of display, compared with figures that an independent program measured.
 
+use std::ops::ControlFlow;
+
 use bench_dragon::motion::Method;
 use bench_dragon::motion::ensemble::Ensemble;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::Subject;
@@ -18,8 +21,12 @@ fn paper(velocities: Velocities) -> Subject {
 fn measured(subject: &Subject, delay: Option<f64>) -> Vec<DisplayMeasurement> {
     let display = Display { rate: 60.0, delay, frame_ns: 1000.0 };
     let mut shares = vec![0.0];
-    let timeline = Ensemble::alone(subject.motion.clone()).timeline(&mut |_| ());
-    let measured = measure(subject, &timeline, display, &mut |share| shares.push(share));
+    let timeline = Ensemble::alone(subject.motion.clone()).timeline(&mut unreported);
+    let mut report = |share| {
+        shares.push(share);
+        ControlFlow::Continue(())
+    };
+    let measured = measure(subject, &timeline, display, &mut report);
     assert!(shares.is_sorted() && shares.last() == Some(&1.0), "{shares:?}");
     measured.unwrap()
 }

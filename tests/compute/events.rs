@@ -3,6 +3,7 @@
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::show::scene::Scene;
@@ -14,7 +15,7 @@ fn scene(text: &str) -> Scene {
 #[test]
 fn the_paper_scene_has_its_events_as_with_50_digits() {
     let started = std::time::Instant::now();
-    let timeline = Scene::paper().ensemble.timeline(&mut |_| ());
+    let timeline = Scene::paper().ensemble.timeline(&mut unreported);
     println!("found in {:?}", started.elapsed());
     let found: Vec<_> =
         timeline.events().iter().map(|timed| (timed.event.kind, timed.event.bench_a, timed.event.bench_b)).collect();
@@ -31,7 +32,7 @@ fn the_paper_scene_has_its_events_as_with_50_digits() {
 #[test]
 fn the_papers_own_motion_touches_earlier() {
     let text = include_str!("../../config/paper.toml").replace("accuracy = 1e-9", "solver = \"paper\"");
-    let timeline = scene(&text).ensemble.timeline(&mut |_| ());
+    let timeline = scene(&text).ensemble.timeline(&mut unreported);
     let contact = timeline.find(EventKind::Contact).unwrap();
     // The paper prints 412.5 s; this is the exact contact of its own model.
     assert!((contact.time - 412.414901).abs() < 1e-6, "{}", contact.time);
@@ -44,7 +45,7 @@ fn a_contact_just_before_the_lock_is_found() {
                 hole_inset = 0.17921771164504968\n[path]\nkind = \"spiral\"\npitch = 0.7961849666936323\n\
                 start_turn = 5.774603178083499\n[motion]\nhead_speed = 1.0\n[alerts]\n";
     let scene = Scene::parse(text, "random", "random").unwrap();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let contact = timeline.find(EventKind::Contact).expect("sampling sees them overlap at 77.6728 m").event;
     assert!(contact.travelled > 77.585 && contact.travelled < 77.6728, "{contact:?}");
     let mut chain = Chain::new(scene.ensemble.handles());
@@ -57,6 +58,6 @@ fn a_contact_just_before_the_lock_is_found() {
     newton.solve_at(contact.travelled, &mut chain).unwrap();
     let clearance = least_clearance_all_pairs(&chain, scene.ensemble.only().unwrap().team()).unwrap().value;
     assert!(clearance.abs() < 1e-12, "{clearance:e}");
-    let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).own.unwrap();
+    let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut unreported).own.unwrap();
     assert!(least.least.value < 1e-12, "{least:?}");
 }

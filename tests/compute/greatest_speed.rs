@@ -5,6 +5,7 @@ use crate::tables;
 
 use bench_dragon::certify::plan::{GreatestSpeed, greatest_speed};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::reference::Reference;
 use bench_dragon::motion::solve::{Chain, Velocities};
@@ -21,7 +22,7 @@ fn load(name: &str) -> Scene {
 }
 
 fn plan(scene: &Scene, timeline: &Timeline) -> GreatestSpeed {
-    greatest_speed(scene, timeline, LIMIT, &mut |_| ()).unwrap()
+    greatest_speed(scene, timeline, LIMIT, &mut unreported).unwrap()
 }
 
 /// Returns the greatest speed of any handle over the head's at `travelled` metres, and the speed of `handle`.
@@ -63,9 +64,9 @@ fn the_scenes_of_the_repository_are_proved_to_a_nanometre_a_second() {
     for name in ["paper", "school", "tight", "wide", "turnaround", "procession", "long"] {
         let scene = load(name);
         let timeline = if name == "long" {
-            scene.ensemble.timeline_without_contact()
+            scene.ensemble.timeline_without_contact(&mut unreported)
         } else {
-            scene.ensemble.timeline(&mut |_| ())
+            scene.ensemble.timeline(&mut unreported)
         };
         let show_end = timeline.show_end(scene.stops_at_contact());
         if show_end.event.kind == EventKind::Lock {
@@ -87,7 +88,7 @@ fn the_scenes_of_the_repository_are_proved_to_a_nanometre_a_second() {
 #[test]
 fn on_the_way_in_nothing_is_faster_than_the_head() {
     let scene = Scene::paper();
-    let plan = plan(&scene, &scene.ensemble.timeline(&mut |_| ()));
+    let plan = plan(&scene, &scene.ensemble.timeline(&mut unreported));
     assert_eq!((plan.value_lo, plan.value_hi, plan.handle, plan.ratio), (LIMIT, LIMIT, 0, 1.0));
 }
 
@@ -95,7 +96,7 @@ fn on_the_way_in_nothing_is_faster_than_the_head() {
 #[ignore = "tests/run --all"]
 fn tables_of_50_digits_and_the_reference_agree_with_the_turnaround() {
     let scene = load("turnaround");
-    let plan = plan(&scene, &scene.ensemble.timeline(&mut |_| ()));
+    let plan = plan(&scene, &scene.ensemble.timeline(&mut unreported));
     let (least, most) = (LIMIT / plan.value_hi, LIMIT / plan.value_lo);
     let rows = tables::table(include_str!("../truth/turnaround_table.csv"));
     let greatest = rows.iter().map(|row| row.speed).fold(0f64, f64::max);
@@ -144,10 +145,10 @@ fn random_paths_hold_what_dense_sampling_finds() {
              [path]\n{path}\n[motion]\nhead_speed = 1.0\n"
         );
         let Ok(scene) = Scene::parse(&text, "test", "test") else { continue };
-        let timeline = scene.ensemble.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
         if timeline.end().event.kind == EventKind::Lock {
             locked += 1;
-            assert!(greatest_speed(&scene, &timeline, LIMIT, &mut |_| ()).is_err());
+            assert!(greatest_speed(&scene, &timeline, LIMIT, &mut unreported).is_err());
             continue;
         }
         let plan = plan(&scene, &timeline);
@@ -169,6 +170,7 @@ fn random_paths_hold_what_dense_sampling_finds() {
 #[test]
 fn a_huge_limit_is_met_to_nine_digits() {
     let scene = load("procession");
-    let found = greatest_speed(&scene, &scene.ensemble.timeline_without_contact(), 1e6, &mut |_| ()).unwrap();
+    let found = greatest_speed(&scene, &scene.ensemble.timeline_without_contact(&mut unreported), 1e6, &mut unreported)
+        .unwrap();
     assert!(found.proved && found.value_hi / found.value_lo - 1.0 <= 1e-9, "{found:?}");
 }

@@ -4,6 +4,7 @@
 use bench_dragon::messages::state::{EventKind, FrameState, Level};
 use bench_dragon::motion::clearance::{board, least_clearance_all_pairs};
 use bench_dragon::motion::ensemble::Ensemble;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::ground::{Ground, Obstacle};
 use bench_dragon::motion::model::shape::Shape;
 use bench_dragon::motion::model::{Point, Vector};
@@ -29,7 +30,7 @@ fn blocked() -> Scene {
 }
 
 fn timeline(scene: &Scene) -> Timeline {
-    scene.ensemble.timeline(&mut |_| ())
+    scene.ensemble.timeline(&mut unreported)
 }
 
 /// The least of all clearances of a chain: of pairs, and of each bench with each obstacle.
@@ -57,7 +58,7 @@ fn the_clearance_of_every_frame_is_the_least_of_all() {
     let newton = SQUARE.replace("head_speed = 1.0", "head_speed = 1.0\nsolver = \"newton\"");
     for (text, seconds) in [(SQUARE, 60.0), (&newton, 60.0), (&paper, 410.0), (&turnaround, 200.0)] {
         let scene = scene(&text.replace("on_contact = \"stop\"", "on_contact = \"continue\""));
-        let timeline = scene.ensemble.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
         let playback = Playback { rate: 3.0, on_contact: OnContact::Continue, ..Playback::of(&scene) };
         let mut show = Show::new(&scene, timeline, playback).unwrap();
         let mut by_obstacle = 0;
@@ -156,7 +157,7 @@ proptest! {
         let ground = Ground::new(own.ground().obstacles().iter().map(placed).collect());
         let away = Ensemble::alone(own.clone().placed(placement).on_ground(ground));
         let own = Ensemble::alone(own);
-        let timelines = [&own, &away].map(|ensemble| ensemble.timeline(&mut |_| ()));
+        let timelines = [&own, &away].map(|ensemble| ensemble.timeline(&mut unreported));
         prop_assert_eq!(timelines[0].events().len(), timelines[1].events().len());
         for (one, other) in timelines[0].events().iter().zip(timelines[1].events()) {
             prop_assert!((one.time - other.time).abs() < 1e-11 && one.event.bench_a == other.event.bench_a);
@@ -164,7 +165,7 @@ proptest! {
             prop_assert!(places.is_none_or(|(one, other)| (placement.point(one) - other).norm() < 1e-11));
         }
         let show_end = |k: usize| timelines[k].show_end(true);
-        let least = [own.obstacle_clearances(show_end(0), &mut |_| ()), away.obstacle_clearances(show_end(1), &mut |_| ())];
+        let least = [own.obstacle_clearances(show_end(0), &mut unreported), away.obstacle_clearances(show_end(1), &mut unreported)];
         for (one, other) in least[0].iter().zip(&least[1]) {
             prop_assert!((one.least.value - other.least.value).abs() < 1e-11, "{one:?} {other:?}");
         }

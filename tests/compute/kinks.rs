@@ -4,6 +4,7 @@
 use std::cell::Cell;
 
 use bench_dragon::motion::ensemble::Ensemble;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::linkage;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
@@ -120,7 +121,7 @@ fn velocities_keep_their_promise_at_the_kinks_of_the_scenes() {
     for (name, known) in [("turnaround", 432.109_566_744_412_75), ("procession", 105.225_319_949_667_78)] {
         let scene = Scene::load(&std::path::Path::new("config").join(format!("{name}.toml"))).unwrap();
         let motion = scene.ensemble.only().unwrap();
-        let end = scene.ensemble.timeline_without_contact().end().event.travelled;
+        let end = scene.ensemble.timeline_without_contact(&mut unreported).end().event.travelled;
         let mut kinks = kinks(motion, end, usize::MAX);
         assert!(kinks.len() > 2 * motion.team().handles(), "{name}: {} kinks", kinks.len());
         kinks.push(known * motion.head_speed());
@@ -180,7 +181,7 @@ fn velocities_keep_their_promise_at_the_kinks_of_random_routes() {
     let accuracy = (-9.0..-3.0f64).prop_map(|exponent| 10f64.powf(exponent));
     TestRunner::new(config)
         .run(&(motions(), accuracy), |(motion, accuracy)| {
-            let end = Ensemble::alone(motion.clone()).timeline_without_contact().end().event.travelled;
+            let end = Ensemble::alone(motion.clone()).timeline_without_contact(&mut unreported).end().event.travelled;
             let kinks = kinks(&motion, end, if long { usize::MAX } else { 100 });
             let (handles, part) = assert_kept(&motion, accuracy, &kinks);
             compared.set(compared.get() + handles);

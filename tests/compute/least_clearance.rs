@@ -3,6 +3,7 @@
 
 use bench_dragon::certify::plan::{LeastPitch, Overlap, least_pitch};
 use bench_dragon::certify::{CertificateLine, ClearanceEnclosure, ClearanceHints, certify_clearances};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::show::scene::Scene;
 
 use crate::oracle::{chain, scenes};
@@ -41,12 +42,12 @@ fn least_distance(team: &chain::Team, pose: &chain::Pose, limit: f64) -> f64 {
 /// Compares the enclosure of a scene's show with `samples` times of the show. Returns `None` if there is no enclosure.
 fn compared(text: &str, samples: u32, most_steps: u64) -> Option<ClearanceEnclosure> {
     let scene = Scene::parse(text, "test", "test").ok()?;
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show_end = timeline.show_end(scene.stops_at_contact());
-    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut |_| ()).own?.least;
+    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut unreported).own?.least;
     let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
     let mut write = |_: &CertificateLine| Ok(());
-    let enclosure = certify_clearances(&scene.ensemble, show_end, hints, "", most_steps, &mut write, &mut |_| ());
+    let enclosure = certify_clearances(&scene.ensemble, show_end, hints, "", most_steps, &mut write, &mut unreported);
     let enclosure = enclosure.unwrap().own[0].boards?;
     let ClearanceEnclosure { lo, hi, travelled, bench_a, bench_b, until, .. } = enclosure;
     println!("{:?} {enclosure:?}", show_end.event.kind);
@@ -116,7 +117,7 @@ fn random_shows_are_no_nearer_than_is_proved() {
 /// `value_hi`, all boards near the head are apart, sampled densely on the last turns.
 fn least_pitch_compared(text: &str, radius: f64) -> LeastPitch {
     let scene = Scene::parse(text, "test", "test").unwrap();
-    let plan = least_pitch(scene.ensemble.only().unwrap().team(), radius, &mut |_| ()).unwrap();
+    let plan = least_pitch(scene.ensemble.only().unwrap().team(), radius, &mut unreported).unwrap();
     println!("{plan:?}");
     let (lo, hi) = (plan.value_lo, plan.value_hi.unwrap());
     assert!(
@@ -195,7 +196,7 @@ fn a_link_that_locks_with_any_less_is_proved_too() {
         width: 0.15,
         hole_inset: 0.015,
     };
-    let plan = least_pitch(&team, 0.18, &mut |_| ()).unwrap();
+    let plan = least_pitch(&team, 0.18, &mut unreported).unwrap();
     println!("{plan:?}");
     let (lo, hi) = (plan.value_lo, plan.value_hi.unwrap());
     assert!(plan.proved && plan.overlap.is_none() && hi - lo <= 1e-9, "{plan:?}");

@@ -23,6 +23,7 @@ mod several;
 mod show;
 mod solvers;
 mod staged;
+mod stopped;
 #[path = "../truth/tables.rs"]
 mod tables;
 mod truth;

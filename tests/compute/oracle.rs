@@ -12,6 +12,7 @@ pub mod geometry;
 pub mod links;
 pub mod scenes;
 
+use bench_dragon::motion::event::unreported;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
@@ -38,7 +39,7 @@ fn program_events(scene_toml: &str) -> Result<Vec<Event>, String> {
     use bench_dragon::motion::timeline::TimedEvent;
     use bench_dragon::show::scene::Scene;
     let scene = Scene::parse(scene_toml, "oracle", "oracle").map_err(|error| error.to_string())?;
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     assert_eq!(timeline.searched_until(), None, "the program's search gave up");
     let event = |timed: &TimedEvent| Event {
         kind: timed.event.kind.name(),

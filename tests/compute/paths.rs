@@ -5,6 +5,7 @@ use bench_dragon::certify::plan::{greatest_speed, least_pitch};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::FrameState;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::linkage::follower;
 use bench_dragon::motion::model::path::Path;
 use bench_dragon::motion::model::team::Team;
@@ -28,7 +29,7 @@ fn turnaround() -> Scene {
 }
 
 fn timeline(scene: &Scene) -> Timeline {
-    scene.ensemble.timeline(&mut |_| ())
+    scene.ensemble.timeline(&mut unreported)
 }
 
 /// Computes the chain on the stage at `travelled` metres with the safe solver.
@@ -51,7 +52,7 @@ fn the_turnaround_is_free_and_its_least_clearance_is_that_of_dense_sampling() {
     let timeline = timeline(&scene);
     assert_eq!(timeline.events().iter().map(|timed| timed.event.kind).collect::<Vec<_>>(), [EventKind::PathEnd]);
     assert!((timeline.end().time - 482.7812449068211).abs() < 1e-9);
-    let found = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).own.unwrap();
+    let found = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut unreported).own.unwrap();
     let mut chain = Chain::new(scene.ensemble.handles());
     let mut sampled = f64::INFINITY;
     for k in 0..=4828 {
@@ -159,7 +160,7 @@ fn a_hairpin_that_is_too_tight_stalls_and_locks() {
 #[test]
 fn the_least_pitch_to_4_5_m_is_where_boards_just_touch() {
     let team = *Scene::paper().ensemble.only().unwrap().team();
-    let plan = least_pitch(&team, 4.5, &mut |_| ()).unwrap();
+    let plan = least_pitch(&team, 4.5, &mut unreported).unwrap();
     println!("{plan:?}");
     let overlap = plan.overlap.unwrap();
     assert_eq!((overlap.bench_a, overlap.bench_b), (0, 19));
@@ -187,7 +188,7 @@ fn the_least_pitch_to_4_5_m_is_where_boards_just_touch() {
 #[ignore = "tests/run --all"]
 fn the_greatest_speed_of_the_turnaround_is_that_of_dense_sampling() {
     let scene = turnaround();
-    let plan = greatest_speed(&scene, &timeline(&scene), 2.0, &mut |_| ()).unwrap();
+    let plan = greatest_speed(&scene, &timeline(&scene), 2.0, &mut unreported).unwrap();
     println!("{plan:?}");
     let mut chain = Chain::new(scene.ensemble.handles());
     assert!(chain_at(&scene, plan.time, &mut chain));
@@ -257,6 +258,6 @@ fn the_smallest_teams_turn_round() {
         let scene = scene("kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2\nlead_in = 9", benches);
         assert_eq!(timeline(&scene).end().event.kind, EventKind::PathEnd);
         let timeline = timeline(&scene);
-        assert_eq!(scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).own, None);
+        assert_eq!(scene.ensemble.least_clearances(&timeline, timeline.end(), &mut unreported).own, None);
     }
 }

@@ -3,6 +3,7 @@
 
 use bench_dragon::certify::{CertificateLine, MOST_STEPS, certify};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::proof;
 use bench_dragon::show::convert::{Stamps, frame_header, stage};
@@ -70,7 +71,7 @@ fn moved(text: &str, [x, y]: [f64; 2]) -> String {
 /// Returns the lines of a certificate as JSON, without the scene's text, after the checker has accepted it.
 fn certificate(text: &str) -> Vec<String> {
     let scene = scene(text);
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let (mut file, mut lines) = (String::new(), Vec::new());
     let mut write = |line: &CertificateLine| {
         let json = serde_json::to_string(line).unwrap();
@@ -78,7 +79,7 @@ fn certificate(text: &str) -> Vec<String> {
         lines.extend((!matches!(line, CertificateLine::Certificate { .. })).then_some(json));
         Ok(())
     };
-    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut unreported).unwrap();
     proof::verify(file.as_bytes(), &mut |_| ()).unwrap_or_else(|refused| panic!("{refused}"));
     lines
 }
@@ -86,11 +87,11 @@ fn certificate(text: &str) -> Vec<String> {
 #[test]
 fn a_route_has_the_same_events_and_proofs_wherever_it_starts() {
     for (text, kind) in [(U_TURN, EventKind::Stall), (LOOP, EventKind::Contact)] {
-        let home = scene(text).ensemble.timeline(&mut |_| ());
+        let home = scene(text).ensemble.timeline(&mut unreported);
         let proofs = certificate(text);
         assert!(home.find(kind).is_some() && proofs.iter().any(|line| line.contains("\"proved\"")), "{proofs:?}");
         for start in STARTS {
-            let away = scene(&moved(text, start)).ensemble.timeline(&mut |_| ());
+            let away = scene(&moved(text, start)).ensemble.timeline(&mut unreported);
             assert_eq!(away.events().len(), home.events().len());
             for (away, home) in away.events().iter().zip(home.events()) {
                 assert_eq!((away.time, away.event.kind), (home.time, home.event.kind), "{start:?}");
@@ -107,11 +108,11 @@ fn frames_of_a_route_are_those_at_the_origin_moved_by_the_start() {
     for text in [U_TURN, LOOP] {
         let home = scene(text);
         let handles = home.ensemble.handles();
-        let timeline = home.ensemble.timeline(&mut |_| ());
+        let timeline = home.ensemble.timeline(&mut unreported);
         let mut home_solver = home.ensemble.only().unwrap().solver(Velocities::Computed).solver;
         for start in STARTS {
             let away = scene(&moved(text, start));
-            let moved_timeline = away.ensemble.timeline(&mut |_| ());
+            let moved_timeline = away.ensemble.timeline(&mut unreported);
             let mut away_solver = away.ensemble.only().unwrap().solver(Velocities::Computed).solver;
             let mut shows = [(&home, &timeline), (&away, &moved_timeline)]
                 .map(|(scene, timeline)| Show::new(scene, timeline.clone(), Playback::of(scene)).unwrap());
@@ -158,7 +159,7 @@ fn a_placed_show_is_the_show_transformed() {
         let (sine, cosine) = (0.3 * std::f64::consts::TAU).sin_cos();
         let turned = |x: f64, y: f64| (cosine * x + sine * y, sine * x - cosine * y);
         let near = |(x, y): (f64, f64), (a, b): (f64, f64), most: f64| (x - a).hypot(y - b) <= most;
-        let timelines = [&home, &away].map(|scene| scene.ensemble.timeline(&mut |_| ()));
+        let timelines = [&home, &away].map(|scene| scene.ensemble.timeline(&mut unreported));
         let times =
             timelines.each_ref().map(|timeline| timeline.events().iter().map(|timed| timed.time).collect::<Vec<_>>());
         assert_eq!(times[0], times[1]);

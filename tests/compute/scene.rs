@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use bench_dragon::messages::{SEGMENT_ARC, SEGMENT_INWARD_SPIRAL, SEGMENT_LINE, SEGMENT_OUTWARD_SPIRAL, StageMessage};
 use bench_dragon::motion::Method;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::description::PathDescription;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::show::convert::stage;
@@ -78,7 +79,7 @@ fn cues_are_at_the_times_that_the_scene_states() {
     let scene = scene(SPIRAL, 2.0, cues);
     let ensemble = scene.ensemble.try_map(|motion| motion.with_method(Method::Newton)).unwrap();
     let scene = Scene { ensemble, ..scene };
-    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
     let times: Vec<_> = show.cues().iter().map(|cue| (&*cue.name, cue.time)).collect();
     // The head and the ninth bench touch after 412.47 m, with 20 benches as with 223.
     let before = 0.5 * 412.473837682115 - 7.0;
@@ -90,7 +91,7 @@ fn stage_of(path: &str) -> StageMessage {
     let scene = scene(path, 1.0, "");
     let ensemble = scene.ensemble.try_map(|motion| motion.with_method(Method::Newton)).unwrap();
     let scene = Scene { ensemble, ..scene };
-    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
     stage(1, 2, [0; 32], &scene.ensemble, &show)
 }
 
@@ -200,7 +201,7 @@ fn a_route_has_up_to_4096_pieces() {
     let scene = Scene::parse(&text, "test", "test").unwrap();
     let length = 4096.0 * 5.0 * TAU / 8.0;
     assert!((scene.ensemble.only().unwrap().path().length() - length).abs() < 1e-9);
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     assert_eq!((timeline.events().len(), timeline.searched_until()), (1, None), "{timeline:?}");
     assert!((timeline.end().time - length).abs() < 1e-9);
     let show = Show::new(&scene, timeline, Playback::of(&scene)).unwrap();

@@ -8,6 +8,7 @@
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::clearance::{least_clearance_all_pairs, nearest_between_all_pairs};
 use bench_dragon::motion::ensemble::{Dragon, Ensemble};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::team::Team;
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::{Chain, Velocities};
@@ -35,7 +36,7 @@ fn scene(text: &str) -> Scene {
 }
 
 fn timeline(text: &str) -> Timeline {
-    scene(text).ensemble.timeline(&mut |_| ())
+    scene(text).ensemble.timeline(&mut unreported)
 }
 
 fn contact(text: &str) -> Option<TimedEvent> {
@@ -162,7 +163,7 @@ fn first_contacts_are_those_of_a_brute_force_over_random_pairs() {
         let text = any_dragon(&mut rng, "gold") + &any_dragon(&mut rng, "jade");
         let Ok(scene) = Scene::parse(&text, "pair.toml", "pair") else { continue };
         let ensemble = &scene.ensemble;
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         assert_eq!(timeline.searched_until(), None, "{case}: {text}");
         let found = timeline.find(EventKind::Contact);
         // In the last digits before a lock there may be no solution.
@@ -200,8 +201,8 @@ fn heads_that_meet_on_parallel_lines() {
     let beside = dragon("jade", 3, "{ origin = [20.0, 0.31], rotation_turns = 0.5 }", 1.5, 0.0, &line(100.0));
     assert!(contact(&(east.clone() + &beside)).is_none());
     let scene = scene(&(east + &beside));
-    let timeline = scene.ensemble.timeline(&mut |_| ());
-    let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut |_| ()).of_show.unwrap();
+    let timeline = scene.ensemble.timeline(&mut unreported);
+    let least = scene.ensemble.least_clearances(&timeline, timeline.end(), &mut unreported).of_show.unwrap();
     assert!((least.least.value - 0.01).abs() < 1e-12, "{}", least.least.value);
 }
 
@@ -249,10 +250,10 @@ fn the_first_lock_of_any_ends_the_show_and_a_path_end_does_not() {
     let gold = dragon("gold", 3, "{ origin = [0.0, 0.0] }", 1.0, 7.0, spiral);
     let jade = dragon("jade", 3, "{ origin = [100.0, 0.0] }", 1.0, 0.0, &line(3.0));
     let both = scene(&(gold.clone() + &jade));
-    let timeline = both.ensemble.timeline(&mut |_| ());
+    let timeline = both.ensemble.timeline(&mut unreported);
     let alone = gold.replace("[[dragons]]\nname = \"gold\"\nplacement = { origin = [0.0, 0.0] }\ndelay = 7.0\n", "");
     let alone = Scene::parse(&alone.replace("[dragons.", "["), "one.toml", "one").unwrap();
-    let own = alone.ensemble.timeline(&mut |_| ());
+    let own = alone.ensemble.timeline(&mut unreported);
     assert_eq!(own.end().event.kind, EventKind::Lock);
     assert_eq!((timeline.end().event.kind, timeline.end().time), (EventKind::Lock, own.end().time + 7.0));
     let path_ends = timeline.all().into_iter().filter(|of| of.event.kind == EventKind::PathEnd);
@@ -269,7 +270,7 @@ fn a_frame_has_the_handles_of_all_and_the_least_clearance_of_any_two() {
     let text = format!("[motion]\non_contact = \"continue\"\n[alerts]\n{gold}{jade}{rose}");
     let scene = scene(&text);
     let ensemble = &scene.ensemble;
-    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
     let of = |Dragon { motion, .. }: &Dragon| {
         (motion.solver(Velocities::Computed).solver, Chain::new(motion.team().handles()))
     };
@@ -321,7 +322,7 @@ fn the_least_clearance_of_a_frame_is_that_of_all_pairs_after_any_jump() {
         let text = format!("[motion]\non_contact = \"continue\"\n[alerts]\n{dragons}");
         let Ok(scene) = Scene::parse(&text, "jumps.toml", "jumps") else { continue };
         let ensemble = &scene.ensemble;
-        let timeline = scene.ensemble.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
         let ticks = (60.0 * timeline.end().time) as u64;
         // The show loops, so that later ticks are at any time of a showing, before or after the last.
         let playback = Playback { at_end: AtEnd::Loop, ..Playback::of(&scene) };
@@ -342,7 +343,7 @@ fn the_least_clearance_of_a_frame_is_that_of_all_pairs_after_any_jump() {
 fn of_dragons_that_coil_few_boards_are_tested() {
     let scene = scene(&std::fs::read_to_string("config/coil.toml").unwrap());
     let playback = Playback { start: 150.0, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(&mut unreported), playback).unwrap();
     (0..600).for_each(|tick| _ = show.frame(tick));
     // A search from frame to frame tests more than 20.
     assert!(show.pairs_tested() < 600 * 8, "{} of 600 frames", show.pairs_tested());

@@ -4,6 +4,7 @@
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level, PlaybackState};
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::alerts::Alert;
@@ -13,7 +14,7 @@ use bench_dragon::show::{Playback, Show};
 use proptest::prelude::*;
 
 fn paper_timeline() -> Timeline {
-    Scene::paper().ensemble.timeline(&mut |_| ())
+    Scene::paper().ensemble.timeline(&mut unreported)
 }
 
 fn show(playback: Playback) -> Show {
@@ -133,7 +134,7 @@ fn a_start_after_the_contact_is_in_contact_at_once() {
 fn without_alerts_and_velocities_neither_is_computed() {
     let text = include_str!("../../config/paper.toml").replace("[alerts]", "").replace("approach_", "# approach_");
     let scene = Scene::parse(&text.replace("velocities = true", "velocities = false"), "test", "test").unwrap();
-    let timeline = scene.ensemble.timeline_without_contact();
+    let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
     let mut show = Show::new(&scene, timeline, Playback { start: 412.0, ..Playback::of(&scene) }).unwrap();
     for tick in 0..100 {
         let frame = show.frame(tick);
@@ -165,7 +166,7 @@ fn a_tick_past_the_lock_freezes_the_show_at_it() {
 #[test]
 fn boards_that_overlap_unforeseen_are_a_contact_at_once() {
     let scene = Scene::paper();
-    let unsearched = scene.ensemble.timeline_without_contact();
+    let unsearched = scene.ensemble.timeline_without_contact(&mut unreported);
     let playback = Playback { start: 412.0, rate: 1000.0, ..playback() };
     let mut show = Show::new(&scene, unsearched, playback).unwrap();
     let mut alerts = Vec::new();

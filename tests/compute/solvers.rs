@@ -18,6 +18,7 @@ use std::f64::consts::{PI, TAU};
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ensemble::Ensemble;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
 use bench_dragon::motion::model::spiral::Direction;
@@ -52,14 +53,14 @@ impl std::fmt::Debug for Subject {
 impl Subject {
     fn new(description: PathDescription, team: Team, head_speed: f64) -> Self {
         let motion = Motion::new(description, team, head_speed, Method::Accuracy(ACCURACY)).unwrap();
-        let end = Ensemble::alone(motion.clone()).timeline_without_contact().end().time;
+        let end = Ensemble::alone(motion.clone()).timeline_without_contact(&mut unreported).end().time;
         Self { motion, end }
     }
 
     /// Returns a scene of `config/`, up to its contact if it has one.
     fn scene(name: &str) -> Self {
         let scene = Scene::load(&std::path::Path::new("config").join(format!("{name}.toml"))).unwrap();
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         let end = timeline.find(EventKind::Contact).unwrap_or(timeline.end()).time;
         Self { motion: scene.ensemble.only().unwrap().clone(), end }
     }
@@ -410,8 +411,10 @@ fn no_handle_jumps_from_piece_to_piece() {
         let handles = subject.motion.team().handles();
         let (mut chain, mut before) = (Chain::new(handles), Chain::new(handles));
         let mut solver = subject.table().unwrap();
-        let (valid, end) =
-            (solver.valid_until(), Ensemble::alone(subject.motion.clone()).timeline_without_contact().end().time);
+        let (valid, end) = (
+            solver.valid_until(),
+            Ensemble::alone(subject.motion.clone()).timeline_without_contact(&mut unreported).end().time,
+        );
         let junctions = subject.motion.path().junctions().flat_map(|at| [at, at + 2.86, at + 3.6]);
         let edges = (1..400).map(|k| 0.997 * subject.end * f64::from(k) / 400.0).chain(junctions).chain([valid]);
         let edges: Vec<f64> = edges.filter(|edge| (1e-6..end - 1e-6).contains(edge)).collect();

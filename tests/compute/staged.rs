@@ -7,6 +7,7 @@ use std::fmt::Write;
 
 use bench_dragon::certify::{CertificateLine, certify};
 use bench_dragon::messages::state::EventKind as Kind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::proof::{EventKind, Proved, Refused, Status, verify};
 use bench_dragon::show::scene::Scene;
 use fastrand::Rng;
@@ -17,10 +18,10 @@ const MOST_STEPS: u64 = 3000;
 
 /// Returns the lines of a certificate.
 fn certificate(text: &str, scene: &Scene) -> String {
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| line.write(&mut lines);
-    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut |_| ()).unwrap();
+    certify(&scene.ensemble, &timeline, text, MOST_STEPS, &mut write, &mut unreported).unwrap();
     String::from_utf8(lines).unwrap()
 }
 
@@ -33,7 +34,7 @@ fn check(lines: &str) -> Result<Proved, Refused> {
 fn statuses(text: &str) -> Vec<Status> {
     let scene = Scene::parse(text, "staged", "staged").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let proved = check(&certificate(text, &scene)).unwrap_or_else(|refused| panic!("{refused}\n{text}"));
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let obstacles = scene.ensemble.ground().obstacles();
     let results = &proved.results[4..];
     assert_eq!(results.len(), obstacles.len());

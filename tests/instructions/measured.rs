@@ -9,6 +9,7 @@ use bench_dragon::client::connection::{Connection, Subscription, Wake};
 use bench_dragon::messages::control::Command;
 use bench_dragon::motion::Method;
 use bench_dragon::motion::clearance::{ClearanceMonitor, Pairs, Precision};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::ground::{Ground, Obstacle};
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::model::shape::Shape;
@@ -103,7 +104,7 @@ pub fn run() {
         clearance(name, monitor, table.for_frames(), team.handles());
     }
     // A search for the contact would take long.
-    let timeline = paper.ensemble.timeline_without_contact();
+    let timeline = paper.ensemble.timeline_without_contact(&mut unreported);
     step(&paper, &timeline);
     certificate();
 }
@@ -249,11 +250,11 @@ fn certificate() {
     let scene = Scene::parse(&text, "paper.toml", "paper").unwrap();
     let motion = scene.ensemble.only().unwrap();
     assert_eq!(motion.team().benches, 20);
-    let timeline = scene.ensemble.timeline_without_contact();
+    let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
     let mut lines = Vec::new();
     let mut search = |steps: u64| {
         let mut write = |line: &CertificateLine| line.write(&mut lines);
-        certify(&scene.ensemble, &timeline, &text, steps, &mut write, &mut |_| ()).unwrap();
+        certify(&scene.ensemble, &timeline, &text, steps, &mut write, &mut unreported).unwrap();
     };
     counted(&mut search, STEPS);
     part_is_over("certificate step, 20 benches", STEPS);

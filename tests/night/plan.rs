@@ -2,6 +2,7 @@
 
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::messages::state::{FrameState, Level};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::publisher::live::LoopOptions;
 use bench_dragon::show::Playback;
@@ -33,7 +34,7 @@ pub struct Stage {
 impl Stage {
     fn of(text: &str) -> Self {
         let scene = Scene::parse(text, "night.toml", "night").expect("a scene");
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         let events: Vec<(f64, EventKind)> =
             timeline.events().iter().map(|timed| (timed.time, timed.event.kind)).collect();
         let level = |kind| match kind {

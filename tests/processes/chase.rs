@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::harness::{Lines, Process, can_run, json_lines, long, not_run, program, python, text, unique};
+use crate::harness::{Lines, Process, json_lines, long, not_run, npm, program, python, text, unique};
 use nix::sys::signal::Signal;
 
 /// Returns a port that no other test has.
@@ -277,19 +277,13 @@ fn a_show_follows_the_art_net_timecode_of_another_library() {
     if !long() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let mut npm = Command::new("npm");
-    npm.args(["install", "--no-audit", "--no-fund", "@arcanewizards/artnet@0.1.8"]).current_dir(folder.path());
-    let installed = npm.output().map_err(|error| format!("no npm ({error})"));
-    let installed =
-        installed.and_then(|output| if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) });
-    if !can_run(installed) {
-        return;
-    }
+    let (_folder, package) = match npm("@arcanewizards/artnet@0.1.8") {
+        Ok(installed) => installed,
+        Err(why) => return not_run(&why),
+    };
     let (name, port) = ("chase_npm", port().to_string());
     let _publisher = publisher(name, &["--paused"]);
     let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
-    let package = folder.path().join("node_modules/@arcanewizards/artnet");
     let mut sender = Command::new("node");
     sender.arg("tests/python/artnet_npm.mjs").arg(package).args([&port, "8"]);
     let sender = Process::start(&mut sender);

@@ -10,6 +10,7 @@ use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::shared_memory::{node, service_name};
 use bench_dragon::messages::{CollisionAlert, FrameHeader, HandlePose, SceneHeader, Stage, StageMessage, StageSegment};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::publisher::live::{Outgoing, Publisher};
 use bench_dragon::publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
 use bench_dragon::show::convert::stage;
@@ -257,7 +258,7 @@ fn opened(name: &str, scene: &Scene, cues: usize, stage: StageMessage) -> Shared
 #[test]
 fn a_scene_with_more_cues_finds_its_services_open() {
     let scene = Scene::paper();
-    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
     let name = unique("more_cues");
     let open = |cues| opened(&name, &scene, cues, stage(cues as u64, 0, [0; 32], &scene.ensemble, &show));
     let _few = open(3);
@@ -269,7 +270,7 @@ fn a_scene_with_more_cues_finds_its_services_open() {
 #[test]
 fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
     let scene = Scene::paper();
-    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
     let name = unique("beside");
     let stages = [7, 8].map(|run_id| stage(run_id, 0, [0; 32], &scene.ensemble, &show));
     let [mut bystander, mut sender] = stages.map(|stage| opened(&name, &scene, 0, stage));
@@ -311,7 +312,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
 #[test]
 fn an_alert_follows_the_stage_of_its_run() {
     let scene = Scene::paper();
-    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene)).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
     let name = unique("alert_order");
     let mut sender = opened(&name, &scene, 0, stage(8, 0, [0; 32], &scene.ensemble, &show));
     let mut feed = Feed::new(&name, FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();

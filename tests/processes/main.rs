@@ -28,6 +28,7 @@ mod service_manager;
 mod several;
 mod soak;
 mod soak_verdict;
+mod timecode;
 mod transports;
 mod tunnel;
 mod watch;

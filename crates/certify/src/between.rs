@@ -10,12 +10,13 @@ use super::first_order::When;
 use super::interval::Interval;
 use super::lines::{CertificateLine, CertifiedEvent, Status, WIDE};
 use super::search::{
-    AROUND, BESIDE, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, Section, first_line,
+    AROUND, BESIDE, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, STOPPED, Section,
+    first_line,
 };
 use super::{CertifyError, Given, certify_alone, ground};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
-use bench_dragon_motion::event::Event;
+use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::model::separation::overlap_centre;
 use bench_dragon_motion::timeline::Timeline;
 use clearance::UpperBetween;
@@ -37,7 +38,7 @@ pub fn certify(
     scene: &str,
     most_steps: u64,
     write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<Vec<CertifiedEvent>, CertifyError> {
     // The format has no line for a dragon without a name.
     if let Some(motion) = ensemble.only() {
@@ -49,9 +50,9 @@ pub fn certify(
     let (mut proved, mut sections, mut done) = (Vec::new(), Vec::new(), 0.0);
     for (number, dragon) in dragons.iter().enumerate() {
         write(&CertificateLine::Dragon { dragon: number })?;
-        let timeline = Ensemble::alone(dragon.motion.clone()).timeline(&mut |_| ());
+        let timeline = Ensemble::alone(dragon.motion.clone()).timeline(&mut |_| progress(done / parts));
         let section = alone((number, dragon), &timeline, (scene, most_steps), &mut *write, &mut |share| {
-            progress((done + share) / parts);
+            progress((done + share) / parts)
         })?;
         proved.extend(section.events.iter().cloned());
         sections.push((timeline, section));
@@ -65,7 +66,7 @@ pub fn certify(
         });
         let to = ends.iter().map(|side| side.end).fold(0.0, f64::max);
         let to = ends.iter().filter(|side| side.locks).map(|side| side.end).fold(to, f64::min);
-        let hint = ensemble.first_contact_of(pair, to, &mut |_| ());
+        let hint = ensemble.first_contact_of(pair, to, &mut |_| progress(done / parts));
         let mut search = PairSearch::new(ends, Aim::Clear, most_steps, &mut *write);
         let status = search.run(hint, to, &mut |share| progress((done + share) / parts))?;
         let event = CertifiedEvent { event: EventKind::Contact, obstacle: None, dragons: pair.to_vec(), status };
@@ -82,7 +83,7 @@ fn alone(
     timeline: &Timeline,
     (scene, most_steps): (&str, u64),
     write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<Section, CertifyError> {
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let given = Given {
@@ -139,7 +140,7 @@ impl PairSearch<'_, '_> {
         &mut self,
         hint: Option<(f64, [usize; 2])>,
         to: f64,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Result<Status, CertifyError> {
         let Some((contact, benches)) = hint else {
             let refused = self.go_to(to, progress)?;
@@ -187,8 +188,11 @@ impl PairSearch<'_, '_> {
     }
 
     /// Goes to a time in steps. Returns the reason if it stopped before.
-    fn go_to(&mut self, to: f64, progress: &mut dyn FnMut(f64)) -> Result<Option<String>, CertifyError> {
+    fn go_to(&mut self, to: f64, progress: Progress<'_>) -> Result<Option<String>, CertifyError> {
         while self.time < to {
+            if progress((self.time / to).clamp(0.0, 1.0)).is_break() {
+                return Ok(Some(STOPPED.to_owned()));
+            }
             let moving = || self.sides.iter().filter(|side| side.is_moving(self.time));
             let of_link = |side: &Side| side.seconds(side.chain.team.shortest_link());
             let longest = moving().map(of_link).fold(f64::INFINITY, f64::min);
@@ -213,7 +217,6 @@ impl PairSearch<'_, '_> {
                         self.shown = Some(self.shown.map_or(metres, |least| least.min(metres)));
                     }
                     (self.time, self.step) = (next, GROWTH * length);
-                    progress((next / to).clamp(0.0, 1.0));
                 }
                 Err(Refused::Pair(benches)) if self.lower(0.5 * (self.time + next), benches) => {}
                 Err(refused) if length <= least => return Ok(Some(sentence(&refused))),

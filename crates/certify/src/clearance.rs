@@ -22,7 +22,7 @@ use super::step::{Chain, Obstacle};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::contact::LeastClearance;
-use bench_dragon_motion::event::Event;
+use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::timeline::{TimedEvent, TimedObstacleClearance};
 use beside::{Beside, UpperBeside};
 pub(super) use certificate::first_line as clearance_first_line;
@@ -124,7 +124,7 @@ pub(super) fn certify_part(
     hints: ClearanceHints<'_>,
     most_steps: u64,
     write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<ClearanceEnclosures, CertifyError> {
     let descent = Descent::new(chain_of(motion), show_end.event.travelled, most_steps, Some(write));
     let mut descent = Descent { part, ..descent };
@@ -254,7 +254,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         motion: &Motion,
         show_end: &TimedEvent,
         ClearanceHints { boards: hint, obstacles }: ClearanceHints<'_>,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> ClearanceEnclosures {
         let (path, event) = (motion.path(), &show_end.event);
         let slack = END_SLACK * (1.0 + path.length());
@@ -274,7 +274,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         let is_at_start = event.travelled == 0.0;
         self.begin_beside(obstacles, is_at_start);
         let boards = match event.kind {
-            EventKind::Contact | EventKind::Obstacle if is_at_start => self.at_start(hint),
+            EventKind::Contact | EventKind::Obstacle if is_at_start => self.at_start(hint, progress),
             EventKind::Contact => self.touch(event, progress),
             // The end is taken as found, so the steps go beyond it.
             EventKind::Obstacle => {
@@ -312,7 +312,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         &mut self,
         hint: Option<&LeastClearance>,
         target: &GridPoint,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Option<ClearanceEnclosure> {
         let until = self.descend(hint, target, progress)?;
         self.is_complete = until.is_none();
@@ -324,7 +324,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         &mut self,
         lock: &Event,
         hint: Option<&LeastClearance>,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Option<ClearanceEnclosure> {
         let target = self.grid_point(self.end);
         if let Some(until) = self.descend(hint, &target, progress)? {
@@ -346,7 +346,7 @@ impl<'a, 'w> Descent<'a, 'w> {
         &mut self,
         hint: Option<&LeastClearance>,
         target: &GridPoint,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Option<Option<f64>> {
         if let Some(hint) = hint {
             let point = self.inside(hint.travelled)?;
@@ -383,19 +383,19 @@ impl<'a, 'w> Descent<'a, 'w> {
     }
 
     /// Returns true if no two boards touch, and no link locks, from the start to `target`.
-    pub fn stays_clear_to(mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> bool {
+    pub fn stays_clear_to(mut self, target: &GridPoint, progress: Progress<'_>) -> bool {
         self.floor = Some(0.0);
         self.go_to(target, progress).is_none()
     }
 
     /// Encloses the least clearance of a show that ends at its start.
-    fn at_start(&mut self, hint: Option<&LeastClearance>) -> Option<ClearanceEnclosure> {
+    fn at_start(&mut self, hint: Option<&LeastClearance>, progress: Progress<'_>) -> Option<ClearanceEnclosure> {
         let after = self.after_start()?;
         if let Some(hint) = hint {
             let benches = [hint.bench_a, hint.bench_b].map(|bench| bench as usize);
             self.upper = Some(self.upper_between(self.at.clone(), after.clone(), benches)?);
         }
-        let until = self.go_to(&after, &mut |_| ());
+        let until = self.go_to(&after, progress);
         self.is_complete = until.is_none();
         Some(self.enclosed(self.upper?, until))
     }
@@ -407,7 +407,7 @@ impl<'a, 'w> Descent<'a, 'w> {
 
     /// Encloses the least clearance of a show that ends at its first contact. This clearance is 0 if boards are apart
     /// at the start, overlap shortly after the contact, and handles move continuously between the two.
-    fn touch(&mut self, event: &Event, progress: &mut dyn FnMut(f64)) -> Option<ClearanceEnclosure> {
+    fn touch(&mut self, event: &Event, progress: Progress<'_>) -> Option<ClearanceEnclosure> {
         let benches = [event.bench_a?, event.bench_b?].map(|bench| bench as usize);
         let after = self.after_start()?;
         self.floor = Some(0.0);
@@ -456,11 +456,15 @@ impl<'a, 'w> Descent<'a, 'w> {
     }
 
     /// Goes to `target`. Returns the travel that it reached if a step before cannot be shown.
-    fn go_to(&mut self, target: &GridPoint, progress: &mut dyn FnMut(f64)) -> Option<f64> {
+    fn go_to(&mut self, target: &GridPoint, progress: Progress<'_>) -> Option<f64> {
         let least = LEAST_STEP * (1.0 + self.chain.path.length());
         let longest = self.chain.team.shortest_link();
         let mut shrink = SHRINK;
         while self.chain.exact.is_before(self.at.head, target.head) {
+            let steps = self.steps as f64 / self.most_steps as f64;
+            if progress((self.at.travelled / self.end).max(steps).clamp(0.0, 1.0)).is_break() {
+                return Some(self.travelled());
+            }
             let remaining = target.travelled - self.at.travelled;
             let length = self.step.min(remaining);
             let mut to = if self.step >= 0.9 * remaining {
@@ -474,8 +478,6 @@ impl<'a, 'w> Descent<'a, 'w> {
                     self.at = to;
                     self.step = (self.step * GROWTH).min(longest);
                     shrink = SHRINK;
-                    let steps = self.steps as f64 / self.most_steps as f64;
-                    progress((self.at.travelled / self.end).max(steps).clamp(0.0, 1.0));
                     false
                 }
                 Err(Refused { nearer: Some(Nearer::Boards(nearer)), .. }) => {

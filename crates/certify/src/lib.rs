@@ -40,7 +40,7 @@ pub use lines::{
 pub use place::{Place, Span};
 
 use bench_dragon_motion::Motion;
-use bench_dragon_motion::event::Event;
+use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::team::Team;
@@ -83,7 +83,7 @@ pub(crate) fn certify_alone(
     scene: &str,
     most_steps: u64,
     write: &mut dyn FnMut(&CertificateLine) -> io::Result<()>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<Vec<CertifiedEvent>, CertifyError> {
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let given = Given {

@@ -14,6 +14,7 @@ use super::lines::{CertificateLine, Links, Step};
 use super::path::ExactPath;
 use super::place::{Place, Span};
 use super::step::{Chain, Claim, Listed, links_of};
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::team::Team;
@@ -137,7 +138,7 @@ pub(crate) fn reaches(
     pitch: f64,
     radius: f64,
     most_steps: u64,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Option<Reached> {
     let far = clear_beyond(team, pitch, radius)?;
     let mut steps = Vec::new();

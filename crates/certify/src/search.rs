@@ -2,6 +2,7 @@
 //! claims cannot be shown. At each event of the ordinary search, the search writes the line that proves the event.
 
 use std::io;
+use std::ops::ControlFlow;
 
 use super::capsule::Spanned;
 use super::grid::{GridPoint, place};
@@ -13,7 +14,7 @@ use super::place::{Place, Span};
 use super::step::{Chain, Claim, Obstacle, Shown};
 use super::{CertifyError, Given};
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::event::Event;
+use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::model::path::Path;
 
 /// The half width of the proved interval of an event, in seconds.
@@ -76,6 +77,9 @@ pub(super) struct Section {
     pub ends_with_path: bool,
     pub locks: bool,
 }
+
+/// The reason for an undecided result where the receiver of the progress has stopped the search.
+pub(super) const STOPPED: &str = "the search was stopped there";
 
 /// Writes the first line of a certificate of events.
 pub(super) fn first_line(
@@ -145,13 +149,13 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     }
 
     /// Writes the certificate and returns the results for its events.
-    pub fn run(self, progress: &mut dyn FnMut(f64)) -> Result<Vec<CertifiedEvent>, CertifyError> {
+    pub fn run(self, progress: Progress<'_>) -> Result<Vec<CertifiedEvent>, CertifyError> {
         first_line(&mut *self.write, self.given.scene)?;
         Ok(self.section(progress)?.events)
     }
 
     /// Writes the lines after the first, and returns their results.
-    pub fn section(mut self, progress: &mut dyn FnMut(f64)) -> Result<Section, CertifyError> {
+    pub fn section(mut self, progress: Progress<'_>) -> Result<Section, CertifyError> {
         let stuck = match self.motion(progress) {
             Ok(()) => None,
             Err(Halt::Error(error)) => return Err(error),
@@ -183,7 +187,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     }
 
     /// Proves the whole motion, event by event.
-    fn motion(&mut self, progress: &mut dyn FnMut(f64)) -> Result<(), Halt> {
+    fn motion(&mut self, progress: Progress<'_>) -> Result<(), Halt> {
         let end = self.given.events.last().map_or(self.given.path.length(), |event| event.travelled);
         // A search of a long path, or of a long team, may end with its limits long before the path does.
         let mut progress = |at: f64, used: f64| progress((at / end).max(used).clamp(0.0, 1.0));
@@ -288,7 +292,12 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
     }
 
     /// Goes to a travel: see [`CertificateSearch::go_to_point`].
-    fn go_to(&mut self, travelled: f64, event: Option<&Event>, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
+    fn go_to(
+        &mut self,
+        travelled: f64,
+        event: Option<&Event>,
+        progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
+    ) -> Result<(), Halt> {
         if travelled <= self.at.travelled {
             return Ok(());
         }
@@ -302,11 +311,14 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         &mut self,
         target: &GridPoint,
         event: Option<&Event>,
-        progress: &mut dyn FnMut(f64, f64),
+        progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
     ) -> Result<(), Halt> {
         let least = LEAST_STEP * (1.0 + self.given.path.length());
         let longest = self.given.team.shortest_link();
         while self.chain.exact.is_before(self.at.head, target.head) {
+            if progress(self.at.travelled, self.used()).is_break() {
+                return Err(Halt::Stuck(STOPPED.to_owned()));
+            }
             let remaining = target.travelled - self.at.travelled;
             if let Some(lock) = event.filter(|event| event.kind == EventKind::Lock) {
                 // The window of the lock must be around the spans of the last step.
@@ -322,7 +334,6 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 Ok(shown) => {
                     self.accept(to, shown)?;
                     self.step = (self.step * GROWTH).min(longest);
-                    progress(self.at.travelled, self.used());
                 }
                 Err(obstacle) if self.step.min(remaining) > least => {
                     self.step = SHRINK * self.step.min(remaining);
@@ -477,7 +488,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Some((handles[1..].iter().map(|handle| handle.span).collect(), point))
     }
 
-    fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
+    fn contact(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>) -> Result<(), Halt> {
         if !self.clear {
             return Ok(());
         }
@@ -539,7 +550,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    fn obstacle(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
+    fn obstacle(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>) -> Result<(), Halt> {
         let Some(obstacle) = self.number(event).filter(|number| self.free.contains(number)) else { return Ok(()) };
         let earliest = self.at.head;
         self.free.retain(|other| *other != obstacle);
@@ -561,7 +572,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         Ok(())
     }
 
-    fn stall(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64)) -> Result<(), Halt> {
+    fn stall(&mut self, event: &Event, progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>) -> Result<(), Halt> {
         if !self.moving {
             return Ok(());
         }

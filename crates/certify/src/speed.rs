@@ -18,6 +18,7 @@ use super::path::ExactPath;
 use super::place::Place;
 use super::step::Chain;
 use bench_dragon_motion::Motion;
+use bench_dragon_motion::event::Progress;
 
 /// The distance that doubles can resolve, as a share of the path length in metres.
 const LEAST: f64 = 1e-14;
@@ -87,7 +88,7 @@ impl Ord for OpenStep {
 
 /// Encloses the greatest ratio of a handle's speed to the head's over the first `travelled` metres of the head, to a
 /// share of `tolerance`. `progress` receives the share of the work that is done, from 0 to 1.
-pub fn greatest_ratio(motion: &Motion, travelled: f64, tolerance: f64, progress: &mut dyn FnMut(f64)) -> GreatestRatio {
+pub fn greatest_ratio(motion: &Motion, travelled: f64, tolerance: f64, progress: Progress<'_>) -> GreatestRatio {
     RatioSearch::new(motion, travelled, MOST_HANDLES).run(tolerance, None, progress)
 }
 
@@ -107,12 +108,7 @@ impl<'a> RatioSearch<'a> {
     }
 
     /// Encloses the greatest ratio. `steps` receives the steps that show the upper bound, in any order.
-    fn run(
-        &self,
-        tolerance: f64,
-        mut steps: Option<&mut Vec<Stretch>>,
-        progress: &mut dyn FnMut(f64),
-    ) -> GreatestRatio {
+    fn run(&self, tolerance: f64, mut steps: Option<&mut Vec<Stretch>>, progress: Progress<'_>) -> GreatestRatio {
         // The ratio of the head itself.
         let mut best =
             GreatestRatio { lo: 1.0, hi: 1.0, handle: 0, travelled: 0.0, ratio: 1.0, proved: false, steps: 0 };
@@ -123,10 +119,11 @@ impl<'a> RatioSearch<'a> {
         let mut open = BinaryHeap::from([OpenStep { upper: f64::INFINITY, from, to }]);
         let (mut settled, mut handles) = (1.0f64, 0);
         let enough = |best: &GreatestRatio, upper: f64| upper <= best.lo * (1.0 + tolerance);
+        let mut is_stopped = false;
         while let Some(OpenStep { upper, from, to }) = open.pop() {
             let middle = 0.5 * from + 0.5 * to;
             let done = enough(&best, upper);
-            if done || handles > self.most_handles || to - from < self.least {
+            if done || is_stopped || handles > self.most_handles || to - from < self.least {
                 if let Some(steps) = steps.take() {
                     steps.push((from, to));
                     steps.extend(open.drain().map(|step| (step.from, step.to)));
@@ -153,7 +150,7 @@ impl<'a> RatioSearch<'a> {
                 }
             }
             let wide = (open.peek().map_or(settled, |step| step.upper) / best.lo - 1.0).max(tolerance);
-            progress((wide.ln() / tolerance.ln()).clamp(0.0, 1.0));
+            is_stopped = progress((wide.ln() / tolerance.ln()).clamp(0.0, 1.0)).is_break();
         }
         GreatestRatio { hi: settled, proved: true, ..best }
     }

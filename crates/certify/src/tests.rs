@@ -6,7 +6,7 @@ use super::elementary::{atan, ln, pi, sin_cos};
 use super::interval::Interval;
 use super::search::{CertificateSearch, MOST_SPANS};
 use super::{CertificateLine, Given, MOST_STEPS, Status};
-use bench_dragon_motion::event::Event;
+use bench_dragon_motion::event::{Event, unreported};
 use bench_dragon_show::scene::Scene;
 
 const BITS: usize = 192;
@@ -131,7 +131,7 @@ fn elementary_functions_hold_what_192_bits_find() {
 fn a_certificate_with_too_many_places_says_so() {
     let scene = Scene::paper();
     let motion = scene.ensemble.only().unwrap();
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let events: Vec<Event> = timeline.events().iter().map(|timed| timed.event).collect();
     let certified = |most_spans: usize| {
         let given = Given {
@@ -152,7 +152,7 @@ fn a_certificate_with_too_many_places_says_so() {
             }
             Ok(())
         };
-        let events = CertificateSearch::new(given, Vec::new(), &mut count).run(&mut |_| ()).unwrap();
+        let events = CertificateSearch::new(given, Vec::new(), &mut count).run(&mut unreported).unwrap();
         (events, spans)
     };
     let (events, spans) = certified(5000);

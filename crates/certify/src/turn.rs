@@ -18,7 +18,7 @@ use super::place::{Place, Span};
 use super::search::{CertificateSearch, MOST_SPANS, path_end};
 use super::step::{Chain, Claim, Listed, links_of};
 use bench_dragon_messages::state::EventKind;
-use bench_dragon_motion::event::Event;
+use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;
@@ -262,7 +262,7 @@ impl Passage {
 
     /// Returns true if the passage is proved to be free of contact, stall and lock, and the last bench to have turned
     /// at its end. Boards are bounded to the first order if `closely` is true, which passes boards that all but touch.
-    pub fn is_free(&self, team: &Team, closely: bool, progress: &mut dyn FnMut(f64)) -> bool {
+    pub fn is_free(&self, team: &Team, closely: bool, progress: Progress<'_>) -> bool {
         let travelled = self.path.length();
         let end = Event { kind: EventKind::PathEnd, travelled, bench_a: None, bench_b: None, place: None };
         let given = Given {

@@ -102,6 +102,7 @@ pub enum FeedEvent<'a> {
 /// A publisher and its subscriber, here in one process:
 ///
 /// ```
+/// use bench_dragon_motion::event::unreported;
 /// use std::time::Duration;
 ///
 /// use bench_dragon_publisher::live::{Outgoing, Publisher};
@@ -114,7 +115,7 @@ pub enum FeedEvent<'a> {
 /// use bench_dragon_show::convert::stage;
 ///
 /// let scene = Scene::paper();
-/// let mut show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), Playback::of(&scene))?;
+/// let mut show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene))?;
 /// let config = PublisherConfig {
 ///     name: format!("feed_example_{}", std::process::id()),
 ///     handles: scene.ensemble.handles(),

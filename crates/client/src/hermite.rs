@@ -181,6 +181,7 @@ fn coordinate(at: [f64; 2], rate: [f64; 2], ends: (bool, bool), length: f64, u: 
 
 #[cfg(test)]
 mod tests {
+    use bench_dragon_motion::event::unreported;
     use proptest::prelude::*;
 
     use super::*;
@@ -206,7 +207,7 @@ mod tests {
     /// A reader that has taken the first frames of a show, which ends at the contact.
     fn reader(playback: Playback, frames: u64) -> HermiteReader {
         let scene = scene();
-        reader_of(&mut Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), playback).unwrap(), playback, frames)
+        reader_of(&mut Show::new(&scene, scene.ensemble.timeline(&mut unreported), playback).unwrap(), playback, frames)
     }
 
     fn reader_of(show: &mut Show, playback: Playback, frames: u64) -> HermiteReader {
@@ -300,7 +301,7 @@ mod tests {
     fn the_last_handle_of_each_of_two_dragons_has_the_heading_that_the_solver_gives() {
         let scene = Scene::parse(include_str!("../../../config/coil.toml"), "coil.toml", "coil").unwrap();
         let playback = Playback { start: 100.0, rate: 10.0, ..Playback::of(&scene) };
-        let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
+        let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(&mut unreported), playback).unwrap();
         let mut reader = reader_of(&mut show, playback, 2);
         let (mut chain, mut handles) = (Chain::new(122), Vec::new());
         scene.ensemble.solver(scene.velocities).solve(100.05, &mut chain).unwrap();

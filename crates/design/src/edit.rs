@@ -6,12 +6,13 @@ use std::collections::BTreeMap;
 
 use toml_edit::DocumentMut;
 
+use crate::request::Setting;
 use crate::scene::{DesignedScene, Fault, written};
 use crate::tables::Path;
 use bench_dragon_motion::model::Point;
 
 /// A change of the text.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Change {
     /// A number.
     Number {
@@ -27,12 +28,12 @@ pub enum Change {
         /// The new place.
         value: Point,
     },
-    /// A word.
+    /// A word, or true or false.
     Word {
-        /// The name of the word.
+        /// The name of the value.
         name: String,
-        /// The new word.
-        value: &'static str,
+        /// The new value.
+        value: toml_edit::Value,
     },
 }
 
@@ -49,7 +50,7 @@ impl Change {
 
     /// Creates the change of a word.
     pub fn word(name: &str, value: &'static str) -> Self {
-        Self::Word { name: name.to_owned(), value }
+        Self::Word { name: name.to_owned(), value: value.into() }
     }
 }
 
@@ -60,12 +61,16 @@ fn rounded(value: f64, step: f64) -> f64 {
     format!("{value:.decimals$}").parse().unwrap_or(value) + 0.0
 }
 
-/// Replaces numbers of a text by others, and adds those that the text leaves to their defaults.
+/// Replaces values of a text by others, and adds those that the text leaves to their defaults.
 ///
 /// # Errors
 /// [`Fault`] for a number that its field cannot have, or a name without a table.
-pub fn set(scene: &DesignedScene, numbers: &BTreeMap<String, f64>) -> Result<String, Fault> {
-    let changes = numbers.iter().map(|(name, value)| Change::Number { name: name.clone(), value: *value });
+pub fn set(scene: &DesignedScene, values: &BTreeMap<String, Setting>) -> Result<String, Fault> {
+    let changes = values.iter().map(|(name, value)| match value {
+        Setting::Number(value) => Change::Number { name: name.clone(), value: *value },
+        Setting::Switch(value) => Change::Word { name: name.clone(), value: (*value).into() },
+        Setting::Word(value) => Change::Word { name: name.clone(), value: value.into() },
+    });
     apply(scene, &changes.collect::<Vec<_>>())
 }
 
@@ -89,8 +94,8 @@ pub fn apply(scene: &DesignedScene, changes: &[Change]) -> Result<String, Fault>
                 }
             }
             Change::Word { name, value } => match scene.values.get(name) {
-                Some(found) => spans.push((found.span.clone(), format!("\"{value}\""))),
-                None => missing.push((name.as_str(), toml_edit::Value::from(*value))),
+                Some(found) => spans.push((found.span.clone(), value.to_string())),
+                None => missing.push((name.as_str(), value.clone())),
             },
         }
     }

@@ -5,8 +5,10 @@
 //! dragged and `edit` the changes. `session` answers a page; nothing here opens a socket or a file.
 
 mod additions;
+mod cues;
 mod edit;
 mod frame;
+mod geojson;
 pub mod handles;
 mod request;
 pub mod scene;

@@ -13,7 +13,7 @@ pub struct Request {
     /// The number, which answers repeat.
     pub id: u64,
     text: Option<String>,
-    set: Option<BTreeMap<String, f64>>,
+    set: Option<BTreeMap<String, Setting>>,
     drag: Option<Drag>,
     add: Option<Addition>,
     remove: Option<String>,
@@ -24,6 +24,18 @@ pub struct Request {
     template: Option<String>,
     geojson: Option<String>,
     file: Option<bool>,
+}
+
+/// A new value.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Setting {
+    /// True or false.
+    Switch(bool),
+    /// A number.
+    Number(f64),
+    /// A word.
+    Word(String),
 }
 
 /// A handle and the place to which it is dragged.
@@ -65,8 +77,8 @@ pub struct Addition {
 pub enum Wish {
     /// A new text.
     Text(String),
-    /// Other numbers in the text.
-    Set(BTreeMap<String, f64>),
+    /// Other numbers, words and switches in the text.
+    Set(BTreeMap<String, Setting>),
     /// A handle at another place.
     Drag(Drag),
     /// A new table.

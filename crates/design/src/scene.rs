@@ -5,8 +5,9 @@
 use std::ops::Range;
 
 use serde::Serialize;
+use serde_json::json;
 
-use crate::text::{Lines, Values};
+use crate::text::{Found, Lines, Value, Values};
 use bench_dragon_messages::sentence::number;
 use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::model::shape::ShapeKind;
@@ -61,6 +62,27 @@ pub struct Field {
     #[serde(flatten)]
     pub span: Span,
 }
+
+/// A word, or true or false, of the text, with the words that it may be.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Choice<'t> {
+    name: &'t str,
+    value: serde_json::Value,
+    unit: &'static str,
+    choices: &'static [&'static str],
+    line: usize,
+    #[serde(flatten)]
+    span: Span,
+}
+
+/// The words of the text that a page offers, by the ends of their names.
+const CHOICES: [(&str, &[&str]); 5] = [
+    (".side", &["left", "right"]),
+    (".direction", &["in", "out"]),
+    ("motion.on_contact", &["stop", "continue"]),
+    ("motion.at_end", &["hold", "loop"]),
+    (".then", &["mark", "pause"]),
+];
 
 /// The bytes of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -148,6 +170,26 @@ impl DesignedScene {
     /// Returns the line of a value, from 1.
     pub(crate) fn line_of(&self, name: &str) -> Option<usize> {
         self.values.get(name).map(|found| self.lines.line(found.span.start))
+    }
+
+    /// Returns the fields of the numbers, and of the words and switches of the text, in its order.
+    pub(crate) fn listed_fields(&self) -> Vec<serde_json::Value> {
+        let numbers = self.fields.iter().map(|field| (field.span.start, json!(field)));
+        let choice = |found: &Found| {
+            let (value, choices): (serde_json::Value, &[&str]) = match &found.value {
+                Value::Switch(value) => ((*value).into(), &[]),
+                Value::Words(words) => {
+                    let (_, choices) = CHOICES.into_iter().find(|(end, _)| found.name.ends_with(end))?;
+                    (words.as_str().into(), choices)
+                }
+                Value::Number(_) | Value::Array(_) | Value::Other => return None,
+            };
+            let (line, span) = (self.lines.line(found.span.start), found.span.clone().into());
+            Some((found.span.start, json!(Choice { name: &found.name, value, unit: "", choices, line, span })))
+        };
+        let mut listed: Vec<_> = numbers.chain(self.values.all().iter().filter_map(choice)).collect();
+        listed.sort_by_key(|(start, _)| *start);
+        listed.into_iter().map(|(_, field)| field).collect()
     }
 
     /// Returns the pieces of all routes.

@@ -10,11 +10,12 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use serde_json::{Value, json};
 
 use crate::frame::{frame, stage};
+use crate::geojson;
 use crate::request::{Request, Wish};
 use crate::scene::{DesignedScene, Fault};
 use crate::search::{Job, Searcher};
 use crate::templates::{TEMPLATES, template};
-use crate::{additions, edit, handles};
+use crate::{additions, cues, edit, handles};
 use bench_dragon_messages::{FrameHeader, HandlePose, StageMessage};
 
 /// The requests of a page that may wait. A page waits for an answer before its next change.
@@ -66,8 +67,8 @@ impl Session {
     pub fn start(file: Option<DesignFile>, answers: Answers) -> io::Result<Self> {
         let (requests, received) = sync_channel(MOST_WAITING);
         let found = Arc::clone(&answers);
-        let searcher = Searcher::start(move |answer| found(Answer::Json(answer.to_string())))?;
-        let desk = Desk { file, answers, searcher, scene: None, is_refused: false, at: 0.0, frames: 0 };
+        let searcher = Searcher::start(move |answer: &Value| found(Answer::Json(answer.to_string())))?;
+        let desk = Desk { file, answers, searcher, scene: None, is_refused: false, at: 0.0, run: 0 };
         std::thread::Builder::new().name("design".to_owned()).spawn(move || desk.serve(&received))?;
         Ok(Self { requests })
     }
@@ -92,11 +93,13 @@ struct Desk {
     is_refused: bool,
     /// The simulated time of the picture.
     at: f64,
-    frames: u64,
+    /// Grows with every scene.
+    run: u64,
 }
 
 impl Desk {
     fn serve(mut self, requests: &Receiver<String>) {
+        self.answer(0, Wish::File);
         while let Ok(request) = requests.recv() {
             match Request::read(&request) {
                 Ok((id, wish)) => self.answer(id, wish),
@@ -126,13 +129,19 @@ impl Desk {
             },
             Wish::At(time) => {
                 self.at = if time.is_finite() { time.max(0.0) } else { 0.0 };
-                return self.draw();
+                return self.draw(id);
             }
             Wish::Set(numbers) => self.good().and_then(|scene| edit::set(&scene, &numbers)),
-            Wish::Drag(drag) => self.good().and_then(|scene| handles::drag(&scene, &drag)),
+            Wish::Drag(drag) => self.good().and_then(|scene| match cues::dragged(&drag.handle) {
+                Some(cue) => cues::drag(&scene, cue, &drag, self.searcher.timeline(self.run).as_ref()),
+                None => handles::drag(&scene, &drag),
+            }),
             Wish::Add(addition) => self.good().and_then(|scene| additions::add(&scene, &addition, self.at)),
             Wish::Remove(name) => self.good().and_then(|scene| additions::remove(&scene, &name)),
-            _ => Err("this request is not known yet".to_owned().into()),
+            Wish::GeoJson(text) => self
+                .good()
+                .and_then(|scene| additions::add_polygons(&scene, geojson::polygons(&text).map_err(Fault::from)?)),
+            Wish::Plan(..) | Wish::Cancel => Err("plans are not there yet".to_owned().into()),
         };
         match changed.and_then(|text| DesignedScene::read(&text, &self.shown())) {
             Ok(scene) => self.show(id, scene),
@@ -163,7 +172,8 @@ impl Desk {
             Err(fault) => {
                 self.is_refused = true;
                 self.searcher.search(None);
-                self.refuse(id, &fault);
+                // The page knows every text but the first one and that of the file.
+                self.json(&json!({"id": id, "error": fault_of(&fault, text)}));
             }
         }
     }
@@ -173,24 +183,32 @@ impl Desk {
         let scene = Arc::new(scene);
         self.is_refused = false;
         self.scene = Some(Arc::clone(&scene));
+        self.run += 1;
         // The old search ends while this picture is made.
         self.searcher.search(None);
         self.json(&described(id, &scene));
-        let stage = Box::new(stage(&scene.scene, scene.path_end()));
+        let stage = Box::new(stage(&scene.scene, self.run, scene.path_end()));
         (self.answers)(Answer::Stage(stage, scene.scene.name.clone()));
-        self.draw();
+        self.draw(id);
         self.json(&json!({"id": id, "events": {"state": "computing"}}));
-        self.searcher.search(Some(Job { id, scene }));
+        self.searcher.search(Some(Job { id, run: self.run, scene }));
     }
 
     /// Draws the scene at the time of the picture.
-    fn draw(&mut self) {
-        self.frames += 1;
+    fn draw(&mut self, id: u64) {
         let Some(scene) = &self.scene else { return };
-        if let Some((header, poses)) = frame(&scene.scene, self.at, self.frames) {
+        let timeline = self.searcher.timeline(self.run);
+        if let Some((header, poses)) = frame(&scene.scene, self.at, (self.run, id), timeline.as_ref()) {
             (self.answers)(Answer::Frame(header, poses));
         }
     }
+}
+
+/// Returns a fault with the text that has it.
+fn fault_of(fault: &Fault, text: &str) -> Value {
+    let mut fault = json!(fault);
+    fault["text"] = text.into();
+    fault
 }
 
 /// Returns the first message to a page.
@@ -213,7 +231,7 @@ fn described(id: u64, designed: &DesignedScene) -> Value {
     json!({"id": id, "scene": {
         "text": designed.text,
         "name": designed.scene.name,
-        "fields": designed.fields,
+        "fields": designed.listed_fields(),
         "handles": handles::handles(designed),
         "start": 0.0,
         "end": designed.path_end(),

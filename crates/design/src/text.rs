@@ -15,6 +15,8 @@ pub enum Value {
     Number(f64),
     /// A text.
     Words(String),
+    /// True or false.
+    Switch(bool),
     /// An array, with the number of its elements.
     Array(usize),
     /// A table, or a value that is none of these.
@@ -72,7 +74,8 @@ impl Values {
                 self.add_table(&name, table);
                 Value::Other
             }
-            DeValue::Boolean(_) | DeValue::Datetime(_) => Value::Other,
+            DeValue::Boolean(value) => Value::Switch(*value),
+            DeValue::Datetime(_) => Value::Other,
         };
         let (span, index) = (spanned.span(), self.found.len());
         self.by_name.insert(name.clone(), index);
@@ -81,6 +84,11 @@ impl Values {
             self.by_start.insert(span.start, index);
         }
         self.found.push(Found { name, value, span });
+    }
+
+    /// Returns all values.
+    pub fn all(&self) -> &[Found] {
+        &self.found
     }
 
     /// Returns a value by its name.

@@ -6,9 +6,9 @@
 use std::ops::Range;
 
 use bench_dragon_motion::Motion;
-use bench_dragon_motion::linkage::NoFollower;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::Point;
-use bench_dragon_motion::sweep::{Moved, sweep};
+use bench_dragon_motion::sweep::{Moved, SweepError, sweep};
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay::IntOverlayOptions;
 use i_overlay::core::simplify::Simplify;
@@ -55,8 +55,8 @@ impl SweptArea {
     /// Unites the positions of the boards of all stretches. `progress` receives the share that is done, from 0 to 1.
     ///
     /// # Errors
-    /// [`NoFollower`] if a handle has no place before the end of its stretch.
-    pub fn new(stretches: &[SweptStretch<'_>], progress: &mut dyn FnMut(f64)) -> Result<Self, NoFollower> {
+    /// A handle has no place before the end of its stretch, or `progress` has stopped the search.
+    pub fn new(stretches: &[SweptStretch<'_>], progress: Progress<'_>) -> Result<Self, SweepError> {
         let mut union = Union { waiting: Vec::new(), levels: Vec::new() };
         let share = 1.0 / stretches.len() as f64;
         for (k, SweptStretch { motion, travelled, benches }) in stretches.iter().enumerate() {

@@ -175,14 +175,12 @@ impl<'a> ConservativeAdvancement<'a> {
     }
 
     /// Returns the least clearance of one pair within a bracket that holds one minimum, and the head's place there.
-    /// Infinite if a configuration cannot be solved.
-    pub fn minimum_of(&self, (a, b): (u32, u32), from: f64, to: f64) -> (f64, f64) {
+    /// Infinite if a configuration cannot be solved, or the budget is spent.
+    pub fn minimum_of(&self, (a, b): (u32, u32), (from, to): (f64, f64), budget: &mut Budget) -> (f64, f64) {
         let pair = (a as usize, b as usize);
         let clearance = |travelled: f64| {
             let mut configuration = Configuration::new(self.path, travelled);
-            let mut unreported = |_| {};
-            let mut budget = Budget::new(u64::MAX, &mut unreported);
-            let solved = configuration.solve_to(pair.1 + 1, self.path, self.team, &mut budget);
+            let solved = configuration.solve_to(pair.1 + 1, self.path, self.team, budget);
             solved.map_or(f64::INFINITY, |()| configuration.clearance(pair))
         };
         golden_section_min(clearance, from, to)

@@ -6,14 +6,14 @@
 
 mod clearances;
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use bench_dragon_messages::Roster;
 use bench_dragon_messages::state::EventKind;
 
 use crate::clearance::{ClearanceMonitor, Pairs, Precision};
 use crate::contact::between::{self, Meeting, MovingDragon};
-use crate::event::{Budget, Event};
+use crate::event::{Budget, Event, Progress};
 use crate::ground::{Ground, Obstacle};
 use crate::linkage::NoFollower;
 use crate::model::team::Team;
@@ -170,10 +170,11 @@ impl Ensemble {
         self.ground().obstacles().get((number as usize).checked_sub(self.handles())?)
     }
 
-    /// Returns the events of all dragons, contacts included. `progress` is called at times with the share of the search
-    /// that is done, from 0 to 1.
-    pub fn timeline(&self, progress: &mut dyn FnMut(f64)) -> Timeline {
+    /// Returns the events of all dragons, contacts included. If `progress` stops the search, the timeline says so.
+    pub fn timeline(&self, progress: Progress<'_>) -> Timeline {
         let (own_share, share) = self.shares();
+        let mut is_stopped = false;
+        let mut progress = |share| noted(progress(share), &mut is_stopped);
         let own = |(k, dragon): (usize, &Dragon)| {
             let events = dragon.motion.events(&mut |part| progress(share * (k as f64 + part)));
             self.on_the_shows_clock(k, events)
@@ -188,19 +189,26 @@ impl Ensemble {
                 first = between.as_ref().into_iter().chain(&first).min_by(by_time).copied();
                 reached
             }
+            Err(_) if is_stopped => 0.0,
             Err(stuck) => {
                 log::warn!("the search for a contact of two dragons stopped at a place without a solution: {stuck}");
                 0.0
             }
         };
-        collected(&own, end, first, until)
+        collected(&own, end, first, until).stopped(is_stopped)
     }
 
-    /// Returns the events without contacts and obstacles, which cost a search.
-    pub fn timeline_without_contact(&self) -> Timeline {
-        let own = |(k, dragon): (usize, &Dragon)| self.on_the_shows_clock(k, dragon.motion.events_without_contact());
+    /// Returns the events without contacts and obstacles, which cost a longer search. If `progress` stops it, the
+    /// timeline says so.
+    pub fn timeline_without_contact(&self, progress: Progress<'_>) -> Timeline {
+        let mut is_stopped = false;
+        let (_, share) = self.shares();
+        let own = |(k, dragon): (usize, &Dragon)| {
+            let mut of_all = |part| noted(progress(share * (k as f64 + part)), &mut is_stopped);
+            self.on_the_shows_clock(k, dragon.motion.events_without_contact(&mut of_all))
+        };
         let own: Vec<Timeline> = self.dragons.iter().enumerate().map(own).collect();
-        collected(&own, end_of(&own), None, f64::INFINITY)
+        collected(&own, end_of(&own), None, f64::INFINITY).stopped(is_stopped)
     }
 
     /// Returns the share of a search that is spent on the dragons alone, and the share of one dragon.
@@ -234,14 +242,16 @@ impl Ensemble {
     }
 
     /// Returns the first contact of boards of two dragons up to a time, and the time up to which the search came.
-    fn contact_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Result<(Option<TimedEvent>, f64), NoFollower> {
+    fn contact_between(&self, to: f64, progress: Progress<'_>) -> Result<(Option<TimedEvent>, f64), NoFollower> {
         if self.dragons.len() < 2 {
             return Ok((None, f64::INFINITY));
         }
-        let found = self.singularities();
-        let moving = self.moving(&found)?;
+        let found = self.singularities(progress);
+        let known = self.known_to(&found, to);
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
-        let (mut first, mut to, mut until): (Option<(Meeting, [usize; 2])>, _, _) = (None, to, f64::INFINITY);
+        let moving = self.moving(&found, &mut budget)?;
+        let until = if known < to { known } else { f64::INFINITY };
+        let (mut first, mut to, mut until): (Option<(Meeting, [usize; 2])>, _, _) = (None, known, until);
         for pair in pairs(moving.len()) {
             let contact = between::first_contact(pair.map(|k| &moving[k]), (0.0, to), &mut budget)?;
             if contact.searched_until < to && contact.value.is_none() {
@@ -263,12 +273,7 @@ impl Ensemble {
 
     /// Returns the first contact of boards of two dragons up to a time of the show. The contact has its time, and a
     /// bench of each dragon, counted within the dragon. Returns `None` if there is no contact, or the search gave up.
-    pub fn first_contact_of(
-        &self,
-        pair: [usize; 2],
-        to: f64,
-        progress: &mut dyn FnMut(f64),
-    ) -> Option<(f64, [usize; 2])> {
+    pub fn first_contact_of(&self, pair: [usize; 2], to: f64, progress: Progress<'_>) -> Option<(f64, [usize; 2])> {
         let two = self.pair(pair);
         let TimedEvent { time, event } = two.contact_between(to, progress).ok()?.0?;
         Some((time, two.within([event.bench_a?, event.bench_b?])))
@@ -295,14 +300,25 @@ impl Ensemble {
         [0, 1].map(|k| (self.first_handles[pair[k]] + meeting.benches[k]) as u32)
     }
 
-    fn singularities(&self) -> Vec<Singularities> {
-        self.dragons.iter().map(|dragon| dragon.motion.singularities(&mut |_| ())).collect()
+    fn singularities(&self, progress: Progress<'_>) -> Vec<Singularities> {
+        self.dragons.iter().map(|dragon| dragon.motion.singularities(&mut |_| progress(0.0))).collect()
     }
 
-    fn moving<'a>(&'a self, found: &'a [Singularities]) -> Result<Vec<MovingDragon<'a>>, NoFollower> {
+    /// Returns the time of the show, at most `to`, up to which the turns of all dragons are known.
+    fn known_to(&self, found: &[Singularities], to: f64) -> f64 {
+        let incomplete = self.dragons.iter().zip(found).filter(|(_, found)| found.end.is_none());
+        incomplete.map(|(dragon, found)| dragon.motion.time_at(found.searched_until) + dragon.delay).fold(to, f64::min)
+    }
+
+    fn moving<'a>(
+        &'a self,
+        found: &'a [Singularities],
+        budget: &mut Budget,
+    ) -> Result<Vec<MovingDragon<'a>>, NoFollower> {
         let moving = |(Dragon { delay, motion, .. }, found): (&'a Dragon, &'a Singularities)| {
             let end = found.end.map_or(motion.path().length(), |end| end.travelled);
-            MovingDragon::new(motion.advancement(found), *motion.placement(), (*delay, motion.head_speed(), end))
+            let of_show = (*delay, motion.head_speed(), end);
+            MovingDragon::new(motion.advancement(found), *motion.placement(), of_show, budget)
         };
         self.dragons.iter().zip(found).map(moving).collect()
     }
@@ -352,6 +368,12 @@ impl Solver for EnsembleSolver {
         }
         Ok(())
     }
+}
+
+/// Returns what the receiver of a search's progress has answered, and notes a stop.
+fn noted(answer: ControlFlow<()>, is_stopped: &mut bool) -> ControlFlow<()> {
+    *is_stopped |= answer.is_break();
+    answer
 }
 
 /// Returns all pairs of `count` dragons, in order.

@@ -1,5 +1,7 @@
 //! Events of a motion and the budget of a search. The searches return events; the timeline gives them times.
 
+use std::ops::ControlFlow;
+
 use bench_dragon_messages::state::EventKind;
 
 use crate::model::Point;
@@ -10,9 +12,10 @@ use crate::model::Point;
 ///
 /// ```
 /// use bench_dragon_messages::state::EventKind;
+/// use bench_dragon_motion::event::unreported;
 /// use bench_dragon_show::scene::Scene;
 ///
-/// let timeline = Scene::paper().ensemble.timeline_without_contact();
+/// let timeline = Scene::paper().ensemble.timeline_without_contact(&mut unreported);
 /// for timed in timeline.events() {
 ///     println!("{}: {} s, after {} m", timed.event.kind.name(), timed.time, timed.event.travelled);
 /// }
@@ -36,36 +39,64 @@ pub struct Event {
     pub place: Option<Point>,
 }
 
-/// The budget of a search is spent.
+/// The receiver of a search's progress: the share of the search that is done, from 0 to 1. It is called at least every
+/// 50 ms. [`ControlFlow::Break`] stops the search, whose result then says how far it came; a receiver that has stopped
+/// a search returns it at each later call, too.
+pub type Progress<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
+
+/// The [`Progress`] of a search that nobody watches, and nobody stops.
+pub fn unreported(_share: f64) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// The budget of a search is spent, or the search was stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Spent;
+
+/// Work after which a search asks whether it is to stop: less than 10 ms also on a path of many pieces.
+const WORK_BETWEEN_REPORTS: u64 = 2_000;
 
 /// Work that a search may still do, and the receiver of its progress. One unit of work is one link solved or one pair
 /// of boards tested.
 pub struct Budget<'a> {
     left: u64,
-    progress: &'a mut dyn FnMut(f64),
+    progress: Progress<'a>,
+    /// The share that was reported last, and the work since then.
+    share: f64,
+    unreported: u64,
+    is_stopped: bool,
 }
 
 impl<'a> Budget<'a> {
-    /// Creates a budget of `limit` units of work. `progress` is called at times with the share of the search that is
-    /// done, from 0 to 1.
-    pub fn new(limit: u64, progress: &'a mut dyn FnMut(f64)) -> Self {
-        Self { left: limit, progress }
+    /// Creates a budget of `limit` units of work.
+    pub fn new(limit: u64, progress: Progress<'a>) -> Self {
+        Self { left: limit, progress, share: 0.0, unreported: 0, is_stopped: false }
     }
 
     /// Subtracts `work` units.
     ///
     /// # Errors
-    /// [`Spent`] if fewer are left; the budget is then empty.
+    /// [`Spent`] if fewer are left or the search was stopped; the budget is then empty.
     pub fn spend(&mut self, work: u64) -> Result<(), Spent> {
-        let enough = work <= self.left;
+        self.unreported += work;
+        if self.unreported >= WORK_BETWEEN_REPORTS {
+            self.report(self.share);
+        }
+        let enough = work <= self.left && !self.is_stopped;
         self.left = self.left.saturating_sub(work);
         if enough { Ok(()) } else { Err(Spent) }
     }
 
     /// Reports the share of the search that is done.
     pub fn report(&mut self, share: f64) {
-        (self.progress)(share.clamp(0.0, 1.0));
+        (self.share, self.unreported) = (share.clamp(0.0, 1.0), 0);
+        if !self.is_stopped && (self.progress)(self.share).is_break() {
+            (self.left, self.is_stopped) = (0, true);
+        }
+    }
+
+    /// Returns true if the receiver of the progress has stopped the search.
+    pub fn is_stopped(&self) -> bool {
+        self.is_stopped
     }
 }

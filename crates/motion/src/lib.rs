@@ -32,7 +32,7 @@ use crate::solve::{Solver, Velocities};
 
 use clearance::{ClearanceMonitor, Pairs, Precision};
 use contact::{ConservativeAdvancement, Found, LeastClearance, ObstacleClearance, Touch};
-use event::{Budget, Event};
+use event::{Budget, Event, Progress};
 use ground::Ground;
 use placement::{Placed, Placement};
 use singularities::Singularities;
@@ -90,12 +90,13 @@ pub enum MotionError {
 /// use bench_dragon_motion::model::team::Team;
 /// use bench_dragon_messages::state::EventKind;
 /// use bench_dragon_motion::ensemble::Ensemble;
+/// use bench_dragon_motion::event::unreported;
 /// use bench_dragon_motion::{Method, Motion};
 ///
 /// let team = Team { benches: 20, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
 /// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
 /// let motion = Motion::new(path, team, 1.0, Method::Newton)?;
-/// let timeline = Ensemble::alone(motion).timeline(&mut |_| ());
+/// let timeline = Ensemble::alone(motion).timeline(&mut unreported);
 /// let contact = timeline.find(EventKind::Contact).unwrap();
 /// assert!((contact.time - 412.473_837_682).abs() < 1e-9);
 /// assert_eq!((contact.event.bench_a, contact.event.bench_b), (Some(0), Some(8)));
@@ -343,7 +344,7 @@ impl Motion {
 
     /// Returns all events, contact included. `progress` is called at times with the share of the search that is done,
     /// from 0 to 1.
-    pub fn events(&self, progress: &mut dyn FnMut(f64)) -> MotionEvents {
+    pub fn events(&self, progress: Progress<'_>) -> MotionEvents {
         let found = self.singularities(&mut |share| progress(0.1 * share));
         let end = self.end(&found);
         let mut searched_until = found.searched_until;
@@ -371,7 +372,7 @@ impl Motion {
     }
 
     /// Returns the first touch of each obstacle up to a place of the head, and the place up to which the search came.
-    fn touches(&self, found: &Singularities, until: f64, progress: &mut dyn FnMut(f64)) -> (Vec<Event>, f64) {
+    fn touches(&self, found: &Singularities, until: f64, progress: Progress<'_>) -> (Vec<Event>, f64) {
         let ground = self.ground.in_own_frame(&self.placement);
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
         match self.advancement(found).first_touches(&ground, 0.0, until, &mut budget) {
@@ -392,8 +393,8 @@ impl Motion {
     }
 
     /// Returns the events without contacts and obstacles, which cost a search.
-    pub fn events_without_contact(&self) -> MotionEvents {
-        let found = self.singularities(&mut |_| ());
+    pub fn events_without_contact(&self, progress: Progress<'_>) -> MotionEvents {
+        let found = self.singularities(progress);
         let end = self.end(&found);
         self.placed_events(found.stall.into_iter().chain([end]).collect(), found.searched_until)
     }
@@ -401,34 +402,32 @@ impl Motion {
     /// Returns the least clearance of two boards that share no handle, from one place of the head to another. Returns
     /// `None` for fewer than three benches, and if a place inside the motion has no solution. `progress` is called as
     /// by [`Motion::events`].
-    pub fn least_clearance(
-        &self,
-        (from, to): (f64, f64),
-        progress: &mut dyn FnMut(f64),
-    ) -> Option<Found<LeastClearance>> {
+    pub fn least_clearance(&self, (from, to): (f64, f64), progress: Progress<'_>) -> Option<Found<LeastClearance>> {
         if self.team.benches < 3 {
             return None;
         }
-        let found = self.singularities(&mut |_| ());
+        let found = self.singularities(&mut |_| progress(0.0));
+        let to = found.known_to(to).max(from);
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
-        self.advancement(&found).least_clearance(from, to.max(from), &mut budget).ok()
+        self.advancement(&found).least_clearance(from, to, &mut budget).ok()
     }
 
     /// Returns the least clearance of each obstacle from the start to a place of the head. `progress` is called as by
     /// [`Motion::events`]. Returns the clearances in the order of the obstacles, and the place up to which the search
     /// came. The list is empty without obstacles, and if a place inside the motion has no solution.
-    pub fn obstacle_clearances(&self, to: f64, progress: &mut dyn FnMut(f64)) -> (Vec<Option<ObstacleClearance>>, f64) {
+    pub fn obstacle_clearances(&self, to: f64, progress: Progress<'_>) -> (Vec<Option<ObstacleClearance>>, f64) {
         if self.ground.is_empty() {
             return (Vec::new(), to);
         }
-        let found = self.singularities(&mut |_| ());
+        let found = self.singularities(&mut |_| progress(0.0));
+        let to = found.known_to(to);
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
         let ground = self.ground.in_own_frame(&self.placement);
         self.advancement(&found).obstacle_clearances(&ground, 0.0, to, &mut budget).unwrap_or((Vec::new(), to))
     }
 
     /// Searches for stall, lock and the turns of the handles.
-    pub fn singularities(&self, progress: &mut dyn FnMut(f64)) -> Singularities {
+    pub fn singularities(&self, progress: Progress<'_>) -> Singularities {
         Singularities::search(&self.path, &self.team, &mut Budget::new(SINGULARITIES_BUDGET, progress))
     }
 

@@ -56,6 +56,11 @@ pub struct Singularities {
 }
 
 impl Singularities {
+    /// Returns the metres of travel, at most `to`, up to which all turns are known.
+    pub fn known_to(&self, to: f64) -> f64 {
+        if self.end.is_some() { to } else { to.min(self.searched_until) }
+    }
+
     /// Searches from the start of the motion until it ends or the budget is spent.
     pub fn search(path: &Path, team: &Team, budget: &mut Budget) -> Self {
         let trace = |link: usize, start| LinkTrace::new(Link { path, length: team.link(link) }, start);

@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use crate::Motion;
+use crate::event::Progress;
 use crate::linkage::{NoFollower, follower, link_pose};
 use crate::model::Point;
 use crate::model::board::Board;
@@ -13,6 +14,17 @@ use crate::model::board::Board;
 /// The corners of a board on the stage, at the beginning and at the end of a step of the head. They are in the order of
 /// [`Board::corners`].
 pub type Moved = [[Point; 4]; 2];
+
+/// The reason for an incomplete sweep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SweepError {
+    /// A handle has no place before the end of the stretch.
+    #[error(transparent)]
+    NoFollower(#[from] NoFollower),
+    /// The receiver of the progress has stopped it.
+    #[error("stopped")]
+    Stopped,
+}
 
 /// Shares of a step at which the corners are compared with the straight lines between its ends.
 const SHARES: [f64; 3] = [0.25, 0.5, 0.75];
@@ -34,18 +46,18 @@ const LEAST_SHARE: f64 = 1e-9;
 /// board is left out from the place on where the board before it, of the same length, began.
 ///
 /// # Errors
-/// [`NoFollower`] if a handle has no place before the end of the stretch.
+/// A handle has no place before the end of the stretch, or `progress` has stopped the search.
 pub fn sweep(
     motion: &Motion,
     (from, to): (f64, f64),
     benches: Range<usize>,
     tolerance: f64,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
     moved: &mut dyn FnMut(&Moved),
-) -> Result<(), NoFollower> {
+) -> Result<(), SweepError> {
     let mut boards = Boards { motion, benches, begun: Vec::new(), turn_back: false };
     // A handle that goes backward may leave the places that a board before it has covered.
-    boards.turn_back = motion.singularities(&mut |_| ()).stall.is_some_and(|stall| stall.travelled < to);
+    boards.turn_back = motion.singularities(&mut |_| progress(0.0)).stall.is_some_and(|stall| stall.travelled < to);
     let mut at = boards.positions(from, usize::MAX)?;
     boards.begun = at.iter().map(|board| board.front).collect();
     // Boards that stand cover their place.
@@ -56,6 +68,9 @@ pub fn sweep(
     let mut travelled = from;
     let mut step = FIRST_SHARE * shortest;
     while travelled < to {
+        if progress((travelled - from) / (to - from)).is_break() {
+            return Err(SweepError::Stopped);
+        }
         let next = (travelled + step).min(to);
         let least = LEAST_SHARE * shortest;
         match boards.straight_to(&at, (travelled, next), tolerance) {
@@ -63,7 +78,6 @@ pub fn sweep(
                 boards.report(&at, &positions, moved);
                 (at, travelled) = (positions, next);
                 step *= GROWTH;
-                progress((travelled - from) / (to - from));
             }
             None if next - travelled > least => step = 0.5 * (next - travelled),
             None => match boards.positions(next, boards.alone(&at)) {
@@ -73,7 +87,7 @@ pub fn sweep(
                 }
                 // The end may be a lock, at which rounding leaves no follower.
                 Err(_) if to - travelled <= 1e3 * least => break,
-                Err(none) => return Err(none),
+                Err(none) => return Err(none.into()),
             },
         }
     }

@@ -44,6 +44,7 @@ pub struct Timeline {
     /// The path ends of dragons that stand while others continue, in order of time.
     standing: Vec<TimedEvent>,
     searched_until: Option<f64>,
+    is_stopped: bool,
 }
 
 impl Timeline {
@@ -56,7 +57,7 @@ impl Timeline {
             let by_time = a.time.total_cmp(&b.time).then(a.event.kind.cmp(&b.event.kind));
             ends(a).cmp(&ends(b)).then(by_time).then(a.event.bench_b.cmp(&b.event.bench_b))
         });
-        Self { events, standing: Vec::new(), searched_until }
+        Self { events, standing: Vec::new(), searched_until, is_stopped: false }
     }
 
     /// Returns the timeline with the path ends of dragons that stand while others continue. These path ends change no
@@ -93,6 +94,21 @@ impl Timeline {
     /// missing.
     pub fn searched_until(&self) -> Option<f64> {
         self.searched_until
+    }
+
+    /// Returns the timeline of a search that was stopped, if `is_stopped` is true. Where the search came no further,
+    /// nothing is known.
+    pub fn stopped(mut self, is_stopped: bool) -> Self {
+        self.is_stopped = is_stopped;
+        if is_stopped {
+            self.searched_until.get_or_insert(0.0);
+        }
+        self
+    }
+
+    /// Returns true if the search was stopped by the receiver of its progress. Then `searched_until` is a time.
+    pub fn is_stopped(&self) -> bool {
+        self.is_stopped
     }
 
     /// Returns the first event of a kind, if there is one.

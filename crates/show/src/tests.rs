@@ -4,6 +4,7 @@ use super::*;
 use crate::scene::AtEnd;
 use bench_dragon_messages::state::Level;
 use bench_dragon_motion::Method;
+use bench_dragon_motion::event::unreported;
 
 const RATE: f64 = 50.0;
 
@@ -15,7 +16,7 @@ fn show(extra: &str, change: impl FnOnce(&mut Playback)) -> Show {
     let scene = Scene { ensemble, ..scene };
     let mut playback = Playback { rate: RATE, ..Playback::of(&scene) };
     change(&mut playback);
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     Show::new(&scene, timeline, playback).unwrap()
 }
 

@@ -7,6 +7,7 @@ use super::{CollisionMeasurement, Subject};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::clearance::least_clearance_all_pairs;
 use bench_dragon_motion::ensemble::Ensemble;
+use bench_dragon_motion::event::unreported;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_motion::timeline::Timeline;
 
@@ -35,7 +36,7 @@ pub(super) fn measure(
     let all_pairs = all_pairs_ns(subject, end);
     let mut measurements = vec![frame_cost("live clearance", live), frame_cost("all pairs", all_pairs)];
     let began = Instant::now();
-    let _ = Ensemble::alone(subject.motion.clone()).timeline(&mut |_| ());
+    let _ = Ensemble::alone(subject.motion.clone()).timeline(&mut unreported);
     measurements.push(CollisionMeasurement {
         method: "exact search".to_owned(),
         frame_ns: None,

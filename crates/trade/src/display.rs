@@ -12,6 +12,7 @@ use bench_dragon_client::hermite::HermiteReader;
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{FrameHeader, HandlePose};
 use bench_dragon_motion::Method;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::convert::handle_pose;
@@ -121,12 +122,12 @@ pub struct DisplayMeasurement {
 /// Measures every reader at every rate on `subject`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A sentence for a dragon without a solution at a sample before its end.
+/// A sentence for a dragon without a solution at a sample before its end, or a measurement that `progress` has stopped.
 pub fn measure(
     subject: &Subject,
     timeline: &Timeline,
     display: Display,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<Vec<DisplayMeasurement>, String> {
     let end = last_frame_time(timeline.show_end(subject.stops_at_contact).time);
     let truth = truth(subject, &display_times(end, display.rate))?;
@@ -151,7 +152,7 @@ pub fn measure(
                 on_front: false,
             }));
         }
-        progress((index + 1) as f64 / RATES.len() as f64);
+        super::go_on(progress((index + 1) as f64 / RATES.len() as f64))?;
     }
     let points: Vec<(f64, f64)> =
         measurements.iter().map(|m| (m.bytes_per_second, m.max_position_error.max(noise))).collect();

@@ -7,11 +7,14 @@ mod candidates;
 mod collision;
 pub mod display;
 
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use serde::Serialize;
 
 use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::separation_board_board;
@@ -120,12 +123,8 @@ struct ReferenceSample {
 /// Measures every solver on `subject`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A sentence if the reference has no solution.
-pub fn measure(
-    subject: &Subject,
-    timeline: &Timeline,
-    progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Measurement>, String> {
+/// A sentence if the reference has no solution, or `progress` has stopped the measurement.
+pub fn measure(subject: &Subject, timeline: &Timeline, progress: Progress<'_>) -> Result<Vec<Measurement>, String> {
     let end = timeline.end().time;
     let samples = truth(subject, end, &mut |share| progress(0.5 * share))?;
     let contact = contact_errors(subject, timeline)?;
@@ -135,13 +134,18 @@ pub fn measure(
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {
         measurements.push(measured(subject, candidate, &samples, noise, end));
-        progress(0.5 + 0.5 * (index + 1) as f64 / count);
+        go_on(progress(0.5 + 0.5 * (index + 1) as f64 / count))?;
     }
     mark_pareto_front(&mut measurements);
     if let Some(first) = measurements.first_mut() {
         first.collision = collision::measure(subject, timeline, first.contact_time_error, first.frame_ns);
     }
     Ok(measurements)
+}
+
+/// Converts the answer of a progress's receiver.
+fn go_on(answer: ControlFlow<()>) -> Result<(), String> {
+    if answer.is_break() { Err("the measurement was stopped".to_owned()) } else { Ok(()) }
 }
 
 /// Returns the high-precision reference of a dragon.
@@ -152,28 +156,35 @@ fn reference(subject: &Subject) -> Result<Reference, String> {
 
 /// Returns the reference at all samples. At the lock itself the solution is lost in rounding, so the last sample is a
 /// thousandth of a second earlier.
-fn truth(subject: &Subject, end: f64, progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
+fn truth(subject: &Subject, end: f64, progress: Progress<'_>) -> Result<Vec<ReferenceSample>, String> {
     let last_second = 1f64.min(0.5 * end);
     let spread = (0..SPREAD_SAMPLES).map(|k| (end - last_second) * k as f64 / SPREAD_SAMPLES as f64);
     let last = (0..LAST_SECOND_SAMPLES)
         .map(|k| end - last_second + (last_second * 0.999) * k as f64 / (LAST_SECOND_SAMPLES - 1) as f64);
     let times: Vec<f64> = spread.chain(last).collect();
     let (first, second) = times.split_at(times.len() / 2);
+    let is_stopped = AtomicBool::new(false);
+    let stopped = || match is_stopped.load(Ordering::Relaxed) {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    };
     std::thread::scope(|scope| {
-        let second = scope.spawn(|| samples(subject, second, &mut |_| ()));
-        let mut all = samples(subject, first, progress)?;
+        let second = scope.spawn(|| samples(subject, second, &mut |_| stopped()));
+        let first = samples(subject, first, progress);
+        is_stopped.store(first.is_err(), Ordering::Relaxed);
+        let mut all = first?;
         all.extend(second.join().map_err(|_| "the reference's second thread panicked".to_owned())??);
         Ok(all)
     })
 }
 
-fn samples(subject: &Subject, times: &[f64], progress: &mut dyn FnMut(f64)) -> Result<Vec<ReferenceSample>, String> {
+fn samples(subject: &Subject, times: &[f64], progress: Progress<'_>) -> Result<Vec<ReferenceSample>, String> {
     let mut reference = reference(subject)?;
     let mut samples = Vec::with_capacity(times.len());
     for &time in times {
         let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
         samples.push(ReferenceSample { time, handles });
-        progress(samples.len() as f64 / times.len() as f64);
+        go_on(progress(samples.len() as f64 / times.len() as f64))?;
     }
     Ok(samples)
 }

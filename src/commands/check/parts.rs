@@ -16,6 +16,7 @@ use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
 use super::super::certificate_file::CertificateFile;
+use super::super::signals::report;
 use super::super::{CommandError, Common, Output, progress_bar};
 
 /// The proved bounds of a least clearance, in every line of `check --prove --json`.
@@ -109,7 +110,7 @@ impl Parts {
         let bar = progress_bar(1000, common).with_message("proving the least clearance");
         let mut write =
             |line: &CertificateLine| certificate.as_mut().map_or(Ok(()), |certificate| certificate.write(line));
-        let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+        let mut progress = |share| report(&bar, share);
         let least = found.0.map(|found| found.least);
         let hints = ClearanceHints { boards: least.as_ref(), obstacles: found.1 };
         let (ensemble, most_steps) = (&scene.ensemble, MOST_CLEARANCE_STEPS);

@@ -6,7 +6,9 @@ use bench_dragon::show::scene::{Accepted, Scene};
 use serde::Serialize;
 
 use super::super::events::bench_name;
+use super::super::signals::{report, unstopped};
 use super::super::{CommandError, Common, Output, progress_bar};
+use super::{given_up, status, warn_of_obstacles};
 
 /// The line of `plan turn --json`.
 #[derive(Serialize)]
@@ -29,7 +31,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
     let (scene, motion) = common.scene_text()?.parse_only()?;
-    super::warn_of_obstacles(&scene);
+    warn_of_obstacles(&scene);
     let description = motion.description();
     let Some(pitch) = description.pitch().or_else(|| description.pitch_of_turn()) else {
         let sentence = "the scene's path is a route without a turn, or with several: expected path.kind \"spiral\" or \
@@ -37,7 +39,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
         return Err(CommandError::BadInput(sentence.to_owned()));
     };
     let bar = progress_bar(1000, common).with_message("searching for the turn");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
+    let mut progress = |share| report(&bar, share);
     let found = least_turn(motion.team(), pitch, arc_ratio, &mut progress)?;
     bar.finish_and_clear();
     let mut output = Output::standard();
@@ -48,14 +50,14 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
             output.line(&sentence)?;
         }
     }
-    output.finish()
+    output.finish().and(unstopped())
 }
 
 fn line(found: &LeastTurn) -> TurnLine {
     let LeastTurn { value_lo, value_hi, value, length, arc_ratio, limit, proved, intervals, .. } = *found;
     TurnLine {
         plan: "turn",
-        status: if proved { "proved" } else { "given_up" },
+        status: status(proved),
         value,
         value_lo: (intervals > 0).then_some(value_lo),
         value_hi,
@@ -89,10 +91,11 @@ fn sentences(scene: &Scene, pitch: f64, is_best: bool, found: &LeastTurn) -> Vec
             if proved { "Proved:" } else { "Not decided to 1e-8 m. What is proved:" }
         ),
         _ if intervals > 0 => format!(
-            "Not decided: the search was given up after {intervals} intervals of radii. What is proved: with every radius \
-             from {from} m to {value_lo} m a link stalls or locks, or two boards overlap."
+            "Not decided: the search {} after {intervals} intervals of radii. What is proved: with every radius from \
+             {from} m to {value_lo} m a link stalls or locks, or two boards overlap.",
+            given_up()
         ),
-        _ => "Not decided: the search was given up, and nothing is proved.".to_owned(),
+        _ => format!("Not decided: the search {}, and nothing is proved.", given_up()),
     });
     if is_best {
         sentences.push(format!(

@@ -8,7 +8,7 @@ use bench_dragon::certify::{self, CertificateLine};
 use bench_dragon::messages::state::EventKind as Kind;
 use bench_dragon::motion::Method;
 use bench_dragon::motion::clearance::least_clearance_all_pairs;
-use bench_dragon::motion::event::Event;
+use bench_dragon::motion::event::{Event, unreported};
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::proof::{EventKind, Proved, ProvedClearance, ProvedEvent, ProvedPitch, ProvedSpeed, Status, Until};
@@ -51,7 +51,7 @@ impl Found {
     /// Searches the scene of a certificate; `None` if it is refused.
     pub fn new(text: &str) -> Option<Self> {
         let scene = scene(text)?;
-        let timeline = scene.ensemble.timeline(&mut |_| ());
+        let timeline = scene.ensemble.timeline(&mut unreported);
         let mut solver =
             scene.ensemble.only().unwrap().with_method(Method::Newton).ok()?.solver(Velocities::Computed).solver;
         let end = timeline.end().time;
@@ -118,7 +118,7 @@ impl Found {
         };
         let least = || {
             let ensemble = &self.scene.ensemble;
-            let found = ensemble.least_clearances(&self.timeline, self.timeline.end(), &mut |_| ());
+            let found = ensemble.least_clearances(&self.timeline, self.timeline.end(), &mut unreported);
             Some(found.own?.least.value).filter(|_| self.timeline.searched_until().is_none())
         };
         let mut frames = self.frames.iter().filter(|(time, _)| *time <= until);
@@ -134,15 +134,16 @@ impl Found {
             |chain: &Chain| chain.vx.iter().zip(&chain.vy).all(|(x, y)| ratio(x, y) <= claim.ratio_hi + CLOSE);
         let mut frames = self.frames.iter().filter(|(time, _)| *time <= claim.time_until);
         // A motion that ends with a lock has no greatest ratio.
-        let fastest = || Some(1.0 / greatest_speed(&self.scene, &self.timeline, 1.0, &mut |_| ()).ok()?.value_lo);
+        let fastest = || Some(1.0 / greatest_speed(&self.scene, &self.timeline, 1.0, &mut unreported).ok()?.value_lo);
         frames.all(|(_, chain)| is_slow(chain))
             && self.fastest.get_or_init(fastest).is_none_or(|most| claim.ratio_lo <= most * (1.0 + CLOSE))
     }
 
     /// Returns true if the claim agrees with the ordinary search for the least pitch.
     fn has_pitch(&self, claim: &ProvedPitch) -> bool {
-        let find =
-            || (claim.radius, least_pitch(self.scene.ensemble.only().unwrap().team(), claim.radius, &mut |_| ()).ok());
+        let find = || {
+            (claim.radius, least_pitch(self.scene.ensemble.only().unwrap().team(), claim.radius, &mut unreported).ok())
+        };
         let (radius, found) = *self.pitch.get_or_init(find);
         let found = if radius == claim.radius { found } else { find().1 };
         // Every pitch may reach the radius, or none.
@@ -156,12 +157,12 @@ impl Found {
 /// Returns the lines of a scene's certificate.
 pub fn certificate(text: &str) -> Vec<Value> {
     let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
-    let timeline = scene.ensemble.timeline(&mut |_| {});
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let mut lines = Vec::new();
     let mut write = |line: &CertificateLine| {
         lines.push(serde_json::to_value(line).unwrap());
         Ok::<(), std::io::Error>(())
     };
-    certify::certify(&scene.ensemble, &timeline, text, certify::MOST_STEPS, &mut write, &mut |_| {}).unwrap();
+    certify::certify(&scene.ensemble, &timeline, text, certify::MOST_STEPS, &mut write, &mut unreported).unwrap();
     lines
 }

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use bench_dragon::certify::plan::{certify_greatest_speed, certify_least_pitch};
 use bench_dragon::certify::{CertificateLine, ClearanceHints, certify_clearances};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::proof::{Proved, verify};
 use serde_json::Value;
 
@@ -155,20 +156,20 @@ pub fn lines_of(lines: &[Value]) -> Vec<u8> {
 
 fn clearance(text: &str) -> Vec<u8> {
     let scene = scene(text).expect("a scene");
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     let show_end = timeline.show_end(true);
-    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut |_| ()).own.expect("three benches").least;
+    let hint = scene.ensemble.least_clearances(&timeline, show_end, &mut unreported).own.expect("three benches").least;
     written(|write| {
         let hints = ClearanceHints { boards: Some(&hint), obstacles: &[] };
-        certify_clearances(&scene.ensemble, show_end, hints, text, 1000, write, &mut |_| ()).expect("lines");
+        certify_clearances(&scene.ensemble, show_end, hints, text, 1000, write, &mut unreported).expect("lines");
     })
 }
 
 fn speed(text: &str) -> Vec<u8> {
     let scene = scene(text).expect("a scene");
-    let timeline = scene.ensemble.timeline(&mut |_| ());
+    let timeline = scene.ensemble.timeline(&mut unreported);
     written(|write| {
-        let found = certify_greatest_speed(&scene, &timeline, 1.5, text, 50_000, write, &mut |_| ());
+        let found = certify_greatest_speed(&scene, &timeline, 1.5, text, 50_000, write, &mut unreported);
         found.expect("no lock").expect("lines");
     })
 }
@@ -177,7 +178,7 @@ fn speed(text: &str) -> Vec<u8> {
 fn pitch(text: &str, radius: f64) -> Vec<u8> {
     let scene = scene(text).expect("a scene");
     let lines = written(|write| {
-        let found = certify_least_pitch(scene.ensemble.only().unwrap().team(), radius, text, write, &mut |_| ());
+        let found = certify_least_pitch(scene.ensemble.only().unwrap().team(), radius, text, write, &mut unreported);
         found.expect("a pitch").expect("lines");
     });
     let mut lines: Vec<Value> = text_lines(&lines).map(|line| serde_json::from_slice(line).expect("JSON")).collect();

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 use bench_dragon::messages::control::{Code, Command};
 use bench_dragon::messages::state::PlaybackState;
 use bench_dragon::messages::{ControlRequest, ControlResponse};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::publisher::live::control::{Answer, CommandQueues, command_queue};
 use bench_dragon::publisher::live::show_source::ShowSource;
@@ -39,7 +40,7 @@ fn scene(pauses: bool) -> &'static (Scene, Timeline) {
                     [[cues]]\nname = \"end\"\nat = 20.0\n";
         let text = if pauses { text.to_owned() } else { text.replace("then = \"pause\"\n", "") };
         let scene = Scene::parse(&text, "control.toml", "control").expect("a scene");
-        let timeline = scene.ensemble.timeline_without_contact();
+        let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
         (scene, timeline)
     })
 }

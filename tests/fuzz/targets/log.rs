@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock};
 
 use bench_dragon::messages::control::{Command, CommandRecord};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
 use bench_dragon::publisher::log::lines::{Line, SecondLine, ShowLine};
@@ -252,8 +253,8 @@ fn timeline(text: &str, scene: &Scene) -> Timeline {
         known.clear();
     }
     let search = || match scene.alerts {
-        Some(_) => scene.ensemble.timeline(&mut |_| ()),
-        None => scene.ensemble.timeline_without_contact(),
+        Some(_) => scene.ensemble.timeline(&mut unreported),
+        None => scene.ensemble.timeline_without_contact(&mut unreported),
     };
     known.entry(text.to_owned()).or_insert_with(search).clone()
 }

@@ -2,6 +2,7 @@
 
 use bench_dragon::messages::sentence::{Figures, alert_sentence};
 use bench_dragon::motion::Method;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::show::convert::{Stamps, collision_alert, frame_header, stage};
@@ -120,8 +121,8 @@ fn is_within(scene: &Scene, benches: usize, links: f64) -> bool {
 
 fn play(scene: &Scene) {
     let timeline = match scene.alerts {
-        Some(_) => scene.ensemble.timeline(&mut |_| ()),
-        None => scene.ensemble.timeline_without_contact(),
+        Some(_) => scene.ensemble.timeline(&mut unreported),
+        None => scene.ensemble.timeline_without_contact(&mut unreported),
     };
     let is_searched = timeline.searched_until().is_none();
     let stop = timeline.show_end(scene.stops_at_contact()).time;

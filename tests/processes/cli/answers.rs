@@ -4,6 +4,7 @@ use std::path::Path;
 
 use bench_dragon::certify::plan::{greatest_speed, least_pitch};
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use serde_json::Value;
 
 use crate::cli::events::time_of;
@@ -44,7 +45,7 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
         assert!(same_bits(value, value_hi) && value_lo < value_hi && value_hi - value_lo <= 1e-9, "{plan}");
         assert!(radius >= REACH && from < value_lo, "{}: {plan}", scene.name);
         if scene.name == "school" {
-            let known = least_pitch(scene.load().ensemble.only().unwrap().team(), REACH, &mut |_| ()).unwrap();
+            let known = least_pitch(scene.load().ensemble.only().unwrap().team(), REACH, &mut unreported).unwrap();
             let overlap = known.overlap.unwrap();
             let bounds =
                 [(value_lo, known.value_lo), (value_hi, known.value_hi.unwrap()), (radius, overlap.head_radius)];
@@ -91,8 +92,8 @@ fn plan_speed_has_its_keys_or_names_what_forbids_it() {
         planned += 1;
         if scene.benches() <= 60 {
             let loaded = scene.load();
-            let timeline = loaded.ensemble.timeline(&mut |_| ());
-            let known = greatest_speed(&loaded, &timeline, LIMIT, &mut |_| ()).unwrap();
+            let timeline = loaded.ensemble.timeline(&mut unreported);
+            let known = greatest_speed(&loaded, &timeline, LIMIT, &mut unreported).unwrap();
             let bounds = [(value_lo, known.value_lo), (value_hi, known.value_hi)];
             for (printed, known) in bounds.into_iter().chain([(time, known.time), (ratio, known.ratio)]) {
                 assert!(same_bits(printed, known), "{}: {plan}", scene.name);

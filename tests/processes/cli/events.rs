@@ -1,6 +1,7 @@
 //! `events` and `check`: every event of every scene, in text and as JSON, with the bits of the library's timeline.
 
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use serde_json::Value;
 
 use crate::cli::scenes::{SceneFile, assert_keys, numbers, program, same_bits, scene, scenes};
@@ -12,7 +13,7 @@ const KINDS: [&str; 4] = ["contact", "stall", "lock", "path_end"];
 fn events_as_json_are_the_timeline_bit_for_bit() {
     for scene in scenes() {
         let lines = scene.answer(&["events", "--json"]);
-        let timeline = scene.load().ensemble.timeline(&mut |_| ());
+        let timeline = scene.load().ensemble.timeline(&mut unreported);
         assert_eq!(lines.lines().count(), timeline.events().len(), "{}: {lines}", scene.name);
         for (line, timed) in lines.lines().zip(timeline.events()) {
             let event: Value = serde_json::from_str(line).unwrap();
@@ -206,5 +207,5 @@ fn check_states_what_each_scene_models() {
 
 /// Returns the time of the event of that kind in the library's timeline.
 pub fn time_of(scene: &SceneFile, kind: EventKind) -> Option<f64> {
-    scene.load().ensemble.timeline(&mut |_| ()).find(kind).map(|timed| timed.time)
+    scene.load().ensemble.timeline(&mut unreported).find(kind).map(|timed| timed.time)
 }

@@ -1,6 +1,7 @@
 //! `solve`: rows, order, bits and refusals on every scene; links and places against the numbers of the scene file.
 
 use bench_dragon::messages::state::EventKind;
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::solve::Chain;
 use bench_dragon::show::solve_at_or_just_before;
 
@@ -82,7 +83,7 @@ fn assert_same(scene: &SceneFile, printed: &[SolvedTime], expected: &[SolvedTime
 
 /// Returns times not in order, one of them twice, and every event of this scene by its name.
 fn times(scene: &SceneFile) -> (String, Vec<f64>) {
-    let timeline = scene.load().ensemble.timeline(&mut |_| ());
+    let timeline = scene.load().ensemble.timeline(&mut unreported);
     let mut times = vec![("1.25".to_owned(), 1.25), ("0".to_owned(), 0.0), ("1.25".to_owned(), 1.25)];
     times.extend(timeline.events().iter().map(|timed| (timed.event.kind.name().to_owned(), timed.time)));
     times.push(("1e-3".to_owned(), 1e-3));

@@ -10,7 +10,7 @@ use crate::lines::{CertificateLine, CertifiedClearance, Until};
 use crate::{CertifyError, Span};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
-use bench_dragon_motion::event::Event;
+use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::timeline::TimedEvent;
 
 /// The width of an enclosure in metres, with room for the rounding of both ends.
@@ -82,7 +82,7 @@ pub fn certify_clearances(
     scene: &str,
     most_steps: u64,
     write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<EnsembleClearances, CertifyError> {
     clearance_first_line(&mut *write, scene)?;
     let dragons = ensemble.dragons();
@@ -98,8 +98,9 @@ pub fn certify_clearances(
             write(&CertificateLine::Dragon { dragon: number })?;
             let end = own_end(ensemble, number, show_end);
             let alone = Ensemble::alone(motion.clone());
-            let least = alone.least_clearances(&alone.timeline_without_contact(), &end, &mut |_| ()).own;
-            let (least, obstacles) = (least.map(|found| found.least), alone.obstacle_clearances(&end, &mut |_| ()));
+            let mut silent = |_| progress(0.0);
+            let least = alone.least_clearances(&alone.timeline_without_contact(&mut silent), &end, &mut silent).own;
+            let (least, obstacles) = (least.map(|found| found.least), alone.obstacle_clearances(&end, &mut silent));
             let hints = ClearanceHints { boards: least.as_ref(), obstacles: &obstacles };
             let part = Part { dragons: vec![number], delay: dragon.delay, show_end: Some(show_end.time) };
             certify_part(motion, (part, &end), hints, most_steps, write, &mut progress)?
@@ -109,10 +110,11 @@ pub fn certify_clearances(
     for pair in pairs(dragons.len()) {
         write(&CertificateLine::Pair { dragons: pair })?;
         let sides = pair.map(|k| {
-            let end = Ensemble::alone(dragons[k].motion.clone()).timeline_without_contact().end().event;
+            let alone = Ensemble::alone(dragons[k].motion.clone());
+            let end = alone.timeline_without_contact(&mut |_| progress(done / parts)).end().event;
             Side::new(&dragons[k], end, end.kind == EventKind::Lock, None)
         });
-        let hint = ensemble.nearest_of(pair, show_end.time);
+        let hint = ensemble.nearest_of(pair, show_end.time, &mut |_| progress(done / parts));
         let mut search = PairSearch::new(sides, Aim::Links, most_steps, &mut *write);
         let contact = contact_of(ensemble, pair, show_end);
         let mut of_pair = |share: f64| progress((done + share) / parts);
@@ -169,7 +171,7 @@ impl PairSearch<'_, '_> {
         dragons: [usize; 2],
         hint: Option<(f64, [usize; 2])>,
         show_end: &TimedEvent,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Result<BetweenEnclosure, CertifyError> {
         let locks = self.sides.iter().filter(|side| side.locks);
         let latest = locks.map(|side| side.end - side.seconds(BEFORE_LOCK)).fold(f64::INFINITY, f64::min);
@@ -202,11 +204,11 @@ impl PairSearch<'_, '_> {
         &mut self,
         dragons: [usize; 2],
         (time, benches): (f64, [usize; 2]),
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Result<BetweenEnclosure, CertifyError> {
         let touched = BetweenEnclosure { dragons, lo: Some(0.0), hi: Some(0.0), time, benches, until: None };
         self.aim = Aim::Apart(0.0);
-        let stuck = self.go_to(FIRST.min(0.5 * time), &mut |_| ())?;
+        let stuck = self.go_to(FIRST.min(0.5 * time), &mut |_| progress(0.0))?;
         let found = self.found_meeting(time, benches);
         if let (None, Some((far, line))) = (stuck, found) {
             self.aim = Aim::Links;

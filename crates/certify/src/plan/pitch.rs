@@ -13,6 +13,7 @@ use crate::clearance::Write;
 use crate::lines::{About, CertificateLine, CertifiedPitch};
 use crate::pitch::{Pitches, Reached, head_locks, reaches};
 use crate::place::Span;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
@@ -76,8 +77,8 @@ const SHALLOW: f64 = 0.5;
 ///
 /// # Errors
 /// The radius is reached with every pitch from the least one on, or with none.
-pub fn least_pitch(team: &Team, radius: f64, progress: &mut dyn FnMut(f64)) -> Result<LeastPitch, PlanError> {
-    let mut propose = |from: f64, to: f64, progress: &mut dyn FnMut(f64)| free_from(team, (from, to), radius, progress);
+pub fn least_pitch(team: &Team, radius: f64, progress: Progress<'_>) -> Result<LeastPitch, PlanError> {
+    let mut propose = |from: f64, to: f64, progress: Progress<'_>| free_from(team, (from, to), radius, progress);
     Ok(decided(team, radius, &mut propose, false, progress)?.0)
 }
 
@@ -90,9 +91,9 @@ pub fn certify_least_pitch(
     radius: f64,
     scene: &str,
     write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<io::Result<LeastPitch>, PlanError> {
-    let mut propose = |from: f64, to: f64, progress: &mut dyn FnMut(f64)| free_from(team, (from, to), radius, progress);
+    let mut propose = |from: f64, to: f64, progress: Progress<'_>| free_from(team, (from, to), radius, progress);
     let (found, proof) = decided(team, radius, &mut propose, true, progress)?;
     Ok(written(&found, proof, radius, scene, write).map(|()| found))
 }
@@ -121,7 +122,7 @@ fn written(found: &LeastPitch, proof: Proof, radius: f64, scene: &str, write: Wr
 }
 
 /// A function that proposes the least pitch between two with which the radius might be reached.
-type Propose<'p> = &'p mut dyn FnMut(f64, f64, &mut dyn FnMut(f64)) -> Proposal;
+type Propose<'p> = &'p mut dyn FnMut(f64, f64, Progress<'_>) -> Proposal;
 
 /// Encloses the least pitch with any proposals; wrong proposals only cost time. `keeps` requests the lines of the
 /// intervals.
@@ -130,7 +131,7 @@ fn decided(
     radius: f64,
     propose: Propose<'_>,
     keeps: bool,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<(LeastPitch, Proof), PlanError> {
     let Accepted { least, greatest, .. } = Accepted::LENGTH;
     let from = least.max(0.5 * team.width);
@@ -153,7 +154,7 @@ fn decided(
         intervals: 0,
         lines: keeps.then(Vec::new),
     };
-    let reaches = |pitch: f64, progress: &mut dyn FnMut(f64)| reaches(team, pitch, radius, MOST_STEPS, progress);
+    let reaches = |pitch: f64, progress: Progress<'_>| reaches(team, pitch, radius, MOST_STEPS, progress);
     let (mut value_hi, mut reached) = (None, None);
     let mut next = from;
     for _ in 0..MOST_PROPOSALS {
@@ -235,14 +236,14 @@ enum Shown {
 
 impl Blocked<'_> {
     /// Extends the interval up to a pitch, or as far as can be shown. `progress` receives the share that is done.
-    fn extend_to(&mut self, to: f64, progress: &mut dyn FnMut(f64)) {
+    fn extend_to(&mut self, to: f64, progress: Progress<'_>) {
         let from = self.pitch;
         let mut width = FIRST_SHARE * from;
         while self.pitch < to && self.intervals < MOST_INTERVALS {
             width = width.min(to - self.pitch);
             let proof = self.holds(width).or_else(|| {
                 // The proposal may be wrong.
-                [true, false].into_iter().find_map(|hinted| self.narrowed(&mut width, hinted))
+                [true, false].into_iter().find_map(|hinted| self.narrowed(&mut width, hinted, &mut |_| progress(0.0)))
             });
             let Some(proof) = proof else { break };
             let next = (self.pitch + width).min(to);
@@ -262,14 +263,16 @@ impl Blocked<'_> {
             self.pitch = next;
             width *= GROWTH;
             self.intervals += 1;
-            progress(((self.pitch - from) / (to - from)).clamp(0.0, 1.0));
+            if progress(((self.pitch - from) / (to - from)).clamp(0.0, 1.0)).is_break() {
+                break;
+            }
         }
     }
 
     /// Follows the boards, with the hints of the proposal or without. Returns the proof for the greatest width of at
     /// most `width` for which there is one, and sets `width` to that.
-    fn narrowed(&mut self, width: &mut f64, hinted: bool) -> Option<Shown> {
-        if !self.follow(hinted) {
+    fn narrowed(&mut self, width: &mut f64, hinted: bool, progress: Progress<'_>) -> Option<Shown> {
+        if !self.follow(hinted, progress) {
             return None;
         }
         let mut narrower = *width;
@@ -302,7 +305,7 @@ impl Blocked<'_> {
     /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds
     /// other boards or a lock. Returns true if it finds any. With hints, it begins with the obstacle of the proposal,
     /// and keeps two boards that, by the proposal, overlap up to the proposed pitch.
-    fn follow(&mut self, hinted: bool) -> bool {
+    fn follow(&mut self, hinted: bool, progress: Progress<'_>) -> bool {
         let Proposal { pitch: proposed, first, last } = self.proposal;
         if let Some(Deepest { pair, depth, head_radius }) = self.deepest
             && !self.locks
@@ -313,7 +316,7 @@ impl Blocked<'_> {
             let (a, b) = pair;
             let behind = [(a, b + 1), (a, b + 2), (a, b.saturating_sub(1).max(a + 2))];
             for (pairs, shallow) in [(&[pair][..], kept), (&behind, self.shallow)] {
-                let nearest = deepest(self.team, self.pitch, self.radius, pairs, head_radius);
+                let nearest = deepest(self.team, self.pitch, self.radius, (pairs, head_radius), progress);
                 if nearest.clearance < -shallow * depth {
                     let depth = if nearest.pair == pair { depth } else { -nearest.clearance };
                     self.deepest = Some(Deepest { pair: nearest.pair, depth, head_radius: nearest.head_radius });
@@ -322,10 +325,11 @@ impl Blocked<'_> {
             }
         }
         let first = first.filter(|_| hinted && self.intervals == 0);
-        let found = first.or_else(|| obstacle(self.team, self.pitch, self.radius));
+        let found = first.or_else(|| obstacle(self.team, self.pitch, self.radius, progress));
         self.locks = matches!(found, Some(Obstacle::Lock));
         let Some(Obstacle::Touch { pair, head_radius }) = found else { return self.locks };
-        let Nearest { clearance, head_radius, .. } = deepest(self.team, self.pitch, self.radius, &[pair], head_radius);
+        let Nearest { clearance, head_radius, .. } =
+            deepest(self.team, self.pitch, self.radius, (&[pair], head_radius), progress);
         let is_same = self.deepest.is_some_and(|deepest| deepest.pair == pair);
         self.shallow = if is_same { self.shallow * self.shallow } else { SHALLOW };
         self.deepest = (clearance < 0.0).then_some(Deepest { pair, depth: -clearance, head_radius });

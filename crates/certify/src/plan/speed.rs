@@ -10,6 +10,7 @@ use crate::clearance::Write;
 use crate::speed::{GreatestRatio, certify_greatest_ratio, greatest_ratio};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::scene::Scene;
 
@@ -52,7 +53,7 @@ pub fn greatest_speed(
     scene: &Scene,
     timeline: &Timeline,
     limit: f64,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<GreatestSpeed, PlanError> {
     let (motion, end, tolerance) = asked(scene, timeline, limit)?;
     Ok(answer(motion, limit, greatest_ratio(motion, end, tolerance, progress)))
@@ -70,7 +71,7 @@ pub fn certify_greatest_speed(
     text: &str,
     most_handles: u64,
     write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<io::Result<GreatestSpeed>, PlanError> {
     let (motion, end, tolerance) = asked(scene, timeline, limit)?;
     let found = certify_greatest_ratio(motion, end, (tolerance, limit), text, most_handles, write, progress);

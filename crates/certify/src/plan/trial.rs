@@ -4,7 +4,7 @@
 use crate::pitch::clear_beyond;
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::contact::{ConservativeAdvancement, LeastClearance};
-use bench_dragon_motion::event::Budget;
+use bench_dragon_motion::event::{Budget, Progress};
 use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::root::bisect_predicate;
 use bench_dragon_motion::model::team::Team;
@@ -35,13 +35,13 @@ pub(super) enum Obstacle {
 }
 
 /// Returns the obstacle for a head with this pitch and radius, if the search finds one.
-pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64) -> Option<Obstacle> {
-    let near = Trial::near(team, pitch, radius);
-    near.obstacle().or_else(|| {
+pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Obstacle> {
+    let near = Trial::near(team, pitch, radius, progress);
+    near.obstacle(progress).or_else(|| {
         // Boards with almost no room between them and the next but one touch in a bend that may be anywhere.
         let outer = clear_beyond(team, pitch, radius)?;
-        let far = Trial::new(team, pitch, radius, outer);
-        (far.limit > near.limit).then(|| far.obstacle())?
+        let far = Trial::new(team, (pitch, radius), outer, progress);
+        (far.limit > near.limit).then(|| far.obstacle(progress))?
     })
 }
 
@@ -61,11 +61,11 @@ pub(super) struct Proposal {
 /// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. Because
 /// the pitch grows in steps of half a percent, a pitch is missed if the two boards come free and meet again within one
 /// step. `progress` receives each pitch.
-pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progress: &mut dyn FnMut(f64)) -> Proposal {
+pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progress: Progress<'_>) -> Proposal {
     let (mut pitch, mut proposal) = (from, Proposal::default());
-    while let Some(mut found) = obstacle(team, pitch, radius) {
+    while let Some(mut found) = obstacle(team, pitch, radius, &mut |_| progress(pitch)) {
         proposal.first.get_or_insert(found);
-        while let Some(next) = found.at_pitch(team, pitch * GROWTH, radius) {
+        while let Some(next) = found.at_pitch(team, pitch * GROWTH, radius, &mut |_| progress(pitch)) {
             (found, pitch) = (next, pitch * GROWTH);
             if pitch > to {
                 return Proposal { last: None, ..proposal };
@@ -74,16 +74,21 @@ pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progre
         proposal.last = Some(found);
         let free_at = match found {
             Obstacle::Lock => {
-                bisect_predicate(|pitch| found.at_pitch(team, pitch, radius).is_none(), pitch, pitch * GROWTH)
+                let mut is_free = |pitch| found.at_pitch(team, pitch, radius, &mut |_| progress(pitch)).is_none();
+                bisect_predicate(&mut is_free, pitch, pitch * GROWTH)
             }
             Obstacle::Touch { pair, head_radius } => {
-                let clearance = |pitch: f64| deepest(team, pitch, radius, &[pair], head_radius).clearance;
+                let clearance = |pitch: f64| {
+                    deepest(team, pitch, radius, (&[pair], head_radius), &mut |_| progress(pitch)).clearance
+                };
                 sign_change(clearance, pitch, pitch * GROWTH)
             }
         };
         // Beyond the rounding of a touch.
         pitch = free_at * (1.0 + 1e-13);
-        progress(pitch);
+        if progress(pitch).is_break() {
+            break;
+        }
     }
     Proposal { pitch: (pitch <= to).then_some(pitch), ..proposal }
 }
@@ -91,7 +96,7 @@ pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progre
 /// Returns the place within `low..=high` where a function becomes positive, to the last bits: the least place known to
 /// have a positive value. The function must be at most 0 at `low` and positive at `high`. Illinois method (Dowell and
 /// Jarratt, 1971).
-fn sign_change(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+fn sign_change(mut function: impl FnMut(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let (mut below, mut above) = (function(low), function(high));
     let mut last_side = 0;
     while high - low > 4.0 * f64::EPSILON * high {
@@ -117,11 +122,12 @@ fn sign_change(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f6
 
 impl Obstacle {
     /// Returns the obstacle near the same place at another pitch, if there still is one.
-    fn at_pitch(self, team: &Team, pitch: f64, radius: f64) -> Option<Self> {
+    fn at_pitch(self, team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Self> {
         match self {
-            Self::Lock => Trial::near(team, pitch, radius).locks().then_some(self),
+            Self::Lock => Trial::near(team, pitch, radius, progress).locks().then_some(self),
             Self::Touch { pair, head_radius } => {
-                let Nearest { clearance, head_radius, .. } = deepest(team, pitch, radius, &[pair], head_radius);
+                let Nearest { clearance, head_radius, .. } =
+                    deepest(team, pitch, radius, (&[pair], head_radius), progress);
                 (clearance <= 0.0).then_some(Self::Touch { pair, head_radius })
             }
         }
@@ -140,8 +146,15 @@ pub(super) struct Nearest {
 }
 
 /// Returns the least clearance of several pairs of boards, at least one, while the head is near a radius.
-pub(super) fn deepest(team: &Team, pitch: f64, radius: f64, pairs: &[(u32, u32)], head_radius: f64) -> Nearest {
-    let trial = Trial::new(team, pitch, radius, head_radius.max(radius) + TURNS_ABOUT * pitch);
+pub(super) fn deepest(
+    team: &Team,
+    pitch: f64,
+    radius: f64,
+    (pairs, head_radius): (&[(u32, u32)], f64),
+    progress: Progress<'_>,
+) -> Nearest {
+    let trial = Trial::new(team, (pitch, radius), head_radius.max(radius) + TURNS_ABOUT * pitch, progress);
+    let mut budget = Budget::new(u64::MAX, progress);
     let around = WINDOW * trial.team.shortest_link();
     let at = trial.path.length() - Path::spiral(pitch, head_radius / pitch).length();
     let (advancement, at) = (trial.advancement(), at.clamp(0.0, trial.limit));
@@ -149,7 +162,7 @@ pub(super) fn deepest(team: &Team, pitch: f64, radius: f64, pairs: &[(u32, u32)]
     let mut least = Nearest { clearance: f64::INFINITY, pair: pairs[0], head_radius };
     for pair in pairs.iter().filter(|pair| pair.1 < trial.team.benches as u32) {
         for (from, to) in parts {
-            let (clearance, travelled) = advancement.minimum_of(*pair, from, to);
+            let (clearance, travelled) = advancement.minimum_of(*pair, (from, to), &mut budget);
             if clearance < least.clearance {
                 // Rounding must not move the head inside the radius.
                 let head_radius = trial.head_radius(travelled).max(radius * (1.0 + 1e-12));
@@ -170,12 +183,13 @@ struct Trial {
 }
 
 impl Trial {
-    fn near(team: &Team, pitch: f64, radius: f64) -> Self {
-        Self::new(team, pitch, radius, radius.max(team.longest_link()) + TURNS_BEFORE * pitch)
+    fn near(team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Self {
+        let outer = radius.max(team.longest_link()) + TURNS_BEFORE * pitch;
+        Self::new(team, (pitch, radius), outer, progress)
     }
 
     /// Creates the trial of a head that comes in from `outer` metres to `radius` metres.
-    fn new(team: &Team, pitch: f64, radius: f64, outer: f64) -> Self {
+    fn new(team: &Team, (pitch, radius): (f64, f64), outer: f64, progress: Progress<'_>) -> Self {
         let start = outer / pitch;
         let path = Path::spiral(pitch, start);
         let length = |turns: f64| Path::spiral(pitch, turns).length();
@@ -187,7 +201,7 @@ impl Trial {
         let singularities = if radius > team.longest_link() {
             Singularities { stall: None, end: None, searched_until: limit, head_turns: vec![], body_turns: vec![] }
         } else {
-            Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| ()))
+            Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, progress))
         };
         Self { team, path, singularities, limit }
     }
@@ -207,12 +221,12 @@ impl Trial {
     }
 
     /// Returns the obstacle that the search finds, if any.
-    fn obstacle(&self) -> Option<Obstacle> {
+    fn obstacle(&self, progress: Progress<'_>) -> Option<Obstacle> {
         if self.locks() {
             return Some(Obstacle::Lock);
         }
-        let least =
-            self.advancement().least_clearance(0.0, self.limit, &mut Budget::new(TRIAL_BUDGET, &mut |_| ())).ok()?;
+        let mut budget = Budget::new(TRIAL_BUDGET, progress);
+        let least = self.advancement().least_clearance(0.0, self.limit, &mut budget).ok()?;
         let touch = least.value.filter(|touch: &LeastClearance| touch.value <= 0.0)?;
         let head_radius = self.head_radius(touch.travelled);
         Some(Obstacle::Touch { pair: (touch.bench_a, touch.bench_b), head_radius })

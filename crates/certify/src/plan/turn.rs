@@ -4,11 +4,14 @@
 //! In: a team, a pitch, the ratio of the arcs. Out: the two numbers. "The least turn" in `docs/proofs.md` has the
 //! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
 
+use std::cell::{Cell, RefCell};
+
 use super::PlanError;
 use super::turn_trial::{Family, Witness};
 use crate::place::Place;
 use crate::turn::{Passage, Turns};
 use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
@@ -94,7 +97,7 @@ pub fn least_turn(
     team: &Team,
     pitch: f64,
     arc_ratio: Option<f64>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> Result<LeastTurn, PlanError> {
     if team.benches >= 3 && 2.0 * team.hole_inset >= team.link(1) {
         return Err(PlanError(format!(
@@ -103,45 +106,50 @@ pub fn least_turn(
             team.link(1)
         )));
     }
-    let family = Family { team, pitch, arc_ratio: arc_ratio.unwrap_or(1.0) };
+    let (share, progress) = (Cell::new(0.0), RefCell::new(progress));
+    let ask = || progress.borrow_mut()(share.get());
+    let family = Family { team, pitch, arc_ratio: arc_ratio.unwrap_or(1.0), ask: &ask };
     let family = if arc_ratio.is_none() { best(family) } else { family };
     let from = Accepted::LENGTH.least;
-    let Some(witness) = family.event(from) else {
+    let first = family.event(from);
+    if family.is_stopped() {
+        return Ok(nothing(from, family.arc_ratio));
+    }
+    let Some(witness) = first else {
         return Err(PlanError(format!(
             "the team turns round with a turn radius of {from} m already, the least that is tested"
         )));
     };
     let mut blocked = Blocked { family, radius: from, witness, intervals: 0, shown: None };
-    blocked.extend(&mut |share| progress(0.5 * share));
+    blocked.extend(&mut |done| {
+        share.set(0.5 * done);
+        ask()
+    });
     let Blocked { radius: value_lo, intervals, shown, .. } = blocked;
     let upper = value_lo + WIDTH;
-    let mut found = LeastTurn {
-        value_lo,
-        value_hi: None,
-        value: None,
-        length: None,
-        from,
-        arc_ratio: family.arc_ratio,
-        limit: shown.map(|witness| limit(&family, value_lo, &witness)),
-        proved: false,
-        intervals,
-        leads: None,
-    };
-    if intervals == 0 || upper > Accepted::LENGTH.greatest || family.event(upper).is_some() {
+    let limit = shown.map(|witness| limit(&family, value_lo, &witness));
+    let mut found = LeastTurn { value_lo, limit, intervals, ..nothing(from, family.arc_ratio) };
+    let may_be_free = intervals > 0 && upper <= Accepted::LENGTH.greatest && family.event(upper).is_none();
+    // A stopped search finds no event.
+    if !may_be_free || family.is_stopped() {
         return Ok(found);
     }
     (found.value, found.length) = (Some(upper), Some(family.length(upper)));
     let closely = shown.is_some_and(|witness| matches!(witness, Witness::Overlap { .. }));
+    let mut of_passage = |done| {
+        share.set(0.5 + 0.5 * done);
+        ask()
+    };
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
         let passage = |team: &Team| Passage::new(team, (pitch, family.arc_ratio), upper);
         // The first benches fail as soon as the whole team does, at less cost.
         let few = Team { benches: team.benches.min(FEW), ..*team };
-        if !passage(&few).is_some_and(|passage| passage.is_free(&few, closely, &mut |_| ())) {
+        if !passage(&few).is_some_and(|passage| passage.is_free(&few, closely, &mut |_| ask())) {
             continue;
         }
         let Some(passage) = passage(team) else { break };
-        if passage.is_free(team, closely, &mut |share| progress(0.5 + 0.5 * share)) {
+        if passage.is_free(team, closely, &mut of_passage) {
             found.value_hi = Some(upper);
             found.leads = Some([passage.lead_in, passage.lead_out]);
             found.proved = upper - value_lo <= 1e-8;
@@ -151,11 +159,27 @@ pub fn least_turn(
     Ok(found)
 }
 
+/// Returns the result of a search that has proved nothing.
+fn nothing(from: f64, arc_ratio: f64) -> LeastTurn {
+    LeastTurn {
+        value_lo: from,
+        value_hi: None,
+        value: None,
+        length: None,
+        from,
+        arc_ratio,
+        limit: None,
+        proved: false,
+        intervals: 0,
+        leads: None,
+    }
+}
+
 /// Returns the family with the best ratio that the ordinary search finds.
 fn best(family: Family<'_>) -> Family<'_> {
     let (mut best, mut step) = (family, FIRST_RATIO_STEP);
     let mut radius = best.radius();
-    while step > LEAST_RATIO_STEP {
+    while step > LEAST_RATIO_STEP && !family.is_stopped() {
         let better = [step, -step].into_iter().find_map(|by| {
             let arc_ratio = (1e3 * best.arc_ratio * by.exp()).round() / 1e3;
             let Accepted { least, greatest, .. } = Accepted::ARC_RATIO;
@@ -193,7 +217,7 @@ struct Blocked<'a> {
 
 impl Blocked<'_> {
     /// Extends the interval as far as can be shown. `progress` receives the share that is done.
-    fn extend(&mut self, progress: &mut dyn FnMut(f64)) {
+    fn extend(&mut self, progress: Progress<'_>) {
         let longest = self.family.team.longest_link();
         let mut width = FIRST_INTERVAL;
         let mut others_below = OTHERS_BELOW;
@@ -215,7 +239,9 @@ impl Blocked<'_> {
             self.shown = Some(self.witness);
             self.intervals += 1;
             width *= GROWTH;
-            progress(self.radius / (self.radius + longest));
+            if progress(self.radius / (self.radius + longest)).is_break() {
+                break;
+            }
         }
     }
 
@@ -243,7 +269,7 @@ impl Blocked<'_> {
 
     /// Returns true if the event is proved for all radii up to `width` further on.
     fn holds(&self, width: f64) -> bool {
-        let Family { team, pitch, arc_ratio } = self.family;
+        let Family { team, pitch, arc_ratio, .. } = self.family;
         let radii = [self.radius, self.radius + width];
         let middle = 0.5 * radii[0] + 0.5 * radii[1];
         let Some(path) = self.family.path(middle) else { return false };

@@ -1,6 +1,8 @@
 //! Events of a team on turnarounds of one pitch and arc ratio, found by the ordinary search, which samples. They
 //! suggest to the proofs of [`crate::turn`] where to search.
 
+use std::ops::ControlFlow;
+
 use crate::grid::{param, place};
 use crate::place::Place;
 use bench_dragon_messages::state::EventKind;
@@ -53,11 +55,13 @@ const REMAINS: f64 = 0.5;
 const ROOM: f64 = 4.0;
 
 /// The turnarounds of a team with one pitch and one ratio of the arcs.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(super) struct Family<'a> {
     pub team: &'a Team,
     pub pitch: f64,
     pub arc_ratio: f64,
+    /// Asks whether the search is to stop. Then events may be missing.
+    pub ask: &'a dyn Fn() -> ControlFlow<()>,
 }
 
 /// An event, as a proof needs it. On a spiral, the coordinate of its places is the polar angle minus the polar angle at
@@ -89,6 +93,11 @@ impl Family<'_> {
 
     fn path_between(&self, radius: f64, lead_in: f64, lead_out: f64) -> Option<Path> {
         Path::turnaround(self.pitch, radius, self.arc_ratio, lead_in, lead_out).ok()
+    }
+
+    /// Returns true if the search is to stop.
+    pub fn is_stopped(&self) -> bool {
+        (self.ask)().is_break()
     }
 
     /// Returns the metres of the S.
@@ -157,7 +166,7 @@ impl Family<'_> {
         let Some(path) = self.path_between(radius, lead_in, team.length() + LINKS_AFTER * longest) else {
             return Vec::new();
         };
-        let found = Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| ()));
+        let found = Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| (self.ask)()));
         let lock = found.end.filter(|end| end.kind == EventKind::Lock);
         let witness = |event: Event| {
             let link = event.bench_a? as usize;
@@ -224,8 +233,8 @@ impl Family<'_> {
         let lead_in = self.spiral_between(radius, outer);
         let path = self.path_between(radius, lead_in, team.length())?;
         let advancement = ConservativeAdvancement::new(&path, team, &[], &[]);
-        let mut unreported = |_| {};
-        let mut budget = Budget::new(TRIAL_BUDGET, &mut unreported);
+        let mut ask = |_| (self.ask)();
+        let mut budget = Budget::new(TRIAL_BUDGET, &mut ask);
         let least = advancement.least_clearance(0.0, path.length(), &mut budget).ok()?.value?;
         let head = self.event_place(radius, path.param_at(least.travelled));
         let pair = (least.bench_a, least.bench_b);
@@ -265,7 +274,10 @@ impl Family<'_> {
         let at = (lead_in + past).clamp(0.0, path.length());
         let parts = [((at - window).max(0.0), at), (at, (at + window).min(path.length()))];
         let pairs = pairs.iter().filter(|pair| (pair.1 as usize) < self.team.benches);
-        let found = pairs.flat_map(|pair| parts.map(|(from, to)| (*pair, advancement.minimum_of(*pair, from, to))));
+        let mut ask = |_| (self.ask)();
+        let mut budget = Budget::new(u64::MAX, &mut ask);
+        let parts = pairs.flat_map(|pair| parts.map(|part| (*pair, part)));
+        let found = parts.map(|(pair, part)| (pair, advancement.minimum_of(pair, part, &mut budget)));
         let (pair, (clearance, travelled)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
         (clearance < 0.0).then(|| (pair, self.event_place(radius, path.param_at(travelled))))
     }

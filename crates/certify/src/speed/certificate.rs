@@ -10,6 +10,7 @@ use crate::interval::Interval;
 use crate::lines::{About, CertificateLine, CertifiedSpeed};
 use crate::place::Place;
 use bench_dragon_motion::Motion;
+use bench_dragon_motion::event::Progress;
 
 /// The share of the tolerance that the search uses: the checker has other capsules, and its bounds may be a little
 /// greater.
@@ -30,7 +31,7 @@ pub fn certify_greatest_ratio(
     scene: &str,
     most_handles: u64,
     write: Write<'_>,
-    progress: &mut dyn FnMut(f64),
+    progress: Progress<'_>,
 ) -> io::Result<GreatestRatio> {
     let (version, about) = (env!("CARGO_PKG_VERSION"), Some(About::GreatestSpeed));
     write(&CertificateLine::Certificate { format: crate::FORMAT, version, about, scene })?;

@@ -7,6 +7,8 @@ use std::io::{self, ErrorKind, Read};
 
 /// The most bytes of a chunk before the samples.
 const MOST_CHUNK_BYTES: u32 = 1 << 20;
+/// The bytes before the samples in a sound that is written.
+pub const HEADER_BYTES: usize = 44;
 const PCM: u16 = 1;
 const FLOAT: u16 = 3;
 const EXTENSIBLE: u16 = 0xfffe;
@@ -97,6 +99,35 @@ impl Format {
             _ => 0.0,
         }
     }
+}
+
+/// Returns the bytes of a sample from -1 to 1 in 16 bits.
+pub fn sample_bytes(value: f64) -> [u8; 2] {
+    ((value * 32_767.0).round() as i16).to_le_bytes()
+}
+
+/// Returns the header of a sound of one channel in 16 bits, with `sound_bytes` bytes of samples. The greatest number
+/// stands for a length that is not known.
+pub fn header(sample_rate: u32, sound_bytes: u32) -> [u8; HEADER_BYTES] {
+    let mut header = [0; HEADER_BYTES];
+    let mut rest = &mut header[..];
+    let mut put = |bytes: &[u8]| {
+        let (begin, end) = std::mem::take(&mut rest).split_at_mut(bytes.len());
+        begin.copy_from_slice(bytes);
+        rest = end;
+    };
+    put(b"RIFF");
+    put(&sound_bytes.saturating_add(HEADER_BYTES as u32 - 8).to_le_bytes());
+    put(b"WAVEfmt ");
+    put(&16u32.to_le_bytes());
+    // The form, the channels.
+    [PCM, 1].iter().for_each(|number| put(&number.to_le_bytes()));
+    [sample_rate, 2 * sample_rate].iter().for_each(|number| put(&number.to_le_bytes()));
+    // The bytes of a block, the bits of a sample.
+    [2u16, 16].iter().for_each(|number| put(&number.to_le_bytes()));
+    put(b"data");
+    put(&sound_bytes.to_le_bytes());
+    header
 }
 
 fn fill(stream: &mut impl Read, bytes: &mut [u8]) -> Result<(), WaveError> {

@@ -37,14 +37,14 @@ impl<'a> MovingDragon<'a> {
     /// or ends at `end` metres of travel.
     ///
     /// # Errors
-    /// [`NoFollower`] if no place near the end can be solved.
+    /// [`NoFollower`] if no place near the end can be solved, or the budget is spent.
     pub fn new(
         chain: ConservativeAdvancement<'a>,
         placement: Placement,
         (delay, head_speed, end): (f64, f64, f64),
+        budget: &mut Budget,
     ) -> Result<Self, NoFollower> {
-        let mut unreported = |_| {};
-        let solvable = last_solvable(&chain, &mut Budget::new(u64::MAX, &mut unreported), 0.0, end);
+        let solvable = last_solvable(&chain, budget, 0.0, end);
         let (end, rounding_from) = solvable.map_err(|_| NoFollower)?;
         Ok(Self { chain, placement, delay, head_speed, end, rounding_from })
     }

@@ -14,6 +14,9 @@ use super::stepped_search::Halt;
 /// Two benches without a common handle, the bench nearer the head first.
 pub(super) type Pair = (usize, usize);
 
+/// Links that are paid for at once: a long team is solved in parts, between which a search can be stopped.
+const PAID_AT_ONCE: usize = 1_000;
+
 /// The foremost handles and boards of a team.
 #[derive(Debug, Clone)]
 pub(super) struct Configuration {
@@ -32,11 +35,14 @@ impl Configuration {
 
     /// Solves followers until there are `benches` boards.
     pub fn solve_to(&mut self, benches: usize, path: &Path, team: &Team, budget: &mut Budget) -> Result<(), Halt> {
-        let missing = benches.saturating_sub(self.boards.len());
-        budget.spend(missing as u64)?;
+        let first = self.boards.len();
+        let missing = benches.saturating_sub(first);
         self.places.reserve(missing);
         self.boards.reserve(missing);
-        for bench in self.boards.len()..benches {
+        for bench in first..benches {
+            if (bench - first).is_multiple_of(PAID_AT_ONCE) {
+                budget.spend(PAID_AT_ONCE.min(benches - bench) as u64)?;
+            }
             let (front, link) = (self.places[bench], team.link(bench));
             let rear = follower(path, front, link)?;
             let direction = link_pose(path, front, rear, link).direction;

@@ -160,10 +160,8 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
             let Some(ObstacleClearance { travelled, bench, .. }) = self.best[j] else { continue };
             let bench = bench as usize;
             let clearance = |travelled: f64| {
-                let mut unreported = |_| {};
                 let mut configuration = Configuration::new(self.chain.path, travelled);
-                let mut budget = Budget::new(u64::MAX, &mut unreported);
-                let solved = configuration.solve_to(bench + 1, self.chain.path, self.chain.team, &mut budget);
+                let solved = configuration.solve_to(bench + 1, self.chain.path, self.chain.team, self.state.budget);
                 solved.map_or(f64::INFINITY, |()| self.obstacles[j].clearance(&configuration.boards[bench]))
             };
             let near = ((travelled - spacing).max(from), (travelled + spacing).min(to));

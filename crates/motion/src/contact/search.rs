@@ -126,7 +126,7 @@ impl<'s, 'a, 'b> ChainSearch<'s, 'a, 'b> {
         }
         if let Some(best) = self.best {
             let near = ((best.travelled - spacing).max(from), (best.travelled + spacing).min(to));
-            let (_, travelled) = self.chain.minimum_of((best.bench_a, best.bench_b), near.0, near.1);
+            let (_, travelled) = self.chain.minimum_of((best.bench_a, best.bench_b), near, self.state.budget);
             let mut configuration = Configuration::new(self.chain.path, travelled);
             let pair = (best.bench_a as usize, best.bench_b as usize);
             self.solve(&mut configuration, pair.1 + 1)?;

@@ -1,8 +1,10 @@
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 use proptest::prelude::*;
 
 use super::*;
+use crate::event::unreported;
 use crate::model::curve::Side;
 use crate::model::{Point, Vector};
 use crate::placement::Placement;
@@ -15,7 +17,7 @@ const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, w
 /// Returns the results of the searches for a whole motion: the contact, the least clearance up to `show_end`, the
 /// motion's end.
 fn search(path: &Path, team: &Team, show_end: Option<f64>) -> (Option<Event>, Option<LeastClearance>, f64) {
-    let mut unreported = |_| {};
+    let mut unreported = unreported;
     let mut budget = Budget::new(200_000_000, &mut unreported);
     let singular = Singularities::search(path, team, &mut budget);
     let end = singular.end.map_or(singular.searched_until, |end| end.travelled);
@@ -28,7 +30,7 @@ fn search(path: &Path, team: &Team, show_end: Option<f64>) -> (Option<Event>, Op
 
 /// The least clearance of all pairs at one place of the head.
 fn all_pairs(path: &Path, team: &Team, travelled: f64) -> f64 {
-    let mut unreported = |_| {};
+    let mut unreported = unreported;
     let mut at = Configuration::new(path, travelled);
     at.solve_to(team.benches, path, team, &mut Budget::new(u64::MAX, &mut unreported)).unwrap();
     let pairs = (0..team.benches).flat_map(|a| (a + 2..team.benches).map(move |b| (a, b)));
@@ -99,7 +101,7 @@ fn a_straight_procession_is_one_step() {
     let path = Path::route(0.1).line(1e6).build().unwrap();
     for team in [PAPER, Team { benches: 3, ..PAPER }] {
         let searches = ConservativeAdvancement::new(&path, &team, &[], &[]);
-        let mut unreported = |_| {};
+        let mut unreported = unreported;
         let mut budget = Budget::new(20_000, &mut unreported);
         let contact = searches.first_contact(0.0, 1e6, &mut budget).unwrap();
         let least = searches.least_clearance(0.0, 1e6, &mut budget).unwrap();
@@ -116,13 +118,15 @@ fn two_dragons_that_are_nearest_at_the_start_take_few_steps() {
     for (delay, origin, turns) in [(50.0, Vector::new(0.3, 1.8), 0.0), (0.0, Vector::new(-behind, 0.0), 0.5)] {
         let moving = [(Vector::zeros(), 0.0), (origin, turns)].map(|(origin, turns)| {
             let chain = ConservativeAdvancement::new(&path, &team, &[], &[]);
-            between::MovingDragon::new(chain, Placement::new(origin, turns, false), (delay, 1.0, 1e4)).unwrap()
+            let (placement, of_show) = (Placement::new(origin, turns, false), (delay, 1.0, 1e4));
+            let mut unreported = unreported;
+            let mut budget = Budget::new(u64::MAX, &mut unreported);
+            between::MovingDragon::new(chain, placement, of_show, &mut budget).unwrap()
         });
-        let (moving, mut unreported) = ([&moving[0], &moving[1]], |_| {});
+        let (moving, mut unreported) = ([&moving[0], &moving[1]], unreported);
         let mut budget = Budget::new(1_000_000, &mut unreported);
         let guess = between::guess_least_clearance(moving, (0.0, 1e3), &mut budget).unwrap();
         assert!((guess.unwrap().value - 1.5).abs() < 1e-12, "{guess:?}");
-        let mut unreported = |_| {};
         let mut budget = Budget::new(100_000, &mut unreported);
         let found = between::least_clearance(moving, (0.0, 1e3), guess, &mut budget).unwrap();
         assert_eq!(found, Found { value: None, searched_until: 1e3 }, "{origin}");
@@ -134,7 +138,7 @@ fn what_overlaps_at_the_start_is_the_deepest_pair() {
     let path = Path::spiral(0.2, 16.0);
     let (contact, ..) = search(&path, &PAPER, Some(0.1));
     let contact = contact.unwrap();
-    let mut unreported = |_| {};
+    let mut unreported = unreported;
     let mut start = Configuration::new(&path, 0.0);
     start.solve_to(223, &path, &PAPER, &mut Budget::new(u64::MAX, &mut unreported)).unwrap();
     let pair = (contact.bench_a.unwrap() as usize, contact.bench_b.unwrap() as usize);
@@ -157,7 +161,10 @@ fn a_spent_budget_tells_how_far_the_search_came() {
     let path = Path::spiral(0.55, 16.0);
     let searches = ConservativeAdvancement::new(&path, &PAPER, &[], &[]);
     let mut shares = Vec::new();
-    let mut report = |share| shares.push(share);
+    let mut report = |share| {
+        shares.push(share);
+        ControlFlow::Continue(())
+    };
     let found = searches.first_contact(0.0, 430.0, &mut Budget::new(20_000, &mut report)).unwrap();
     assert!(found.value.is_none() && found.searched_until > 10.0 && found.searched_until < 412.0, "{found:?}");
     assert!(shares.is_sorted() && shares.len() > 10);

@@ -4,11 +4,11 @@
 
 use bench_dragon_messages::state::EventKind;
 
-use super::{Dragon, Ensemble, pairs};
+use super::{Dragon, Ensemble, noted, pairs};
 use crate::CONTACT_BUDGET;
 use crate::contact::between::{self, Meeting};
 use crate::contact::{LeastClearance, ObstacleClearance};
-use crate::event::Budget;
+use crate::event::{Budget, Progress};
 use crate::timeline::{TimedClearance, TimedEvent, TimedObstacleClearance, Timeline};
 
 /// The least clearances of a show. Where the search of some dragons failed, that of the others is complete up to 0 s.
@@ -20,6 +20,8 @@ pub struct LeastClearances {
     pub between: Option<TimedClearance>,
     /// The least clearance of any two boards; `None` likewise.
     pub of_show: Option<TimedClearance>,
+    /// True if the search was stopped by the receiver of its progress.
+    pub is_stopped: bool,
 }
 
 impl Ensemble {
@@ -30,9 +32,11 @@ impl Ensemble {
         &self,
         timeline: &Timeline,
         show_end: &TimedEvent,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> LeastClearances {
         let (own_share, share) = self.shares();
+        let mut is_stopped = false;
+        let mut progress = |share| noted(progress(share), &mut is_stopped);
         let contact = timeline.find(EventKind::Contact);
         let own =
             |k: usize| self.own_least_clearance(k, contact, show_end, &mut |part| progress(share * (k as f64 + part)));
@@ -41,8 +45,12 @@ impl Ensemble {
         let between = (self.dragons.len() > 1).then(|| {
             self.least_clearance_between(show_end.time, &mut |part| progress(own_share + (1.0 - own_share) * part))
         });
+        // Before its first guess is complete, a search knows nothing.
+        let begin = contact.map_or(0.0, |contact| contact.time);
+        let is_known = |found: &TimedClearance| !is_stopped || found.searched_until.is_none_or(|until| until > begin);
+        let (own, between) = (own.map(|own| own.filter(is_known)), between.map(|between| between.filter(is_known)));
         let of_show = own.into_iter().chain(between).reduce(nearer).flatten();
-        LeastClearances { own: own.flatten(), between: between.flatten(), of_show }
+        LeastClearances { own: own.flatten(), between: between.flatten(), of_show, is_stopped }
     }
 
     /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show. Returns
@@ -52,7 +60,7 @@ impl Ensemble {
         dragon: usize,
         contact: Option<&TimedEvent>,
         show_end: &TimedEvent,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Option<TimedClearance> {
         let Dragon { delay, motion, .. } = &self.dragons[dragon];
         let first = self.first_handles[dragon] as u32;
@@ -74,23 +82,24 @@ impl Ensemble {
 
     /// Returns the least clearance of boards of two dragons, from the start to a time; `None` if there are no two, or
     /// the search failed.
-    fn least_clearance_between(&self, to: f64, progress: &mut dyn FnMut(f64)) -> Option<TimedClearance> {
+    fn least_clearance_between(&self, to: f64, progress: Progress<'_>) -> Option<TimedClearance> {
         if self.dragons.len() < 2 {
             return None;
         }
-        let found = self.singularities();
-        let moving = self.moving(&found).ok()?;
+        let found = self.singularities(progress);
+        let known = self.known_to(&found, to);
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
+        let moving = self.moving(&found, &mut budget).ok()?;
         let mut best: Option<(Meeting, [usize; 2])> = None;
         // The nearest guess leaves little to prove of the others.
         for pair in pairs(moving.len()) {
-            let guess = between::guess_least_clearance(pair.map(|k| &moving[k]), (0.0, to), &mut budget).ok()?;
+            let guess = between::guess_least_clearance(pair.map(|k| &moving[k]), (0.0, known), &mut budget).ok()?;
             best = guess.map(|meeting| (meeting, pair)).into_iter().chain(best).min_by(least);
         }
         let mut searched_until = None;
         for pair in pairs(moving.len()) {
             let below = best.map(|(meeting, _)| meeting);
-            let found = between::least_clearance(pair.map(|k| &moving[k]), (0.0, to), below, &mut budget).ok()?;
+            let found = between::least_clearance(pair.map(|k| &moving[k]), (0.0, known), below, &mut budget).ok()?;
             searched_until = earlier(searched_until, (found.searched_until < to).then_some(found.searched_until));
             best = found.value.map(|meeting| (meeting, pair)).into_iter().chain(best).min_by(least);
         }
@@ -103,25 +112,26 @@ impl Ensemble {
 
     /// Returns the time at which boards of two dragons are nearest, up to a time of the show. Returns also a bench of
     /// each dragon, counted within the dragon. Returns `None` if the search failed.
-    pub fn nearest_of(&self, pair: [usize; 2], to: f64) -> Option<(f64, [usize; 2])> {
+    pub fn nearest_of(&self, pair: [usize; 2], to: f64, progress: Progress<'_>) -> Option<(f64, [usize; 2])> {
         let two = self.pair(pair);
-        let TimedClearance { least, time, .. } = two.least_clearance_between(to, &mut |_| ())?;
+        let TimedClearance { least, time, .. } = two.least_clearance_between(to, progress)?;
         Some((time, two.within([least.bench_a, least.bench_b])))
     }
 
     /// Returns the least clearance of each obstacle over all dragons from the start until the show ends at `show_end`.
-    /// The list is empty without obstacles.
-    pub fn obstacle_clearances(
-        &self,
-        show_end: &TimedEvent,
-        progress: &mut dyn FnMut(f64),
-    ) -> Vec<TimedObstacleClearance> {
+    /// The list is empty without obstacles. An obstacle of which nothing is known, because the search failed or was
+    /// stopped, is missing.
+    pub fn obstacle_clearances(&self, show_end: &TimedEvent, progress: Progress<'_>) -> Vec<TimedObstacleClearance> {
         let share = 1.0 / self.dragons.len() as f64;
+        let mut is_stopped = false;
+        let mut progress = |share| noted(progress(share), &mut is_stopped);
         let own = |k: usize| self.own_obstacle_clearances(k, show_end, &mut |part| progress(share * (k as f64 + part)));
         let own: Vec<_> = (0..self.dragons.len()).map(own).collect();
         let of_obstacle =
             |obstacle: usize| own.iter().map(|own| own.get(obstacle).copied().flatten()).reduce(nearer).flatten();
-        (0..self.ground().obstacles().len()).filter_map(of_obstacle).collect()
+        let is_known =
+            |found: &TimedObstacleClearance| !is_stopped || found.searched_until.is_none_or(|until| until > 0.0);
+        (0..self.ground().obstacles().len()).filter_map(of_obstacle).filter(is_known).collect()
     }
 
     /// Returns the least clearance of each obstacle and one dragon, with the numbers and at the times of the show. It is
@@ -130,7 +140,7 @@ impl Ensemble {
         &self,
         dragon: usize,
         show_end: &TimedEvent,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Vec<Option<TimedObstacleClearance>> {
         let Dragon { delay, motion, .. } = &self.dragons[dragon];
         let to = self.own_end(dragon, show_end);

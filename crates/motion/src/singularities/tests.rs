@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::event::unreported;
 use crate::model::curve::Side;
 use crate::model::path::Route;
 
@@ -9,13 +10,13 @@ fn team(benches: usize, head_length: f64, body_length: f64) -> Team {
 }
 
 fn search(path: &Path, team: &Team) -> Singularities {
-    Singularities::search(path, team, &mut Budget::new(10_000_000, &mut |_| ()))
+    Singularities::search(path, team, &mut Budget::new(10_000_000, &mut unreported))
 }
 
 /// The whole trace of one link.
 fn trace(path: &Path, length: f64) -> LinkTrace<'_> {
     let mut trace = LinkTrace::new(Link { path, length }, Some(0.0)).unwrap();
-    let mut none = |_| ();
+    let mut none = unreported;
     let mut budget = Budget::new(3_000_000, &mut none);
     while trace.end().is_none() {
         assert!(trace.advance(&mut budget), "the budget was spent at {}", trace.at().front);
@@ -184,7 +185,7 @@ fn u_turns_as_wide_as_the_link_cost_no_more_than_others() {
         for power in [-3, -5, -7, -9, -11, -12, -13, -14, -15, -99] {
             for excess in [-10f64.powi(power), 10f64.powi(power)] {
                 let path = u_turn(link, 0.5 * link * (1.0 + excess));
-                let mut none = |_| ();
+                let mut none = unreported;
                 let mut budget = Budget::new(2_000, &mut none);
                 let team = Team { benches: 9, head_length: link, body_length: link, width: 1e-4, hole_inset: 0.0 };
                 let found = Singularities::search(&path, &team, &mut budget);
@@ -222,7 +223,7 @@ fn a_spent_budget_says_how_far_it_came() {
     let whole = search(&path, &team);
     let mut last = 0.0;
     for limit in [20, 100, 400, 800] {
-        let found = Singularities::search(&path, &team, &mut Budget::new(limit, &mut |_| ()));
+        let found = Singularities::search(&path, &team, &mut Budget::new(limit, &mut unreported));
         assert!(found.end.is_none() && found.searched_until > last, "{limit}: {found:?}");
         assert_eq!(found.head_turns, whole.head_turns[..found.head_turns.len()]);
         last = found.searched_until;

@@ -14,6 +14,7 @@ use super::writer::LogWriter;
 use crate::live::{End, LoopCounts, Outgoing, Publisher};
 use bench_dragon_messages::FrameHeader;
 use bench_dragon_messages::control::{Code, Command, CommandRecord};
+use bench_dragon_motion::event::unreported;
 use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::scene::AtEnd;
 use bench_dragon_show::{Playback, Show};
@@ -158,7 +159,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
     let (mut publisher, mut reader) = queue_of(4 * 76, 50);
     let scene = scene_text(NEWTON, false).parse().unwrap();
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(&mut unreported), playback).unwrap();
     for tick in 0..40 {
         // Three commands come in each period. The records of the first of these periods fit exactly.
         if tick >= 10 {
@@ -190,7 +191,7 @@ fn a_frame_is_read_when_all_of_it_has_come() {
     let text = scene_text(NEWTON, false);
     let scene = text.parse().unwrap();
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
-    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(), playback).unwrap();
+    let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(&mut unreported), playback).unwrap();
     let line = ShowLine::new(&text, &playback, Arithmetic::of(&scene), "", (1, 2));
     let mut writer = LogWriter::new(SharedFile(File::default()), line);
     publisher.publish(Outgoing::new(&FrameHeader::default(), show.frame(0))).unwrap();

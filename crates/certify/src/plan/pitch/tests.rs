@@ -1,6 +1,7 @@
 //! The least pitch with wrong proposals.
 
 use super::{LeastPitch, Obstacle, Proposal, decided, least_pitch};
+use bench_dragon_motion::event::{Progress, unreported};
 use bench_dragon_motion::model::team::Team;
 
 const TEAM: Team = Team { benches: 20, head_length: 0.52, body_length: 0.57, width: 0.054, hole_inset: 0.135 };
@@ -9,13 +10,13 @@ const RADIUS: f64 = 0.18;
 /// Returns the result for a sequence of proposed pitches, followed by none.
 fn with_proposals(proposals: &[f64]) -> LeastPitch {
     let mut proposals = proposals.iter().copied();
-    let mut propose = |_, _, _: &mut dyn FnMut(f64)| Proposal { pitch: proposals.next(), ..Proposal::default() };
-    decided(&TEAM, RADIUS, &mut propose, false, &mut |_| ()).unwrap().0
+    let mut propose = |_, _, _: Progress<'_>| Proposal { pitch: proposals.next(), ..Proposal::default() };
+    decided(&TEAM, RADIUS, &mut propose, false, &mut unreported).unwrap().0
 }
 
 #[test]
 fn a_wrong_proposal_leads_to_the_right_pitch() {
-    let known = least_pitch(&TEAM, RADIUS, &mut |_| ()).unwrap();
+    let known = least_pitch(&TEAM, RADIUS, &mut unreported).unwrap();
     println!("{known:?}");
     let (lo, hi) = (known.value_lo, known.value_hi.unwrap());
     assert!(known.proved && hi - lo <= 1e-9 && lo > 3.0 * known.from, "{known:?}");
@@ -33,7 +34,7 @@ fn a_wrong_proposal_leads_to_the_right_pitch() {
 
 #[test]
 fn wrong_obstacles_of_a_proposal_only_cost_time() {
-    let known = least_pitch(&TEAM, RADIUS, &mut |_| ()).unwrap();
+    let known = least_pitch(&TEAM, RADIUS, &mut unreported).unwrap();
     let free = 0.5 * known.value_lo + 0.5 * known.value_hi.unwrap();
     let pair = known.overlap.map(|overlap| (overlap.bench_a, overlap.bench_b)).unwrap();
     let touch = |pair, head_radius| Some(Obstacle::Touch { pair, head_radius });
@@ -43,8 +44,8 @@ fn wrong_obstacles_of_a_proposal_only_cost_time() {
         (Some(Obstacle::Lock), Some(Obstacle::Lock)),
         (None, touch(pair, RADIUS)),
     ] {
-        let mut propose = |_, _, _: &mut dyn FnMut(f64)| Proposal { pitch: Some(free), first, last };
-        let (found, _) = decided(&TEAM, RADIUS, &mut propose, false, &mut |_| ()).unwrap();
+        let mut propose = |_, _, _: Progress<'_>| Proposal { pitch: Some(free), first, last };
+        let (found, _) = decided(&TEAM, RADIUS, &mut propose, false, &mut unreported).unwrap();
         assert!(found.proved, "{first:?} {last:?}: {found:?}");
         assert!((found.value_lo - known.value_lo).abs() < 1e-9, "{first:?} {last:?}: {found:?} {known:?}");
     }
@@ -64,7 +65,7 @@ fn a_pair_of_boards_that_meets_again_is_no_end() {
         (team(15, 1.0024901830117714, 0.260087030130667, 0.20572542372242547), 0.295_520),
         (team(18, 0.5405721156603309, 0.11595298473749256, 0.12469722446346694), 0.291_178),
     ] {
-        let found = least_pitch(&team, radius, &mut |_| ()).unwrap();
+        let found = least_pitch(&team, radius, &mut unreported).unwrap();
         assert!(found.proved, "{found:?}");
     }
 }

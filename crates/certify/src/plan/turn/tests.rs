@@ -3,6 +3,7 @@
 
 use super::{LeastTurn, least_turn};
 use bench_dragon_messages::state::EventKind;
+use bench_dragon_motion::event::unreported;
 use bench_dragon_motion::model::team::Team;
 
 const TEAM: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
@@ -10,7 +11,7 @@ const PITCH: f64 = 1.7;
 const A: f64 = PITCH / std::f64::consts::TAU;
 
 fn least(team: &Team, arc_ratio: Option<f64>) -> LeastTurn {
-    let found = least_turn(team, PITCH, arc_ratio, &mut |_| ()).unwrap();
+    let found = least_turn(team, PITCH, arc_ratio, &mut unreported).unwrap();
     println!("{found:?}");
     found
 }

@@ -1,6 +1,7 @@
 //! Obstacles: the searches against sampling, and scenes solved by hand.
 
 use super::*;
+use crate::event::unreported;
 use crate::ground::Obstacle;
 use crate::model::shape::Shape;
 
@@ -11,7 +12,7 @@ fn ground(shapes: Vec<(Shape, f64)>) -> Ground {
 
 /// Returns the first touches and the least clearances up to `to` or the motion's end, and that place.
 fn touches(path: &Path, team: &Team, ground: &Ground, to: f64) -> (Vec<Option<Touch>>, Vec<ObstacleClearance>, f64) {
-    let mut unreported = |_| {};
+    let mut unreported = unreported;
     let mut budget = Budget::new(20_000_000, &mut unreported);
     let singular = Singularities::search(path, team, &mut budget);
     let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns);
@@ -26,7 +27,7 @@ fn touches(path: &Path, team: &Team, ground: &Ground, to: f64) -> (Vec<Option<To
 
 /// Returns the least clearance of an obstacle at one place of the head, and its bench, by testing all benches.
 fn nearest(path: &Path, team: &Team, obstacle: &Obstacle, travelled: f64) -> Option<(f64, u32)> {
-    let mut unreported = |_| {};
+    let mut unreported = unreported;
     let mut at = Configuration::new(path, travelled);
     at.solve_to(team.benches, path, team, &mut Budget::new(u64::MAX, &mut unreported)).ok()?;
     at.boards.iter().map(|board| obstacle.clearance(board)).zip(0..).min_by(|one, other| one.0.total_cmp(&other.0))
@@ -129,7 +130,7 @@ fn a_clearance_that_stays_the_same_costs_few_steps() {
     let team = Team { benches: 12, ..PAPER };
     let searches = ConservativeAdvancement::new(&path, &team, &[], &[]);
     let ground = ground(vec![(wall, 0.1), (well, 1.0)]);
-    let mut unreported = |_| {};
+    let mut unreported = unreported;
     let mut budget = Budget::new(100_000, &mut unreported);
     let (touches, until) = searches.first_touches(&ground, 0.0, path.length(), &mut budget).unwrap();
     assert!(touches == [None, None] && until == path.length(), "{touches:?} {until}");

@@ -5,6 +5,7 @@ use super::*;
 use crate::live::control::{Answer, CommandSender, command_queue};
 use bench_dragon_messages::control::Code;
 use bench_dragon_messages::state::PlaybackState;
+use bench_dragon_motion::event::unreported;
 use bench_dragon_show::scene::Scene;
 use bench_dragon_show::{Playback, Show};
 
@@ -133,7 +134,7 @@ fn steps_on_each_others_heels_are_all_answered() {
     let text = format!("{team}{path}[motion]\nhead_speed = 1.0\nsolver = \"newton\"\n");
     let scene = Scene::parse(&text, "small.toml", "small").unwrap();
     let playback = Playback { paused: true, ..Playback::of(&scene) };
-    let show = Show::new(&scene, scene.ensemble.timeline(&mut |_| ()), playback).unwrap();
+    let show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), playback).unwrap();
     let mut show = ShowSource::new(show);
     let (port, mut queue) = command_queue();
     let mut queues = CommandQueues::new(vec![port]);

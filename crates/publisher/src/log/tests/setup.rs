@@ -12,6 +12,7 @@ use crate::live::control::{CommandQueues, CommandSender, command_queue};
 use crate::live::show_source::ShowSource;
 use crate::live::{FrameSource, LoopCounts, LoopOptions, Outgoing, Period, PublishError, Publisher, Reports, run_loop};
 use bench_dragon_messages::control::Command;
+use bench_dragon_motion::event::unreported;
 use bench_dragon_motion::solve::table::Instructions;
 use bench_dragon_show::convert::Stamps;
 use bench_dragon_show::scene::SceneText;
@@ -174,8 +175,8 @@ impl Setup {
         let mut playback = Playback { rate: RATE, ..Playback::of(&scene) };
         (self.playback)(&mut playback);
         let timeline = match scene.alerts {
-            Some(_) => scene.ensemble.timeline(&mut |_| ()),
-            None => scene.ensemble.timeline_without_contact(),
+            Some(_) => scene.ensemble.timeline(&mut unreported),
+            None => scene.ensemble.timeline_without_contact(&mut unreported),
         };
         let show = Show::new(&scene, timeline, playback).unwrap();
         let solver = show.solver_reason().to_owned();

@@ -6,6 +6,7 @@ use super::super::writer::{sampled, second_of};
 use super::reference::Reference;
 use super::{Difference, Verdict};
 use bench_dragon_messages::control::Code;
+use bench_dragon_motion::event::unreported;
 use bench_dragon_show::convert::{Stamps, frame_header};
 use bench_dragon_show::scene::Scene;
 use bench_dragon_show::{Frame, Playback, Show, StartError};
@@ -56,8 +57,8 @@ impl Player {
     /// Creates the player of a scene.
     pub fn new(scene: &Scene, playback: Playback, same_arithmetic: bool) -> Result<Self, StartError> {
         let timeline = match scene.alerts {
-            Some(_) => scene.ensemble.timeline(&mut |_| ()),
-            None => scene.ensemble.timeline_without_contact(),
+            Some(_) => scene.ensemble.timeline(&mut unreported),
+            None => scene.ensemble.timeline_without_contact(&mut unreported),
         };
         let show = Show::new(scene, timeline, playback)?;
         let reference = Reference::of(scene);
@@ -346,7 +347,7 @@ mod tests {
             text.replace("[motion]\n", "[motion]\nsolver = \"newton\"\n").replace("benches = 223", "benches = 40");
         let scene = Scene::parse(&text, "lock.toml", "lock").unwrap();
         let motion = scene.ensemble.only().unwrap();
-        let lock = scene.ensemble.timeline_without_contact().show_end(false).time;
+        let lock = scene.ensemble.timeline_without_contact(&mut unreported).show_end(false).time;
         let mut reference = Reference::of(&scene);
         let mut solver = motion.solver(Velocities::Omitted).solver;
         let mut chain = Chain::new(motion.team().handles());
