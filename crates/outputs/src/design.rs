@@ -129,7 +129,6 @@ fn router(server: Server) -> Router {
     let mut router = modules()
         .route("/", get(|| async { Redirect::temporary("design") }))
         .route("/design", get(|| async { served(HTML, include_str!("design/index.html")) }))
-        .route("/design/", get(|| async { Redirect::permanent("../design") }))
         .route("/design/session", get(sessions))
         .route("/design/save", post(save).layer(DefaultBodyLimit::max(MAX_MESSAGE_BYTES)));
     for (name, kind, text) in FILES {

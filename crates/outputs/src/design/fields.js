@@ -53,7 +53,8 @@ function groupOf(name) {
 
 /** Returns the label of a field below the heading of its group or item. */
 function labelOf(name, item) {
-  const rest = name.slice(item.length).replace(/^\./, ""), [group] = rest.split(".");
+  const named = name.replace(/\[([01])\]$/, (_, axis) => ` ${"xy"[axis]}`);
+  const rest = named.slice(item.length).replace(/^\./, ""), [group] = rest.split(".");
   return wordsOf(TITLES.some(([key]) => key === group) && rest !== group ? rest.slice(group.length + 1) : rest);
 }
 

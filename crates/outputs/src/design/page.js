@@ -272,13 +272,13 @@ function choose(number) {
   picture.chosen = { dragon: dragon ?? null, bench: dragon ? number - dragon.first : -1 };
 }
 
-/** Shows everything that has handles; a coil without stage, by its boards. */
+/** Shows the handles; a coil alone by its boards. The last piece and the boundary may be long streets. */
 function fit() {
   isFitted = true;
-  const near = scene.handles.filter(({ kind }) => !FAR.includes(kind)),
-      ends = near.filter(({ kind }) => kind === "end"), isRoute = ends.length > 1, last = isRoute ? ends.at(-1) : null;
-  picture.fit(isRoute || near.some(({ kind }) => kind === "centre" || kind === "corner")
-      ? near.filter((one) => one !== last).map(({ x, y }) => [x, y]) : []);
+  const { handles: all, pieces = [] } = scene, last = pieces.length > 2 ? `${pieces.at(-1).name}.` : null;
+  const near = all.filter(({ name, kind }) => !FAR.includes(kind) && !(last && name.startsWith(last)));
+  const isCoil = !pieces.length && !near.some(({ kind }) => kind === "centre");
+  picture.fit(isCoil ? [] : near.map(({ x, y }) => [x, y]));
 }
 
 function note() {
