@@ -17,6 +17,7 @@
 //! - `recording`: MCAP recordings, their replay, and the verification of logs.
 //! - `chase`: a show follows timecode, or a performer with a tracker.
 //! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
+//! - `design`: a scene edited as text and as a picture.
 //! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
 //! - `fit`: numbers of a scene changed until the show keeps what it must.
 //! - `sheets`: hand-outs for the people who carry the benches.
@@ -31,6 +32,8 @@ pub use bench_dragon_certify as certify;
 #[cfg(feature = "library")]
 pub use bench_dragon_chase as chase;
 pub use bench_dragon_client as client;
+#[cfg(feature = "library")]
+pub use bench_dragon_design as design;
 #[cfg(feature = "library")]
 pub use bench_dragon_drawing as drawing;
 #[cfg(feature = "library")]

@@ -45,6 +45,9 @@ pub enum Command {
     Watch(commands::watch::WatchArguments),
     /// Serve the live stage picture to a browser
     View(commands::view::ViewArguments),
+    /// Serve the page on which a scene is made: text and picture side by side
+    #[command(arg = scene_argument())]
+    Design(commands::design::DesignArguments),
     /// Send a running publisher's dragon to lighting desks and other hosts
     Send(commands::send::SendArguments),
     /// Make a running publisher follow timecode, or a performer with a tracker
@@ -136,6 +139,7 @@ fn main() -> ExitCode {
         Command::Verify(arguments) => commands::verify::verify(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),
+        Command::Design(arguments) => commands::design::design(&common, arguments),
         Command::Send(arguments) => commands::send::send(&common, arguments),
         Command::Chase(arguments) => commands::chase::chase(&common, arguments),
         Command::Metrics(arguments) => commands::metrics::metrics(&common, arguments),

@@ -41,15 +41,15 @@ pub struct ViewArguments {
     certificate: Vec<PathBuf>,
 }
 
-/// The line of `view --json` once browsers can connect.
+/// The line of `view --json`, and of `design --json`, once browsers can connect.
 #[derive(Serialize)]
-struct ReadyLine {
-    r#type: &'static str,
-    url: String,
+pub struct ReadyLine {
+    pub r#type: &'static str,
+    pub url: String,
     /// The addresses for other machines, if the server listens on all of this machine's.
-    others: Vec<String>,
+    pub others: Vec<String>,
     /// The token for commands; null if none is needed.
-    token: Option<String>,
+    pub token: Option<String>,
 }
 
 /// Serves the picture until a signal comes.
@@ -162,7 +162,7 @@ fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result
 }
 
 /// Returns the addresses of this machine for other machines, of the kinds that are listened on.
-fn own_addresses(listen: IpAddr) -> Vec<IpAddr> {
+pub fn own_addresses(listen: IpAddr) -> Vec<IpAddr> {
     let interfaces = nix::ifaddrs::getifaddrs().into_iter().flatten();
     let mut addresses: Vec<_> = interfaces
         .filter_map(|interface| {

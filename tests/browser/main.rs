@@ -1,6 +1,7 @@
 //! The stage page in a real browser.
 
 mod conduct;
+mod design;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod looks;

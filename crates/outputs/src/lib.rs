@@ -3,6 +3,7 @@
 //!
 //! Each is a separate process that handles the events of feeds, so that none can delay the loop.
 
+pub mod design;
 mod http;
 pub mod metrics;
 pub mod monitor;

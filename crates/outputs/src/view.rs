@@ -14,7 +14,7 @@ mod facts;
 pub(crate) mod origin;
 mod reader;
 mod scrub;
-mod wire;
+pub(crate) mod wire;
 
 use std::io;
 use std::net::SocketAddr;
@@ -49,6 +49,10 @@ pub use origin::AllowedOrigin;
 pub use scrub::{OpenScene, SceneFrames};
 use scrub::{SceneInPlay, Scrubber};
 
+/// The kinds of the page's files.
+pub(crate) const HTML: &str = "text/html; charset=utf-8";
+pub(crate) const SCRIPT: &str = "text/javascript; charset=utf-8";
+pub(crate) const STYLE: &str = "text/css; charset=utf-8";
 /// Browsers send requests of a few letters.
 const MAX_REQUEST_BYTES: usize = 1024;
 /// Waking the server at each frame would cost the publisher more than the frame itself.
@@ -212,7 +216,6 @@ where
 }
 
 fn router(server: Server, pages: Option<&Path>) -> Router {
-    let file = |kind, text| get(move || async move { served(kind, text) });
     let names = publishers_module(&server.channels);
     let mut router = Router::new();
     if let Some(folder) = pages {
@@ -222,54 +225,61 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("pages/") }));
     }
     router
-        .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))
-        .route("/address.js", file("text/javascript; charset=utf-8", include_str!("view/address.js")))
-        .route("/boards.js", file("text/javascript; charset=utf-8", include_str!("view/boards.js")))
-        .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
-        .route("/cameras.js", file("text/javascript; charset=utf-8", include_str!("view/cameras.js")))
-        .route("/curve.js", file("text/javascript; charset=utf-8", include_str!("view/curve.js")))
-        .route("/dragon.js", file("text/javascript; charset=utf-8", include_str!("view/dragon.js")))
-        .route("/dragon_figure.js", file("text/javascript; charset=utf-8", include_str!("view/dragon_figure.js")))
-        .route("/dragon_head.js", file("text/javascript; charset=utf-8", include_str!("view/dragon_head.js")))
-        .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
-        .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
-        .route("/key_switch.js", file("text/javascript; charset=utf-8", include_str!("view/key_switch.js")))
-        .route("/label_layout.js", file("text/javascript; charset=utf-8", include_str!("view/label_layout.js")))
-        .route("/labels.js", file("text/javascript; charset=utf-8", include_str!("view/labels.js")))
-        .route("/lantern_light.js", file("text/javascript; charset=utf-8", include_str!("view/lantern_light.js")))
-        .route("/lantern_view.js", file("text/javascript; charset=utf-8", include_str!("view/lantern_view.js")))
-        .route("/lanterns.js", file("text/javascript; charset=utf-8", include_str!("view/lanterns.js")))
-        .route("/lock.js", file("text/javascript; charset=utf-8", include_str!("view/lock.js")))
-        .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
-        .route("/measure.js", file("text/javascript; charset=utf-8", include_str!("view/measure.js")))
-        .route("/pace.js", file("text/javascript; charset=utf-8", include_str!("view/pace.js")))
-        .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
-        .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
-        .route("/pointer_input.js", file("text/javascript; charset=utf-8", include_str!("view/pointer_input.js")))
-        .route("/publisher.js", file("text/javascript; charset=utf-8", include_str!("view/publisher.js")))
-        .route("/publishers.js", get(move || async move { served("text/javascript; charset=utf-8", names) }))
-        .route("/resolution.js", file("text/javascript; charset=utf-8", include_str!("view/resolution.js")))
-        .route("/roster.js", file("text/javascript; charset=utf-8", include_str!("view/roster.js")))
-        .route("/scrub.js", file("text/javascript; charset=utf-8", include_str!("view/scrub.js")))
-        .route("/scrub.css", file("text/css; charset=utf-8", include_str!("view/scrub.css")))
-        .route("/seat.js", file("text/javascript; charset=utf-8", include_str!("view/seat.js")))
-        .route("/seat_sprites.js", file("text/javascript; charset=utf-8", include_str!("view/seat_sprites.js")))
-        .route("/seat_view.js", file("text/javascript; charset=utf-8", include_str!("view/seat_view.js")))
-        .route("/show.js", file("text/javascript; charset=utf-8", include_str!("view/show.js")))
-        .route("/signs.js", file("text/javascript; charset=utf-8", include_str!("view/signs.js")))
-        .route("/sound.js", file("text/javascript; charset=utf-8", include_str!("view/sound.js")))
-        .route("/sprites.js", file("text/javascript; charset=utf-8", include_str!("view/sprites.js")))
-        .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
-        .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
-        .route("/transport.js", file("text/javascript; charset=utf-8", include_str!("view/transport.js")))
-        .route("/village.js", file("text/javascript; charset=utf-8", include_str!("view/village.js")))
-        .route("/words.js", file("text/javascript; charset=utf-8", include_str!("view/words.js")))
-        .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
-        .route("/conduct.js", file("text/javascript; charset=utf-8", include_str!("view/conduct.js")))
-        .route("/conduct.css", file("text/css; charset=utf-8", include_str!("view/conduct.css")))
+        .merge(modules())
+        .route("/", get(|| async { served(HTML, include_str!("view/index.html")) }))
+        .route("/publishers.js", get(move || async move { served(SCRIPT, names) }))
         .route("/frames", get(frames))
         .route("/scrub", get(scrubbed))
         .with_state(server)
+}
+
+/// Returns the files of the page besides its document, which the design page loads too.
+pub(crate) fn modules<S: Clone + Send + Sync + 'static>() -> Router<S> {
+    let file = |kind, text| get(move || async move { served(kind, text) });
+    Router::new()
+        .route("/address.js", file(SCRIPT, include_str!("view/address.js")))
+        .route("/boards.js", file(SCRIPT, include_str!("view/boards.js")))
+        .route("/camera.js", file(SCRIPT, include_str!("view/camera.js")))
+        .route("/cameras.js", file(SCRIPT, include_str!("view/cameras.js")))
+        .route("/curve.js", file(SCRIPT, include_str!("view/curve.js")))
+        .route("/dragon.js", file(SCRIPT, include_str!("view/dragon.js")))
+        .route("/dragon_figure.js", file(SCRIPT, include_str!("view/dragon_figure.js")))
+        .route("/dragon_head.js", file(SCRIPT, include_str!("view/dragon_head.js")))
+        .route("/drawing.js", file(SCRIPT, include_str!("view/drawing.js")))
+        .route("/hermite.js", file(SCRIPT, include_str!("view/hermite.js")))
+        .route("/key_switch.js", file(SCRIPT, include_str!("view/key_switch.js")))
+        .route("/label_layout.js", file(SCRIPT, include_str!("view/label_layout.js")))
+        .route("/labels.js", file(SCRIPT, include_str!("view/labels.js")))
+        .route("/lantern_light.js", file(SCRIPT, include_str!("view/lantern_light.js")))
+        .route("/lantern_view.js", file(SCRIPT, include_str!("view/lantern_view.js")))
+        .route("/lanterns.js", file(SCRIPT, include_str!("view/lanterns.js")))
+        .route("/lock.js", file(SCRIPT, include_str!("view/lock.js")))
+        .route("/marks.js", file(SCRIPT, include_str!("view/marks.js")))
+        .route("/measure.js", file(SCRIPT, include_str!("view/measure.js")))
+        .route("/pace.js", file(SCRIPT, include_str!("view/pace.js")))
+        .route("/palette.js", file(SCRIPT, include_str!("view/palette.js")))
+        .route("/panel.js", file(SCRIPT, include_str!("view/panel.js")))
+        .route("/pointer_input.js", file(SCRIPT, include_str!("view/pointer_input.js")))
+        .route("/publisher.js", file(SCRIPT, include_str!("view/publisher.js")))
+        .route("/resolution.js", file(SCRIPT, include_str!("view/resolution.js")))
+        .route("/roster.js", file(SCRIPT, include_str!("view/roster.js")))
+        .route("/scrub.js", file(SCRIPT, include_str!("view/scrub.js")))
+        .route("/scrub.css", file(STYLE, include_str!("view/scrub.css")))
+        .route("/seat.js", file(SCRIPT, include_str!("view/seat.js")))
+        .route("/seat_sprites.js", file(SCRIPT, include_str!("view/seat_sprites.js")))
+        .route("/seat_view.js", file(SCRIPT, include_str!("view/seat_view.js")))
+        .route("/show.js", file(SCRIPT, include_str!("view/show.js")))
+        .route("/signs.js", file(SCRIPT, include_str!("view/signs.js")))
+        .route("/sound.js", file(SCRIPT, include_str!("view/sound.js")))
+        .route("/sprites.js", file(SCRIPT, include_str!("view/sprites.js")))
+        .route("/stage.js", file(SCRIPT, include_str!("view/stage.js")))
+        .route("/stream.js", file(SCRIPT, include_str!("view/stream.js")))
+        .route("/transport.js", file(SCRIPT, include_str!("view/transport.js")))
+        .route("/village.js", file(SCRIPT, include_str!("view/village.js")))
+        .route("/words.js", file(SCRIPT, include_str!("view/words.js")))
+        .route("/style.css", file(STYLE, include_str!("view/style.css")))
+        .route("/conduct.js", file(SCRIPT, include_str!("view/conduct.js")))
+        .route("/conduct.css", file(STYLE, include_str!("view/conduct.css")))
 }
 
 /// Returns the module with the names of the publishers that the page draws.
@@ -280,7 +290,7 @@ fn publishers_module(channels: &[Channel]) -> String {
 }
 
 /// Returns a file of the page, which loads nothing from other servers.
-fn served(kind: &'static str, text: impl IntoResponse) -> Response {
+pub(crate) fn served(kind: &'static str, text: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, kind),
         (header::CACHE_CONTROL, "no-cache"),
@@ -302,7 +312,7 @@ async fn own_page(Served(server): Served<Server>, request: Request, next: Next) 
     response
 }
 
-fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+pub(crate) fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     headers.get(name)?.to_str().ok()
 }
 

@@ -53,7 +53,8 @@ function takeToken() {
     return given ?? null;
   }
 }
-const token = takeToken();
+/** The token for commands, or null. */
+export const token = takeToken();
 
 /** Returns true if a certificate of exactly this scene proves the announced time of an event. */
 const isProved = (stage, { event, time }) =>
