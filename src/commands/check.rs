@@ -37,7 +37,8 @@ pub struct CheckArguments {
     /// included. With [require] the proof decides. It takes seconds to minutes; with --json, print the proof (and the line of --swept) alone
     #[arg(long)]
     prove: bool,
-    /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage
+    /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage; a real tail that whips covers
+    /// more
     #[arg(long, value_name = "FILE")]
     swept: Option<PathBuf>,
     /// The first time of --swept: seconds, or an event; by default 0

@@ -65,6 +65,11 @@ fn benches_of_several_dragons_have_their_dragons_name() {
     }
     let svg = printed(&["--scene", "config/crossing.toml", "draw", "--swept", "--at", "52", "--until", "52"]);
     assert!(svg.contains("ground covered: "), "{svg}");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ground.json");
+    let said =
+        printed(&["--scene", "config/crossing.toml", "check", "--swept", file.to_str().unwrap(), "--until", "1"]);
+    assert!(said.contains("Left out: rings narrower than 1 mm, and the ground of a real tail that whips"), "{said}");
 }
 
 fn printed(arguments: &[&str]) -> String {
