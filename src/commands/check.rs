@@ -65,6 +65,12 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
+    if timeline.is_stopped() {
+        if !common.json {
+            ahead(&scene, &timeline, &mut output)?;
+        }
+        return output.finish().and(unstopped());
+    }
     let covered = arguments.covered(&scene, &timeline, common)?;
     let certified = arguments.certificate.as_ref().map(|file| proved(&text.text, file, common)).transpose()?;
     if let (Some(covered), true) = (&covered, common.json) {

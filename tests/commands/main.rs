@@ -11,6 +11,7 @@ mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod interrupted;
 mod packages;
 mod placement;
 mod require;

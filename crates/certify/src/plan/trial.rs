@@ -38,6 +38,9 @@ pub(super) enum Obstacle {
 pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Obstacle> {
     let near = Trial::near(team, pitch, radius, progress);
     near.obstacle(progress).or_else(|| {
+        if progress(pitch).is_break() {
+            return None;
+        }
         // Boards with almost no room between them and the next but one touch in a bend that may be anywhere.
         let outer = clear_beyond(team, pitch, radius)?;
         let far = Trial::new(team, (pitch, radius), outer, progress);
@@ -70,6 +73,9 @@ pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progre
             if pitch > to {
                 return Proposal { last: None, ..proposal };
             }
+        }
+        if progress(pitch).is_break() {
+            break;
         }
         proposal.last = Some(found);
         let free_at = match found {

@@ -160,6 +160,9 @@ impl Family<'_> {
 
     /// Returns the first stall and the lock with this radius, with several pivots each.
     pub fn folds(&self, radius: f64) -> Vec<Witness> {
+        if self.is_stopped() {
+            return Vec::new();
+        }
         let team = Team { benches: self.team.benches.min(2), ..*self.team };
         let longest = team.longest_link();
         let lead_in = self.spiral_between(radius, radius.max(longest) + TURNS_BEFORE * self.pitch);
@@ -189,6 +192,9 @@ impl Family<'_> {
     /// Returns the fold with the deepest pivot within the distance `reach` of the place `near`. Both are metres along
     /// the path, and the place is counted from the beginning of the S.
     fn pivoted(&self, radius: f64, (kind, link): (EventKind, usize), near: f64, reach: f64) -> Option<Witness> {
+        if self.is_stopped() {
+            return None;
+        }
         let path = self.path(radius)?;
         let length = self.team.link(link);
         let folded = |pivot: Param| Folded::new(&path, kind, length, pivot);
@@ -228,6 +234,9 @@ impl Family<'_> {
 
     /// Returns two boards that overlap with this radius, at their deepest.
     fn touch(&self, radius: f64) -> Option<Witness> {
+        if self.is_stopped() {
+            return None;
+        }
         let team = self.team;
         let outer = radius.max(team.longest_link()) + BOARDS_BEFORE * self.pitch;
         let lead_in = self.spiral_between(radius, outer);
@@ -267,6 +276,9 @@ impl Family<'_> {
     /// Returns the pair of boards that overlap most deeply with the head near a place, and the head's place then.
     /// `past` is the near place in metres past the beginning of the S.
     fn deepest(&self, radius: f64, pairs: &[(u32, u32)], past: f64) -> Option<((u32, u32), Place)> {
+        if self.is_stopped() {
+            return None;
+        }
         let window = WINDOW * self.team.shortest_link();
         let lead_in = self.spiral_between(radius, radius.max(self.team.longest_link()) + BOARDS_BEFORE * self.pitch);
         let path = self.path_between(radius, lead_in, self.team.length())?;
