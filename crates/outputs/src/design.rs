@@ -20,7 +20,7 @@ use axum::routing::{get, post};
 
 use super::http::Listening;
 use super::view::origin::Admission;
-use super::view::{HTML, Ready, Token, ViewError, modules, served, text_of};
+use super::view::{HTML, Ready, SCRIPT, STYLE, Token, ViewError, modules, served, text_of};
 use bench_dragon_messages::{FrameHeader, HandlePose, StageMessage};
 use session::Place;
 
@@ -30,7 +30,20 @@ const MOST_SESSIONS: usize = 4;
 const MAX_MESSAGE_BYTES: usize = 2 * 1024 * 1024;
 
 /// The files of the page below `/design/`: name, kind, content.
-const FILES: [(&str, &str, &str); 0] = [];
+const FILES: [(&str, &str, &str); 12] = [
+    ("design.css", STYLE, include_str!("design/design.css")),
+    ("fields.js", SCRIPT, include_str!("design/fields.js")),
+    ("ground_picture.js", SCRIPT, include_str!("design/ground_picture.js")),
+    ("handles.js", SCRIPT, include_str!("design/handles.js")),
+    ("history.js", SCRIPT, include_str!("design/history.js")),
+    ("page.js", SCRIPT, include_str!("design/page.js")),
+    ("picture.js", SCRIPT, include_str!("design/picture.js")),
+    ("plans.js", SCRIPT, include_str!("design/plans.js")),
+    ("results.js", SCRIPT, include_str!("design/results.js")),
+    ("session.js", SCRIPT, include_str!("design/session.js")),
+    ("text.js", SCRIPT, include_str!("design/text.js")),
+    ("time_line.js", SCRIPT, include_str!("design/time_line.js")),
+];
 
 /// An answer of a studio to a page.
 #[derive(Debug, Clone)]
@@ -113,11 +126,9 @@ pub fn serve<Refused: From<ViewError>>(
 }
 
 fn router(server: Server) -> Router {
-    let page = || get(|| async { served(HTML, include_str!("design/index.html")) });
     let mut router = modules()
         .route("/", get(|| async { Redirect::temporary("design") }))
-        .route("/design", page())
-        .route("/design/", page())
+        .route("/design", get(|| async { served(HTML, include_str!("design/index.html")) }))
         .route("/design/session", get(sessions))
         .route("/design/save", post(save).layer(DefaultBodyLimit::max(MAX_MESSAGE_BYTES)));
     for (name, kind, text) in FILES {
