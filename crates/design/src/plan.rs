@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
@@ -22,6 +23,9 @@ use bench_dragon_show::results::figure;
 
 /// The speed that no handle may exceed in the plan of the greatest speed, in metres per second: a brisk walk.
 const MOST_SPEED: f64 = 2.0;
+
+/// The least time between two messages about the progress of a plan.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A plan that is found.
 pub struct Planned {
@@ -53,13 +57,13 @@ impl RunningPlan {
         let stop = Arc::new(AtomicBool::new(false));
         let of_thread = Arc::clone(&stop);
         std::thread::Builder::new().name("plan".to_owned()).spawn(move || {
-            let mut shown = 0.0;
+            let (mut shown, mut due) = (0.0, Instant::now());
             let mut progress = |share: f64| {
                 if of_thread.load(Ordering::Relaxed) {
                     return ControlFlow::Break(());
                 }
-                if share >= shown + 0.01 {
-                    shown = share;
+                if share >= shown + 0.01 && Instant::now() >= due {
+                    (shown, due) = (share, Instant::now() + PROGRESS_INTERVAL);
                     answers(&json!({"id": id, "progress": share}));
                 }
                 ControlFlow::Continue(())

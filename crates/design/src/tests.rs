@@ -318,8 +318,8 @@ fn after_a_storm_of_changes_the_last_state_is_exact() {
     let (session, answers) = session();
     let first = until(&answers, 0, "scene", "");
     assert_eq!(first["name"], "paper");
-    for id in 1..=300 {
-        let pitch = 0.55 + 1e-4 * id as f64;
+    for id in 1..=300_u32 {
+        let pitch = f64::from(5500 + id) / 1e4;
         session.request(json!({"id": id, "set": {"path.pitch": pitch}}).to_string()).unwrap();
     }
     let events = until(&answers, 300, "events", "exact");
