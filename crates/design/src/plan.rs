@@ -1,4 +1,5 @@
-//! The plans of a page: the least pitch, the least turn, the greatest speed, and the proof of the events.
+//! The plans of a page: the least pitch, the least turn, the greatest speed, numbers that fit, and the proof of the
+//! events.
 //!
 //! In: a scene with its text. Out: the answer of `plan --json` with a sentence, and the text with the planned number.
 
@@ -15,15 +16,19 @@ use crate::request::Setting;
 use crate::scene::DesignedScene;
 use bench_dragon_certify::plan::{greatest_speed, least_pitch, least_turn};
 use bench_dragon_certify::{CertifiedEvent, MOST_STEPS, Status, certify};
+use bench_dragon_fit::search::{Vary, fit};
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_show::results::figure;
+use bench_dragon_show::scene::SceneText;
 
 /// The speed that no handle may exceed in the plan of the greatest speed, in metres per second: a brisk walk.
 const MOST_SPEED: f64 = 2.0;
 
+/// The greatest number of fields that are fitted.
+const MOST_VARIED: usize = 8;
 /// The least time between two messages about the progress of a plan.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
 
@@ -50,7 +55,7 @@ impl RunningPlan {
     /// # Errors
     /// The system has no thread left.
     pub fn start(
-        (id, kind): (u64, String),
+        (id, kind, vary): (u64, String, Vec<String>),
         scene: Arc<DesignedScene>,
         answers: impl Fn(&Value) + Send + 'static,
     ) -> std::io::Result<Self> {
@@ -68,7 +73,7 @@ impl RunningPlan {
                 }
                 ControlFlow::Continue(())
             };
-            let planned = plan(&kind, &scene, &mut progress);
+            let planned = plan((&kind, &vary), &scene, &mut progress);
             answers(&match planned {
                 _ if of_thread.load(Ordering::Relaxed) => json!({"id": id, "cancelled": true}),
                 Ok(Planned { answer, text }) => json!({"id": id, "plan": answer, "text": text}),
@@ -83,9 +88,11 @@ impl RunningPlan {
 ///
 /// # Errors
 /// One sentence for a plan that the scene cannot have.
-fn plan(kind: &str, scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
-    if kind == "prove" {
-        return prove(scene, progress);
+fn plan((kind, vary): (&str, &[String]), scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
+    match kind {
+        "prove" => return prove(scene, progress),
+        "fit" => return fitted(vary, scene, progress),
+        _ => {}
     }
     let motion = scene.scene.ensemble.only();
     let motion = motion.ok_or("the scene has several dragons, and this plan is for one in [team]")?;
@@ -93,7 +100,7 @@ fn plan(kind: &str, scene: &DesignedScene, progress: Progress<'_>) -> Result<Pla
         "pitch" => pitch(scene, motion, progress),
         "turn" => turn(scene, motion, progress),
         "speed" => speed(scene, progress),
-        _ => Err(format!("there is no plan {kind:?}, expected pitch, turn, speed or prove")),
+        _ => Err(format!("there is no plan {kind:?}, expected pitch, turn, speed, fit or prove")),
     }
 }
 
@@ -205,6 +212,38 @@ fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Strin
 
 fn status(proved: bool) -> &'static str {
     if proved { "proved" } else { "given_up" }
+}
+
+/// Fits numbers of the scene, as `plan fit` does, so that the show keeps what is required.
+fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
+    if vary.is_empty() || vary.len() > MOST_VARIED {
+        return Err(format!("{} numbers are chosen to be fitted, expected 1 to {MOST_VARIED}", vary.len()));
+    }
+    let text = SceneText { text: scene.text.clone(), file: "scene".to_owned(), stem: "scene".to_owned() };
+    let vary: Vec<Vary> = vary.iter().map(|field| Vary { field: field.clone(), range: None }).collect();
+    let clearance = scene.scene.require.and_then(|require| require.clearance).unwrap_or(0.0);
+    let found = fit(&text, &vary, clearance, 1, &mut |share, _| progress(share)).map_err(|error| error.to_string())?;
+    let margin = found.judgement.margin();
+    let sentence = match found.is_found() {
+        true => format!(
+            "The show keeps {clearance} m between boards, and every keep-out, with {} m to spare: found, not proved to be \
+             the greatest.",
+            figure(margin)
+        ),
+        false => {
+            format!("No numbers were found that keep what is required: at best {} m are missing.", figure(-margin))
+        }
+    };
+    let fields: BTreeMap<&str, f64> = found.fields.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+    let answer = json!({
+        "plan": "fit",
+        "status": if found.is_found() { "found" } else { "not_found" },
+        "fields": fields,
+        "clearance": clearance,
+        "margin": margin,
+        "sentence": sentence,
+    });
+    Ok(Planned { answer, text: found.is_found().then_some(found.text) })
 }
 
 /// Proves the events, as `events --certify` does, without a certificate.

@@ -161,8 +161,8 @@ impl Desk {
                 self.plan = None;
                 return;
             }
-            Wish::Plan(kind, _) => match self.good() {
-                Ok(scene) => return self.plan(id, kind, scene),
+            Wish::Plan(kind, vary) => match self.good() {
+                Ok(scene) => return self.plan((id, kind, vary), scene),
                 Err(fault) => Err(fault),
             },
         };
@@ -220,9 +220,9 @@ impl Desk {
     }
 
     /// Starts a plan, and ends another one.
-    fn plan(&mut self, id: u64, kind: String, scene: Arc<DesignedScene>) {
-        let answers = Arc::clone(&self.answers);
-        let started = RunningPlan::start((id, kind), scene, move |answer| answers(Answer::Json(answer.to_string())));
+    fn plan(&mut self, request: (u64, String, Vec<String>), scene: Arc<DesignedScene>) {
+        let (id, answers) = (request.0, Arc::clone(&self.answers));
+        let started = RunningPlan::start(request, scene, move |answer| answers(Answer::Json(answer.to_string())));
         match started {
             Ok(plan) => self.plan = Some(plan),
             Err(error) => self.refuse(id, &format!("there is no thread for a plan: {error}").into()),

@@ -4,6 +4,7 @@
 const TITLES = [["path", "Path"], ["placement", "Placement"], ["team", "Team"], ["motion", "Motion"],
   ["dragons", "Dragons"], ["stage", "Stage"], ["obstacles", "Obstacles"], ["require", "Required"], ["cues", "Cues"],
   ["alerts", "Alerts"], ["publish", "Publishing"]];
+const UNITS = { metres: "m", "metres per second": "m/s", seconds: "s", turns: "turns", "frames per second": "Hz" };
 /** The part of a field's name that names a thing among several. */
 const ITEM = /^(?:dragons\[\d+\]\.)?(?:path\.pieces|stage\.obstacles|cues)\[\d+\]|^dragons\[\d+\]/;
 const NOUNS = { pieces: "Piece", obstacles: "Obstacle", cues: "Cue", dragons: "Dragon" };
@@ -12,6 +13,21 @@ const MANY = 80;
 
 /** Returns a table of names as words. */
 const wordsOf = (name) => name.replaceAll(/[._]/g, " ").replaceAll(/\[(\d+)\]/g, (_, k) => ` ${Number(k) + 1}`).trim();
+
+/** Returns a unit as it stands beside a number. */
+export const unitOf = (unit) => UNITS[unit] ?? "";
+
+/** Returns the fields of a scene, with those that it leaves to their defaults and that most scenes need. */
+function fieldsOf({ fields, obstacles = [] }) {
+  const all = fields.filter(({ value }) => value === null || typeof value !== "object");
+  const has = (name) => all.some((field) => field.name === name), missing = { unit: "metres", min: 0, max: 1e6 };
+  for (const { name, line } of obstacles) {
+    const last = all.findLastIndex((field) => field.name.startsWith(`${name}.`));
+    if (!has(`${name}.keep_out`)) all.splice(last + 1, 0, { ...missing, name: `${name}.keep_out`, value: 0, line });
+  }
+  if (!has("require.clearance")) all.push({ ...missing, name: "require.clearance", value: null, line: null });
+  return all;
+}
 
 /** Returns the item of a field, as it is named in a request; "" for a field of a table. */
 export const itemOf = (name) => ITEM.exec(name)?.[0] ?? "";
@@ -37,7 +53,8 @@ function groupOf(name) {
 
 /** Returns the label of a field below the heading of its group or item. */
 function labelOf(name, item) {
-  const rest = name.slice(item.length).replace(/^\./, ""), [group] = rest.split(".");
+  const named = name.replace(/\[([01])\]$/, (_, axis) => ` ${"xy"[axis]}`);
+  const rest = named.slice(item.length).replace(/^\./, ""), [group] = rest.split(".");
   return wordsOf(TITLES.some(([key]) => key === group) && rest !== group ? rest.slice(group.length + 1) : rest);
 }
 
@@ -66,7 +83,7 @@ export class Fields {
 
   /** Shows the fields of a scene. The field that has the focus keeps what the user types. */
   show(scene) {
-    const fields = scene.fields.filter(({ value }) => value === null || typeof value !== "object");
+    const fields = fieldsOf(scene);
     const key = JSON.stringify([fields.map(({ name }) => name), scene.pieces, scene.obstacles, scene.dragons,
       scene.cues?.map(({ name }) => name)]);
     if (key !== this.key) this.build(fields, scene);
@@ -113,11 +130,12 @@ export class Fields {
         : made("input", { type: isNumber ? "number" : typeof value === "boolean" ? "checkbox" : "text" });
     Object.assign(input.dataset, { field: name });
     input.setAttribute("aria-label", unit ? `${full}, ${unit}` : full);
+    if (value === null) input.placeholder = "none";
     const slider = isNumber ? made("input", { type: "range", attributes: { "data-slider": name,
       "aria-label": `${full}, slider`, tabindex: "-1" } }) : null;
     const row = { field, input, slider, node: made("label", { className: "field" },
         made("span", { textContent: label, title: name }), ...(slider ? [slider] : []), input,
-        made("i", { textContent: unit ?? "" })) };
+        made("i", { textContent: unitOf(unit) })) };
     this.rows.set(name, row);
     this.listen(row);
     return row.node;

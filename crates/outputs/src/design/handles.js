@@ -7,6 +7,7 @@ import { itemOf, itemWords, made } from "./fields.js";
 const STEP = 0.1, FINE_STEP = 0.01;
 /** Handles that are shown at once. */
 const MOST = 300;
+const CORNERS = ["corner", "boundary"];
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const KINDS = { end: "end", middle: "middle", pitch: "pitch", turns: "length along the spiral", radius: "radius",
   placement: "whole path", heading: "first direction", centre: "place", corner: "corner", rim: "radius",
@@ -14,8 +15,8 @@ const KINDS = { end: "end", middle: "middle", pitch: "pitch", turns: "length alo
 
 export class Handles {
   /**
-   * `acts` has drag(handle, to, { free, alt }, gesture), cancel(gesture), remove(name), show(line), and use(name): the
-   * handle in use, or null. It also has isBusy(), true until the last drag is answered, the camera and the canvas.
+   * `acts` has drag(handle, to, { free, alt }, gesture), cancel(gesture), remove(name), insert(after, at) and show(line).
+   * It also has use(name), the handle in use or null, isBusy(), true until the last drag is answered, camera and canvas.
    */
   constructor(root, acts) {
     Object.assign(this, { root, acts, shown: new Map(), scene: null, held: null, gestures: 0 });
@@ -55,6 +56,7 @@ export class Handles {
     node.onpointermove = (event) => this.held === one && this.move(one, event);
     node.onpointerup = node.onpointercancel = () => this.held === one && this.release();
     node.onkeydown = (event) => this.press(one, event);
+    node.ondblclick = () => this.insert(one.handle);
     node.onfocus = () => this.acts.show(one.handle.line);
     node.onblur = () => {
       this.acts.show(null);
@@ -117,7 +119,8 @@ export class Handles {
       if (this.held) this.acts.cancel(`drag ${this.gestures}`);
       this.release();
       one.node.blur();
-    } else if (key === "Delete" || key === "Backspace") this.acts.remove(removable(one.handle));
+    } else if (key === "Delete" || key === "Backspace") this.remove(one.handle);
+    else if (key === "Insert" || key === "+") this.insert(one.handle);
     else if (ARROWS[key]) {
       if (!repeat) this.gestures++;
       const step = shiftKey ? FINE_STEP : STEP, [right, up] = ARROWS[key], [x, y] = one.wanted ??
@@ -130,9 +133,18 @@ export class Handles {
     event.preventDefault();
     event.stopPropagation();
   }
-}
 
-/** Returns the thing that is removed with a handle: a corner, or the item of the handle. */
-function removable({ name, kind }) {
-  return kind === "corner" ? name : itemOf(name) || name;
+  /** Removes a corner, or the piece or obstacle of another handle. */
+  remove({ name, kind }) {
+    const removed = CORNERS.includes(kind) ? name : itemOf(name);
+    if (removed) this.acts.remove(removed);
+  }
+
+  /** Adds a corner between a corner and the next one. */
+  insert({ name, kind, x, y }) {
+    if (!CORNERS.includes(kind)) return;
+    const list = name.replace(/\[\d+\]$/, ""), of = this.scene.handles.filter((one) => one.name.startsWith(`${list}[`));
+    const next = of[(of.findIndex((one) => one.name === name) + 1) % of.length];
+    this.acts.insert(name, [(x + next.x) / 2, (y + next.y) / 2].map((one) => Math.round(10 * one) / 10));
+  }
 }

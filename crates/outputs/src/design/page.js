@@ -7,7 +7,7 @@ import { wordsOf } from "../address.js";
 import { Measure } from "../measure.js";
 import { attach } from "../pointer_input.js";
 import { setLanguage } from "../words.js";
-import { Fields } from "./fields.js";
+import { Fields, unitOf } from "./fields.js";
 import { GroundPicture } from "./ground_picture.js";
 import { Handles } from "./handles.js";
 import { History } from "./history.js";
@@ -58,7 +58,7 @@ const session = new Session({
     if (events.state === "computing") return;
     line.showEvents(events);
     // The marked event, as it is now; or the first that happens on the way.
-    const { event: marked } = picture, list = events.list ?? [];
+    const { event: marked } = picture, list = (picture.events = events.list ?? []);
     picture.mark(list.find(({ event, obstacle }) => event === marked?.event && obstacle === marked?.obstacle) ??
         list.find(({ event }) => event !== "path_end") ?? null);
   },
@@ -87,6 +87,7 @@ const handles = new Handles(element("handles"), { camera, canvas,
   // Only what this gesture has changed.
   cancel: (gesture) => history.gesture === gesture ? undo(-1) : session.forget(),
   remove: (name) => change({ remove: name }, null),
+  insert: (after, at) => change({ add: { what: "corner", after, at } }, null),
   show: (number) => text.show(number),
   isBusy: () => session.inFlight !== null,
 });
@@ -190,7 +191,7 @@ function beside() {
   box.hidden = !handle;
   if (!handle) return;
   const names = handle.fields ?? [handle.name], values = scene.fields.filter(({ name }) => names.includes(name)).map(
-      ({ name, value, unit }) => `${name.split(/[.\]]/).findLast(Boolean)} ${value} ${unit ?? ""}`);
+      ({ name, value, unit }) => `${name.split(/[.\]]/).findLast(Boolean)} ${value} ${unitOf(unit)}`);
   box.textContent = [values.join(", "), results.brief].filter(Boolean).join("\n");
   const [x, y] = camera.toPixel(handle.x, handle.y);
   box.style.transform = `translate(${Math.min(x + 18, camera.width - 220)}px, ${Math.max(4, y - 46)}px)`;
@@ -221,9 +222,11 @@ function allowed(isAllowed) {
   if (!isAllowed) tell("This server needs the token: open the address that it printed.");
 }
 
-/** The scene of the file, or of the first template. A text that was kept here has priority. */
+/**
+ * Takes the scene of the file, or of the first template. Returns true if the page shows it: a kept text has priority.
+ */
 function offer({ scene: offered, error }) {
-  if (history.key !== null) return;
+  if (history.key !== null) return false;
   const given = offered?.text ?? error.text ?? "", kept = history.begin(hello?.file ?? "", given);
   line.time = kept.time;
   if (kept.text !== given) {
@@ -231,11 +234,12 @@ function offer({ scene: offered, error }) {
     send(kept.text);
     session.at(kept.time);
     tell("Continued where you left off. Undo has the earlier texts.");
-  } else {
-    text.set(given);
-    offered ? show(offered) : showError(error);
-    if (kept.time) session.at(kept.time);
+    return false;
   }
+  text.set(given);
+  offered ? show(offered) : showError(error);
+  if (kept.time) session.at(kept.time);
+  return true;
 }
 
 function frame(received) {
@@ -268,13 +272,13 @@ function choose(number) {
   picture.chosen = { dragon: dragon ?? null, bench: dragon ? number - dragon.first : -1 };
 }
 
-/** Shows everything that has handles; a coil without stage, by its boards. */
+/** Shows the handles; a coil alone by its boards. The last piece and the boundary may be long streets. */
 function fit() {
   isFitted = true;
-  const near = scene.handles.filter(({ kind }) => !FAR.includes(kind)),
-      ends = near.filter(({ kind }) => kind === "end"), isRoute = ends.length > 1, last = isRoute ? ends.at(-1) : null;
-  picture.fit(isRoute || near.some(({ kind }) => kind === "centre" || kind === "corner")
-      ? near.filter((one) => one !== last).map(({ x, y }) => [x, y]) : []);
+  const { handles: all, pieces = [] } = scene, last = pieces.length > 2 ? `${pieces.at(-1).name}.` : null;
+  const near = all.filter(({ name, kind }) => !FAR.includes(kind) && !(last && name.startsWith(last)));
+  const isCoil = !pieces.length && !near.some(({ kind }) => kind === "centre");
+  picture.fit(isCoil ? [] : near.map(({ x, y }) => [x, y]));
 }
 
 function note() {

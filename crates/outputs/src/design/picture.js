@@ -39,6 +39,8 @@ export class Picture {
     this.ghost = null;
     /** The stage whose frame has not come. */
     this.coming = null;
+    /** The events of the scene as they are known, and the marked one. */
+    this.events = [];
     this.event = null;
     this.chosen = { dragon: null, bench: -1 };
     this.look = null;
@@ -115,6 +117,7 @@ export class Picture {
     this.size();
     const { live, ghost, camera } = this;
     if (!live.isThere) return;
+    this.judge(live.newest);
     for (const one of ghost ? [live, ghost] : [live]) {
       one.newest.at = now;
       one.stream.alert = one === live ? this.alert() : null;
@@ -143,6 +146,13 @@ export class Picture {
         chosen = dragon === this.chosen.dragon ? this.chosen.bench : -1;
     return { stage, places, colours, path: path.lines, obstacles, marks, identity, stale: false, chosen,
       chosenName: dragon.benchName(chosen), endNames: dragon.endNames() };
+  }
+
+  /** Sets the state of a frame to the latest event before it. Boards that may overlap are searched from then on. */
+  judge(frame) {
+    const passed = this.events.findLast(({ time }) => time <= frame.time)?.event;
+    frame.state = Math.max(0, this.stage.states.findIndex(({ name }) => name === passed));
+    frame.clearance = this.events.some(({ event, time }) => event === "contact" && time <= frame.time) ? -1 : 1;
   }
 
   /** Returns the marked event as the alert of a publisher. */

@@ -25,7 +25,9 @@ function factWords(stage, fact) {
   const { check, what, obstacle, clearance, required, verdict, time } = fact;
   const of = obstacle ?? (check === "require" && what !== "obstacle" ? what : null) ?? "boards";
   const benches = benchWords(stage, fact);
-  if (check !== "require") return [`${capital(of)}: least ${metres(clearance)}`, seconds(time), benches];
+  // The clearance of an obstacle is the distance beyond its keep-out.
+  const beyond = check === "obstacle" ? " beyond keep-out" : "";
+  if (check !== "require") return [`${capital(of)}: ${metres(clearance)}${beyond}`, seconds(time), benches];
   return [`${verdict.toUpperCase()}: ${of} ${metres(clearance)}`, `required ${metres(required)}`,
     Number.isFinite(time) ? `at ${seconds(time)}` : "", benches];
 }

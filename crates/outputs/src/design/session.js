@@ -26,6 +26,9 @@ export class Session {
     this.accepted = 0;
     /** The times of the last changes, ms: when each began, was drawn, and had its events and facts. */
     this.times = new Map();
+    /** The stages and frames so far; true while they are of a scene that the page does not show. */
+    this.stages = this.frames = 0;
+    this.isForeign = false;
     this.retry = 250;
     this.open();
   }
@@ -107,13 +110,16 @@ export class Session {
   receive(message) {
     const { listener, inFlight } = this, { id } = message;
     if (message.hello) return this.greet(message.hello);
-    if (id === 0 && (message.scene || message.error)) return listener.offer(message);
+    if (id === 0 && (message.scene || message.error)) {
+      this.isForeign = !listener.offer(message);
+      return;
+    }
     if (message.allowed !== undefined) return listener.allowed(message.allowed);
-    if (message.type === "stage") return listener.stage(message);
+    if (message.type === "stage") return this.stage(message);
     if (message.scene || message.error) {
       if (id !== inFlight?.id) return message.error && listener.refused(id, message.error);
       this.inFlight = null;
-      if (message.scene) this.accepted = id;
+      if (message.scene) [this.accepted, this.isForeign] = [id, false];
       inFlight.done(message.scene ?? null, message.error ?? null);
       return this.proceed();
     }
@@ -127,11 +133,16 @@ export class Session {
     if (message.cancelled) listener.cancelled(id);
   }
 
+  /** Numbers the stages: the frames that follow one are of that stage. */
+  stage(message) {
+    this.stages++;
+    if (!this.isForeign) this.listener.stage({ ...message, run_id: String(this.stages) });
+  }
+
   draw(data) {
     const frame = frameOf(data, performance.now());
     this.atInFlight = null;
-    // A new connection begins with the scene of the file, which this page does not show again.
-    if (frame && frame.sequence >= this.accepted) this.listener.frame(frame);
+    if (frame && !this.isForeign) this.listener.frame({ ...frame, run: String(this.stages), sequence: ++this.frames });
     if (this.wantedAt !== null) this.at(this.wantedAt);
   }
 }

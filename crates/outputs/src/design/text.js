@@ -66,7 +66,9 @@ export class SceneText {
     wrong.toggleAttribute("data-error", Boolean(error));
     if (error) {
       wrong.dataset.line = error.line ?? "";
-      wrong.textContent = error.line ? `Line ${error.line}: ${error.sentence}` : error.sentence;
+      // The name of the file is not news here.
+      const sentence = error.sentence.replace(/^.*?, line \d+: /, "");
+      wrong.textContent = error.line ? `Line ${error.line}: ${sentence}` : sentence;
     }
     this.gutter.parentElement.style.setProperty("--error-line", this.errorLine ?? -1);
     this.place();
