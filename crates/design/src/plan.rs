@@ -226,8 +226,8 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
     let margin = found.judgement.margin();
     let sentence = match found.is_found() {
         true => format!(
-            "The show keeps {clearance} m between boards, and every keep-out, with {} m to spare: found, not proved to be \
-             the greatest.",
+            "The show keeps {clearance} m between boards, and every keep-out, with {} m to spare: found, not proved to \
+             be the greatest.",
             figure(margin)
         ),
         false => {

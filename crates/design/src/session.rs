@@ -9,14 +9,14 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use serde_json::{Value, json};
 
+use crate::change::changed;
 use crate::frame::{Frames, stage};
-use crate::geojson;
+use crate::handles;
 use crate::plan::RunningPlan;
 use crate::request::{Request, Wish};
 use crate::scene::{DesignedScene, Fault};
 use crate::search::{Job, Searcher};
 use crate::templates::{TEMPLATES, template};
-use crate::{additions, cues, edit, handles};
 use bench_dragon_messages::{FrameHeader, HandlePose, StageMessage};
 
 /// The requests of a page that may wait. A page waits for an answer before its next change.
@@ -133,7 +133,7 @@ impl Desk {
     }
 
     fn answer(&mut self, id: u64, wish: Wish) {
-        let changed = match wish {
+        let text = match wish {
             Wish::Text(text) => return self.take(id, &text),
             Wish::Template(key) => match template(&key) {
                 Some(template) => return self.take(id, template.text),
@@ -147,16 +147,6 @@ impl Desk {
                 self.at = if time.is_finite() { time.max(0.0) } else { 0.0 };
                 return self.draw(id);
             }
-            Wish::Set(numbers) => self.good().and_then(|scene| edit::set(&scene, &numbers)),
-            Wish::Drag(drag) => self.good().and_then(|scene| match cues::dragged(&drag.handle) {
-                Some(cue) => cues::drag(&scene, cue, &drag, self.searcher.timeline(self.run).as_ref()),
-                None => handles::drag(&scene, &drag),
-            }),
-            Wish::Add(addition) => self.good().and_then(|scene| additions::add(&scene, &addition, self.at)),
-            Wish::Remove(name) => self.good().and_then(|scene| additions::remove(&scene, &name)),
-            Wish::GeoJson(text) => self
-                .good()
-                .and_then(|scene| additions::add_polygons(&scene, geojson::polygons(&text).map_err(Fault::from)?)),
             Wish::Cancel => {
                 self.plan = None;
                 return;
@@ -165,8 +155,13 @@ impl Desk {
                 Ok(scene) => return self.plan((id, kind, vary), scene),
                 Err(fault) => Err(fault),
             },
+            wish => self.good().and_then(|scene| {
+                let timeline = self.searcher.timeline(self.run);
+                // All other requests change the text.
+                changed(&scene, &wish, self.at, timeline.as_ref()).unwrap_or_else(|| Ok(scene.text.clone()))
+            }),
         };
-        match changed.and_then(|text| DesignedScene::read(&text, &self.shown())) {
+        match text.and_then(|text| DesignedScene::read(&text, &self.shown())) {
             Ok(scene) => self.show(id, scene),
             Err(fault) => self.refuse(id, &fault),
         }
@@ -232,7 +227,7 @@ impl Desk {
     /// Draws the scene at the time of the picture.
     fn draw(&mut self, id: u64) {
         let Some(scene) = &self.scene else { return };
-        if self.frames.as_ref().is_none_or(|frames| !frames.knows_events)
+        if self.frames.as_ref().is_none_or(|frames| !frames.know_all_events())
             && let Some(timeline) = self.searcher.timeline(self.run)
         {
             self.frames = Some(Frames::new(&scene.scene, self.run, Some(timeline)));

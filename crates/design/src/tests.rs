@@ -234,6 +234,13 @@ fn what_is_added_stands_behind_the_rest() {
     assert_eq!(read(&without).scene, scene.scene);
     let cue = read(&additions::add(&scene, &addition("cue", "", [0.0, 0.0]), 12.5).unwrap());
     assert_eq!(cue.cues()[0].at, Some(12.5));
+    let paper = named("paper.toml");
+    let two = read(&additions::add(&paper, &addition("dragon", "", [30.0, 0.0]), 0.0).unwrap());
+    let [first, second] = two.scene.ensemble.dragons() else { panic!("{}", two.text) };
+    assert_eq!(Some(&first.motion), paper.scene.ensemble.only(), "{}", two.text);
+    assert_eq!(second.motion.placement().origin(), Point::new(30.0, 0.0));
+    assert_eq!(two.scene.on_contact, paper.scene.on_contact);
+    assert!(two.text.matches('#').count() >= paper.text.matches('#').count(), "{}", two.text);
     let two = named("crossing.toml");
     let three = read(&additions::add(&two, &addition("dragon", "", [0.0, 30.0]), 0.0).unwrap());
     assert_eq!(three.scene.ensemble.dragons().len(), 3, "{}", three.text);
@@ -366,4 +373,49 @@ fn a_picture_follows_each_scene_and_each_time() {
         let error = until(&answers, id, "error", "");
         assert!(error["sentence"].as_str().unwrap().contains(says), "{request}: {error}");
     }
+}
+
+/// Requests of all kinds, with names and numbers of the scene and without sense.
+#[test]
+fn no_request_makes_more_of_a_scene_than_another_scene_or_one_sentence() {
+    let mut random = 1_u64;
+    let mut next = move |below: usize| {
+        // A linear congruential generator is random enough to choose requests.
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) as usize % below
+    };
+    let numbers = [0.0, -1.0, 1e-9, 0.3, 2.0, 16.0, 1e4, 1e9, -1e300, 5e-324];
+    let (mut changed, mut refused) = (0, 0);
+    for (_, first) in scenes().into_iter().filter(|(name, _)| name != "long.toml") {
+        let mut scene = first.clone();
+        for _ in 0..60 {
+            let found = handles(&scene);
+            let handle = &found[next(found.len())].name;
+            let field = &scene.fields[next(scene.fields.len())].name;
+            let names =
+                [field.as_str(), handle, "path", "stage.obstacles", "stage.boundary", "cues[0]", "a[0][1].b", ""];
+            let (name, number) = (names[next(names.len())], numbers[next(numbers.len())]);
+            let (x, y) = (numbers[next(numbers.len())], numbers[next(numbers.len())]);
+            let kinds = ["line", "arc", "spiral", "turn", "circle", "polygon", "none"];
+            let whats = ["piece", "obstacle", "corner", "cue", "dragon", "none"];
+            let (kind, what) = (kinds[next(kinds.len())], whats[next(whats.len())]);
+            let request = match next(6) {
+                0 => json!({"id": 1, "set": {name: number}}),
+                1 => json!({"id": 1, "set": {name: "word"}}),
+                2 => json!({"id": 1, "remove": name}),
+                3 => json!({"id": 1, "add": {"what": what, "kind": kind, "at": [x, y], "after": name}}),
+                _ => {
+                    json!({"id": 1, "drag": {"handle": handle, "to": [x, y], "free": next(2) == 0, "alt": next(2) == 0}})
+                }
+            };
+            match crate::change::requested(&scene, &request.to_string()) {
+                Ok(other) => (scene, changed) = (other, changed + 1),
+                Err(fault) => {
+                    assert!(!fault.sentence.is_empty() && !fault.sentence.contains('\n'), "{request}: {fault}");
+                    refused += 1;
+                }
+            }
+        }
+    }
+    assert!(changed > 50 && refused > 50, "{changed} {refused}");
 }
