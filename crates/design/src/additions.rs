@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use toml_edit::Value;
+use toml_edit::{DocumentMut, Item, Table, Value};
 
 use crate::edit::document;
 use crate::handles::arc_through;
@@ -18,6 +18,8 @@ use bench_dragon_show::scene::MOST_DRAGONS;
 /// The length of a line, and the radius of an arc, that a page adds without a place, in metres.
 const LINE: f64 = 5.0;
 const RADIUS: f64 = 5.0;
+/// The name of the dragon that had none.
+const FIRST_NAME: &str = "gold";
 /// Half the size of an obstacle that a page adds, in metres.
 const HALF: f64 = 1.0;
 
@@ -173,15 +175,13 @@ fn add_cue(scene: &DesignedScene, time: f64) -> Result<String, Fault> {
 /// Adds a dragon like the last one, at another place.
 fn add_dragon(scene: &DesignedScene, addition: &Addition) -> Result<String, Fault> {
     let dragons = scene.scene.ensemble.dragons();
-    if scene.scene.ensemble.only().is_some() {
-        let sentence =
-            "the scene has one dragon in [team], expected [[dragons]] with names before another one is added";
-        return Err(sentence.to_owned().into());
-    }
     if dragons.len() >= MOST_DRAGONS {
         return Err(format!("the scene has {MOST_DRAGONS} dragons already, and no more are possible").into());
     }
     let mut document = document(&scene.text)?;
+    if scene.scene.ensemble.only().is_some() {
+        name_the_dragon(&mut document)?;
+    }
     let list = Path::of("dragons")?;
     let mut dragon = list.last_table(&mut document).ok_or_else(|| "the dragons are no [[dragons]]".to_owned())?;
     let names: Vec<&str> = dragons.iter().map(|dragon| &*dragon.name).collect();
@@ -192,4 +192,26 @@ fn add_dragon(scene: &DesignedScene, addition: &Addition) -> Result<String, Faul
     let origin = format!("dragons[{}].placement.origin", dragons.len());
     Path::of(&origin)?.insert(&mut document, place(at))?;
     Ok(document.to_string())
+}
+
+/// Makes the dragon of `[team]` the first of `[[dragons]]`. The show keeps the rest of `[motion]`.
+fn name_the_dragon(document: &mut DocumentMut) -> Result<(), Fault> {
+    let root = document.as_table_mut();
+    let mut dragon = table([("name", FIRST_NAME.into())]);
+    dragon.set_position(root.get("team").and_then(|team| team.as_table()?.position()));
+    for key in ["team", "path", "placement"] {
+        if let Some((key, item)) = root.remove_entry(key) {
+            dragon.insert_formatted(&key, item);
+        }
+    }
+    let of_show = root.get_mut("motion").and_then(|motion| motion.as_table_mut());
+    let of_show = of_show.ok_or_else(|| "the text has no table [motion]".to_owned())?;
+    let mut own = Table::new();
+    for key in ["head_speed", "accuracy", "solver", "paper"] {
+        if let Some((key, item)) = of_show.remove_entry(key) {
+            own.insert_formatted(&key, item);
+        }
+    }
+    dragon.insert("motion", Item::Table(own));
+    Path::of("dragons")?.push(document, dragon)
 }

@@ -9,6 +9,7 @@ use toml_edit::DocumentMut;
 use crate::request::Setting;
 use crate::scene::{DesignedScene, Fault, written};
 use crate::tables::Path;
+use crate::text::{Found, Value};
 use bench_dragon_motion::model::Point;
 
 /// A change of the text.
@@ -94,6 +95,9 @@ pub fn apply(scene: &DesignedScene, changes: &[Change]) -> Result<String, Fault>
                 }
             }
             Change::Word { name, value } => match scene.values.get(name) {
+                Some(Found { value: Value::Array(_) | Value::Other, .. }) => {
+                    return Err(format!("{name} is no word of the text").into());
+                }
                 Some(found) => spans.push((found.span.clone(), value.to_string())),
                 None => missing.push((name.as_str(), value.clone())),
             },

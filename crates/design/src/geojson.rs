@@ -1,7 +1,7 @@
 //! The polygons of a GeoJSON text (RFC 7946).
 //!
-//! In: a text, in metres of the stage or in degrees of longitude and latitude. Out: polygons with their names, in metres
-//! of the stage. Degrees are mapped to metres about the middle of all polygons, which comes to the origin.
+//! In: a text, in metres of the stage or in degrees of longitude and latitude. Out: polygons with their names, in
+//! metres of the stage. Degrees are mapped to metres about the middle of all polygons, which comes to the origin.
 
 use serde_json::Value;
 

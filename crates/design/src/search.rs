@@ -1,6 +1,7 @@
 //! The searches for events and clearances of one text, on a thread of their own.
 //!
-//! In: the newest scene. Out: events and clearances, each as it is found. A newer scene stops the search of the old one.
+//! In: the newest scene. Out: events and clearances, each as it is found. A newer scene stops the search of an older
+//! one.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};

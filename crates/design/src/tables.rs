@@ -195,8 +195,8 @@ fn forget_positions(table: &mut Table) {
     }
 }
 
-/// Returns the text before an element, of which the first line is a comment on the element before; or the text after the
-/// last element.
+/// Returns the text before an element, of which the first line is a comment on the element before; or the text after
+/// the last element.
 fn before(array: &Array, index: usize) -> String {
     let raw = match array.get(index) {
         Some(element) => element.decor().prefix(),
