@@ -34,6 +34,7 @@ pub mod ros_args;
 pub mod run;
 pub mod scene_argument;
 mod scene_facts;
+mod scene_frames;
 pub mod send;
 mod service_manager;
 pub mod sheets;

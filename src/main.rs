@@ -69,7 +69,7 @@ pub enum Command {
     /// Measure accuracy against cost for every solver on this scene and machine
     #[command(arg = scene_argument())]
     Trade(commands::trade::TradeArguments),
-    /// Plan a choreography: the least pitch, the least turn radius, the greatest speed
+    /// Plan a choreography: the least pitch, the least turn radius, the greatest speed, numbers that fit
     Plan(commands::plan::PlanArguments),
     /// Soak-test: publish for hours to real subscriber processes and give a verdict
     #[command(arg = scene_argument())]

@@ -137,7 +137,7 @@ fn announce(common: &Common, ready: &Ready) -> Result<(), CommandError> {
     let is_of_all = address.ip().is_unspecified();
     let fragment = token.as_ref().map_or(String::new(), |token| format!("#token={}", token.as_str()));
     let others = if is_of_all { own_addresses(address.ip()) } else { Vec::new() };
-    let url = |host: &str| format!("http://{host}/design");
+    let url = |host: &str| format!("http://{host}/");
     let others: Vec<String> = others.iter().map(|ip| url(&SocketAddr::new(*ip, address.port()).to_string())).collect();
     let mut output = Output::standard();
     if common.json {

@@ -13,6 +13,7 @@ use serde_json::json;
 
 use super::qr_code::qr_code;
 use super::scene_facts::scene_facts;
+use super::scene_frames::scene_frames;
 use super::verify::certificate::reason;
 use super::{CommandError, Common, Output, stop_on_signals};
 
@@ -59,7 +60,8 @@ pub fn view(common: &Common, arguments: &ViewArguments) -> Result<(), CommandErr
     let proofs = Arc::new(Proofs::expected(&certificates));
     let address = SocketAddr::new(listen, port);
     let facts = Arc::new(Facts::new(scene_facts));
-    let options = ViewOptions { address, control, origins: allow_origin, pages, proofs: Arc::clone(&proofs), facts };
+    let (origins, open_scene) = (allow_origin, scene_frames);
+    let options = ViewOptions { address, control, origins, pages, proofs: Arc::clone(&proofs), facts, open_scene };
     serve(&common.names, options, &stop, |ready| {
         announce(common, arguments, ready)?;
         check_in_background(certificates, proofs, common.json)

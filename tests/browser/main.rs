@@ -6,6 +6,7 @@ mod design;
 mod harness;
 mod looks;
 mod proved;
+mod scrub;
 mod several;
 mod sheets;
 mod view;

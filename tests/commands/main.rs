@@ -4,6 +4,7 @@ mod bad_input;
 mod certify;
 mod check_cues;
 mod contest;
+mod design;
 mod draw;
 mod files;
 mod first_scene;

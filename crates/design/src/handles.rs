@@ -137,6 +137,7 @@ pub fn handles(scene: &DesignedScene) -> Vec<Handle> {
     let mut found = Found { scene, handles: Vec::new() };
     for (number, dragon) in scene.scene.ensemble.dragons().iter().enumerate() {
         paths::add(&mut found, &scene.prefix(number), &dragon.motion);
+        pieces::add(&mut found, &scene.prefix(number), &dragon.motion);
     }
     ground::add(&mut found, scene.scene.ensemble.ground());
     found.handles

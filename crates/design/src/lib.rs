@@ -10,10 +10,13 @@ mod edit;
 mod frame;
 mod geojson;
 pub mod handles;
+mod plan;
 mod request;
 pub mod scene;
 mod search;
 pub mod session;
 mod tables;
 pub mod templates;
+#[cfg(test)]
+mod tests;
 mod text;

@@ -9,8 +9,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use serde_json::{Value, json};
 
-use crate::frame::{frame, stage};
+use crate::frame::{Frames, stage};
 use crate::geojson;
+use crate::plan::RunningPlan;
 use crate::request::{Request, Wish};
 use crate::scene::{DesignedScene, Fault};
 use crate::search::{Job, Searcher};
@@ -68,8 +69,21 @@ impl Session {
         let (requests, received) = sync_channel(MOST_WAITING);
         let found = Arc::clone(&answers);
         let searcher = Searcher::start(move |answer: &Value| found(Answer::Json(answer.to_string())))?;
-        let desk = Desk { file, answers, searcher, scene: None, is_refused: false, at: 0.0, run: 0 };
-        std::thread::Builder::new().name("design".to_owned()).spawn(move || desk.serve(&received))?;
+        // Solvers do not leave the thread that made them.
+        std::thread::Builder::new().name("design".to_owned()).spawn(move || {
+            let new = Desk {
+                file,
+                answers,
+                searcher,
+                scene: None,
+                frames: None,
+                plan: None,
+                is_refused: false,
+                at: 0.0,
+                run: 0,
+            };
+            new.serve(&received);
+        })?;
         Ok(Self { requests })
     }
 
@@ -89,6 +103,8 @@ struct Desk {
     searcher: Searcher,
     /// The last text that is a scene.
     scene: Option<Arc<DesignedScene>>,
+    frames: Option<Frames>,
+    plan: Option<RunningPlan>,
     /// True if the page has a text that is none.
     is_refused: bool,
     /// The simulated time of the picture.
@@ -141,7 +157,14 @@ impl Desk {
             Wish::GeoJson(text) => self
                 .good()
                 .and_then(|scene| additions::add_polygons(&scene, geojson::polygons(&text).map_err(Fault::from)?)),
-            Wish::Plan(..) | Wish::Cancel => Err("plans are not there yet".to_owned().into()),
+            Wish::Cancel => {
+                self.plan = None;
+                return;
+            }
+            Wish::Plan(kind, vary) => match self.good() {
+                Ok(scene) => return self.plan((id, kind, vary), scene),
+                Err(fault) => Err(fault),
+            },
         };
         match changed.and_then(|text| DesignedScene::read(&text, &self.shown())) {
             Ok(scene) => self.show(id, scene),
@@ -171,6 +194,7 @@ impl Desk {
             Ok(scene) => self.show(id, scene),
             Err(fault) => {
                 self.is_refused = true;
+                (self.frames, self.plan) = (None, None);
                 self.searcher.search(None);
                 // The page knows every text but the first one and that of the file.
                 self.json(&json!({"id": id, "error": fault_of(&fault, text)}));
@@ -183,6 +207,7 @@ impl Desk {
         let scene = Arc::new(scene);
         self.is_refused = false;
         self.scene = Some(Arc::clone(&scene));
+        (self.frames, self.plan) = (None, None);
         self.run += 1;
         // The old search ends while this picture is made.
         self.searcher.search(None);
@@ -194,11 +219,26 @@ impl Desk {
         self.searcher.search(Some(Job { id, run: self.run, scene }));
     }
 
+    /// Starts a plan, and ends another one.
+    fn plan(&mut self, request: (u64, String, Vec<String>), scene: Arc<DesignedScene>) {
+        let (id, answers) = (request.0, Arc::clone(&self.answers));
+        let started = RunningPlan::start(request, scene, move |answer| answers(Answer::Json(answer.to_string())));
+        match started {
+            Ok(plan) => self.plan = Some(plan),
+            Err(error) => self.refuse(id, &format!("there is no thread for a plan: {error}").into()),
+        }
+    }
+
     /// Draws the scene at the time of the picture.
     fn draw(&mut self, id: u64) {
         let Some(scene) = &self.scene else { return };
-        let timeline = self.searcher.timeline(self.run);
-        if let Some((header, poses)) = frame(&scene.scene, self.at, (self.run, id), timeline.as_ref()) {
+        if self.frames.as_ref().is_none_or(|frames| !frames.knows_events)
+            && let Some(timeline) = self.searcher.timeline(self.run)
+        {
+            self.frames = Some(Frames::new(&scene.scene, self.run, Some(timeline)));
+        }
+        let frames = self.frames.get_or_insert_with(|| Frames::new(&scene.scene, self.run, None));
+        if let Some((header, poses)) = frames.at(self.at, id) {
             (self.answers)(Answer::Frame(header, poses));
         }
     }

@@ -4,7 +4,8 @@
 //! `reader` reads a publisher's shared memory on a separate thread, because ports cannot leave the thread that created
 //! them, and hands over the newest picture. `browser` sends the picture to one browser at its pace, over one WebSocket
 //! for each publisher; `wire` is its layout. `origin` decides which pages may connect, `authorization` which browsers
-//! may command; `certificates` has the proofs of scenes, `facts` the facts that take time to compute.
+//! may command; `certificates` has the proofs of scenes, `facts` the facts that take time to compute, and `scrub` the
+//! frames at times that a browser requests.
 
 mod authorization;
 mod browser;
@@ -12,6 +13,7 @@ mod certificates;
 mod facts;
 pub(crate) mod origin;
 mod reader;
+mod scrub;
 pub(crate) mod wire;
 
 use std::io;
@@ -44,6 +46,8 @@ pub use certificates::{Certificate, Proofs, SceneHash};
 pub use facts::{ClearanceCurve, Facts, LeastOfShow, SceneFacts};
 use origin::Admission;
 pub use origin::AllowedOrigin;
+pub use scrub::{OpenScene, SceneFrames};
+use scrub::{SceneInPlay, Scrubber};
 
 /// The kinds of the page's files.
 pub(crate) const HTML: &str = "text/html; charset=utf-8";
@@ -66,6 +70,8 @@ struct Picture {
     /// The latest cues, each with its number among all cues of this server, so that none is left out.
     cues: Arc<[(u64, Utf8Bytes)]>,
     frame: Bytes,
+    /// The scene that is played, once its text has come.
+    scene: Option<Arc<SceneInPlay>>,
     /// True if frames are stamped by the clock of this machine; `None` while there is no publisher.
     shares_clock: Option<bool>,
 }
@@ -80,6 +86,7 @@ impl Picture {
 #[derive(Clone)]
 struct Server {
     channels: Arc<[Channel]>,
+    scrubber: Arc<Scrubber>,
     admission: Arc<Admission>,
 }
 
@@ -107,6 +114,8 @@ pub struct ViewOptions {
     pub proofs: Arc<Proofs>,
     /// The facts about scenes that are computed while pages are served.
     pub facts: Arc<Facts>,
+    /// The function that opens a scene for frames at other times.
+    pub open_scene: OpenScene,
 }
 
 /// The data that browsers need to connect.
@@ -158,7 +167,7 @@ pub fn serve<Refused: From<ViewError>>(
     stop: &Arc<AtomicBool>,
     ready: impl FnOnce(&Ready) -> Result<(), Refused>,
 ) -> Result<(), Refused> {
-    let ViewOptions { address, control, origins, pages, proofs, facts } = options;
+    let ViewOptions { address, control, origins, pages, proofs, facts, open_scene } = options;
     names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(ViewError::from)?;
     if let Some(folder) = &pages {
         std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
@@ -185,7 +194,8 @@ pub fn serve<Refused: From<ViewError>>(
         }));
     }
     let admission = Arc::new(Admission { loopback, origins });
-    let router = router(Server { channels: channels.into(), admission }, pages.as_deref());
+    let scrubber = Arc::new(Scrubber::new(open_scene));
+    let router = router(Server { channels: channels.into(), scrubber, admission }, pages.as_deref());
     let served = server.serve(router, stop);
     // A panic of a reader has already been printed.
     let read = readers.into_iter().try_for_each(|reader| reader.join().unwrap_or(Ok(())));
@@ -219,6 +229,7 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         .route("/", get(|| async { served(HTML, include_str!("view/index.html")) }))
         .route("/publishers.js", get(move || async move { served(SCRIPT, names) }))
         .route("/frames", get(frames))
+        .route("/scrub", get(scrubbed))
         .with_state(server)
 }
 
@@ -252,6 +263,8 @@ pub(crate) fn modules<S: Clone + Send + Sync + 'static>() -> Router<S> {
         .route("/publisher.js", file(SCRIPT, include_str!("view/publisher.js")))
         .route("/resolution.js", file(SCRIPT, include_str!("view/resolution.js")))
         .route("/roster.js", file(SCRIPT, include_str!("view/roster.js")))
+        .route("/scrub.js", file(SCRIPT, include_str!("view/scrub.js")))
+        .route("/scrub.css", file(STYLE, include_str!("view/scrub.css")))
         .route("/seat.js", file(SCRIPT, include_str!("view/seat.js")))
         .route("/seat_sprites.js", file(SCRIPT, include_str!("view/seat_sprites.js")))
         .route("/seat_view.js", file(SCRIPT, include_str!("view/seat_view.js")))
@@ -303,36 +316,63 @@ pub(crate) fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&
     headers.get(name)?.to_str().ok()
 }
 
+/// The fields of a query.
+type Fields = Vec<(String, String)>;
+
+fn field<'f>(query: &'f Fields, wanted: &str) -> Option<&'f str> {
+    query.iter().find(|(field, _)| field == wanted).map(|(_, value)| value.as_str())
+}
+
+impl Server {
+    /// Returns the publisher that a page from an admitted origin may watch.
+    #[expect(clippy::result_large_err, reason = "the error is the answer")]
+    fn watched(&self, headers: &HeaderMap, query: &Fields) -> Result<Channel, Response> {
+        if !self.admission.allows(text_of(headers, header::ORIGIN), text_of(headers, header::HOST)) {
+            let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
+            return Err((StatusCode::FORBIDDEN, sentence).into_response());
+        }
+        let mut channels = self.channels.iter();
+        let channel = match field(query, "name") {
+            None => channels.next(),
+            Some(name) => channels.find(|channel| channel.name == name),
+        };
+        let unknown = "name: expected one of the publishers that this server was started for";
+        channel.cloned().ok_or_else(|| (StatusCode::NOT_FOUND, unknown).into_response())
+    }
+}
+
+type Upgrade = Result<WebSocketUpgrade, WebSocketUpgradeRejection>;
+
+/// Returns the upgrade to a WebSocket with small requests; `instead` answers another request.
+#[expect(clippy::result_large_err, reason = "the error is the answer")]
+fn upgraded(upgrade: Upgrade, instead: &'static str) -> Result<WebSocketUpgrade, Response> {
+    let upgrade = upgrade.map_err(|_| (StatusCode::UPGRADE_REQUIRED, instead).into_response())?;
+    Ok(upgrade.max_frame_size(MAX_REQUEST_BYTES).max_message_size(MAX_REQUEST_BYTES))
+}
+
 async fn frames(
     Served(server): Served<Server>,
     headers: HeaderMap,
-    Query(query): Query<Vec<(String, String)>>,
-    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
-) -> Response {
-    if !server.admission.allows(text_of(&headers, header::ORIGIN), text_of(&headers, header::HOST)) {
-        let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
-        return (StatusCode::FORBIDDEN, sentence).into_response();
-    }
-    let field = |wanted: &str| query.iter().find(|(field, _)| field == wanted).map(|(_, value)| value.as_str());
-    let Some(gap) = gap(field("rate")) else {
-        return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response();
+    Query(query): Query<Fields>,
+    upgrade: Upgrade,
+) -> Result<Response, Response> {
+    let channel = server.watched(&headers, &query)?;
+    let Some(gap) = gap(field(&query, "rate")) else {
+        return Err((StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response());
     };
-    let mut channels = server.channels.iter();
-    let channel = match field("name") {
-        None => channels.next(),
-        Some(name) => channels.find(|channel| channel.name == name),
-    };
-    let Some(channel) = channel.cloned() else {
-        return (StatusCode::NOT_FOUND, "name: expected one of the publishers that this server was started for")
-            .into_response();
-    };
-    match upgrade {
-        Ok(upgrade) => upgrade
-            .max_frame_size(MAX_REQUEST_BYTES)
-            .max_message_size(MAX_REQUEST_BYTES)
-            .on_upgrade(move |socket| browser::serve(socket, channel, gap)),
-        Err(_) => (StatusCode::UPGRADE_REQUIRED, "frames come over a WebSocket: open ws://.../frames").into_response(),
-    }
+    let upgrade = upgraded(upgrade, "frames come over a WebSocket: open ws://.../frames")?;
+    Ok(upgrade.on_upgrade(move |socket| browser::serve(socket, channel, gap)))
+}
+
+async fn scrubbed(
+    Served(server): Served<Server>,
+    headers: HeaderMap,
+    Query(query): Query<Fields>,
+    upgrade: Upgrade,
+) -> Result<Response, Response> {
+    let channel = server.watched(&headers, &query)?;
+    let upgrade = upgraded(upgrade, "frames come over a WebSocket: open ws://.../scrub")?;
+    Ok(upgrade.on_upgrade(move |socket| scrub::serve(socket, channel.pictures, server.scrubber)))
 }
 
 /// Returns the least time between two frames at a requested `rate`, zero without a rate; `None` for an invalid rate.

@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Found, Pull, ROUNDING, Ray, pieces};
+use super::{Found, Pull, ROUNDING, Ray};
 use crate::edit::Change;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::curve::Curve;
@@ -32,10 +32,7 @@ pub(super) fn add(found: &mut Found<'_>, prefix: &str, motion: &Motion) {
             let turn = Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out };
             turn.add(found, &format!("{prefix}path"), placement);
         }
-        PathDescription::Route { heading_turns, .. } => {
-            add_heading(found, prefix, &placement, heading_turns);
-            pieces::add(found, prefix, motion);
-        }
+        PathDescription::Route { heading_turns, .. } => add_heading(found, prefix, &placement, heading_turns),
     }
 }
 
