@@ -74,8 +74,8 @@ function rounded(value, [low, high]) {
 
 export class Fields {
   /**
-   * `acts` has set(name, value, gesture), end(), remove(item) and show(line). A gesture has a key of its own, which a
-   * slider keeps while it is dragged.
+   * `acts` has set(name, value, gesture), remove(item), show(line) and focus(field). A gesture has a key of its own,
+   * which a slider keeps while it is dragged.
    */
   constructor(root, acts) {
     Object.assign(this, { root, acts, key: null, rows: new Map(), gestures: 0 });
@@ -151,7 +151,7 @@ export class Fields {
       row.sent = value;
       this.acts.set(row.field.name, value, `field ${row.field.name} ${this.gestures}`);
     };
-    input.onfocus = () => this.acts.show(row.field.line);
+    input.onfocus = () => this.acts.focus(row.field);
     input.oninput = () => {
       row.isTyped = input.type === "number" || input.type === "text";
       send();
@@ -163,6 +163,7 @@ export class Fields {
     input.onblur = () => this.end();
     if (!slider) return;
     slider.oninput = () => {
+      if (!row.isHeld) this.acts.focus(row.field);
       row.isHeld = true;
       const { integer, slider: range } = row.field, value = slider.valueAsNumber;
       input.value = integer ? Math.round(value) : rounded(value, range);

@@ -15,8 +15,9 @@ const KINDS = { end: "end", middle: "middle", pitch: "pitch", turns: "length alo
 
 export class Handles {
   /**
-   * `acts` has drag(handle, to, { free, alt }, gesture), cancel(gesture), remove(name), insert(after, at) and show(line).
-   * It also has use(name), the handle in use or null, isBusy(), true until the last drag is answered, camera and canvas.
+   * `acts` has drag(handle, to, { free, alt }, gesture), cancel(gesture), remove(name), insert(after, at), show(line)
+   * and use(name), the handle in use or null. It also has isBusy(), true until the last drag is answered, and the
+   * camera and the canvas.
    */
   constructor(root, acts) {
     Object.assign(this, { root, acts, shown: new Map(), scene: null, held: null, gestures: 0 });

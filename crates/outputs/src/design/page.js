@@ -80,6 +80,10 @@ const fields = new Fields(element("fields"), {
   set: (name, value, gesture) => change({ set: { [name]: value } }, gesture, name),
   remove: (item) => change({ remove: item }, null),
   show: (number) => text.show(number),
+  focus: ({ name, line: number, value }) => {
+    text.show(number);
+    if (typeof value === "number") plans.vary(name);
+  },
 });
 const handles = new Handles(element("handles"), { camera, canvas,
   drag: (handle, to, how, gesture) => change({ drag: { handle: handle.name, to, ...how } }, gesture, handle.name),

@@ -6,7 +6,7 @@ const element = (id) => document.getElementById(id);
 export class Plans {
   /** `session` sends requests; `use` is called with the text of a result. */
   constructor(session, use) {
-    Object.assign(this, { session, use, running: null, text: null });
+    Object.assign(this, { session, use, running: null, text: null, varied: null });
     for (const button of document.querySelectorAll("[data-plan]")) button.onclick = () => this.start(button);
     element("plan-stop").onclick = () => this.stop();
     element("plan-use").onclick = () => {
@@ -16,15 +16,25 @@ export class Plans {
     };
     element("plan-discard").onclick = () => this.clear();
     this.clear();
+    this.vary(null);
   }
 
   start(button) {
     if (this.running !== null) this.stop();
     if (!this.session.isOpen) return;
     this.clear();
-    this.running = this.session.send({ plan: button.dataset.plan });
+    const { plan } = button.dataset;
+    this.running = this.session.send(plan === "fit" ? { plan, vary: [this.varied] } : { plan });
     this.put(`${button.textContent} …`, { isRunning: true });
     element("plan-progress").removeAttribute("value");
+  }
+
+  /** Names the field that a fit changes: the one that was used last. */
+  vary(name) {
+    this.varied = name;
+    const fit = element("plan-fit");
+    fit.disabled = name === null;
+    fit.textContent = name === null ? "Fit" : `Fit ${name}`;
   }
 
   stop() {

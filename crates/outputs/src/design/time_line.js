@@ -58,7 +58,8 @@ export class TimeLine {
   mark() {
     const focus = document.activeElement?.dataset?.cue;
     const events = this.events.filter(({ time }) => Number.isFinite(time)).map((event) => {
-      const mark = made("i", { className: "event", title: `${capital(say(event.event))}, ${event.time.toFixed(1)} s` });
+      const mark = made("i", { className: event.event === "path_end" ? "event end" : "event",
+        title: `${capital(say(event.event))}, ${event.time.toFixed(1)} s` });
       mark.style.setProperty("--share", this.share(event.time));
       return mark;
     });
