@@ -2,12 +2,11 @@
 
     timecode_peer.py --name NAME (--port PORT [--npm FOLDER] | --mtc | --ltc) [--fps 25] [--drop] [--offset S]
 
-`--port`: ArtTimeCode over UDP, decoded by the table of Art-Net 4, or with `--npm` by npm's @arcanewizards/artnet. `--mtc`:
-MIDI from standard input, decoded by the library mido. `--ltc`: a WAV stream from standard input, decoded by Debian's
-libltc. Prints a JSON line for each label: `label`, `kind` (`running` or `located`), and `late`, the seconds by which it
-came after the moment at which the show was there (null while the show stands). A label of sound has the moment of its
-last sample, by a clock of samples that begins with the earliest of the moments at which the pieces of the last second
-came; of a file with 0.
+`--port`: ArtTimeCode over UDP, decoded by the table of Art-Net 4, or with `--npm` by npm's @arcanewizards/artnet.
+`--mtc`: MIDI from standard input, decoded by the library mido. `--ltc`: a WAV stream from standard input, decoded by
+Debian's libltc. Prints a JSON line for each label: `label`, `kind` (`running` or `located`), and `late`, the seconds by
+which it came after the moment at which the show was there (null while the show stands). A label of sound has the moment
+of its last sample. The clock of samples is that of the earliest piece of the last second, and begins with 0 in a file.
 """
 
 import argparse
@@ -145,7 +144,7 @@ def receive_ltc(arguments, output):
         libltc.ltc_decoder_write_s16(decoder, piece, len(piece) // 2, samples)
         samples += len(piece) // 2
         if not is_file:
-            # What waited for this process before it began to read says nothing about the clock.
+            # Pieces that waited in the pipe until this process began to read came late.
             pieces.append((moment, moment - samples / rate))
             while pieces[0][0] < moment - 1.0:
                 pieces.popleft()
