@@ -1,5 +1,5 @@
-//! OSC with a user's own addresses, and OSC that conducts a show: judged by python-osc, and by npm's node-osc in the long
-//! run.
+//! OSC with a user's own addresses, and OSC that conducts a show: judged by python-osc, and by npm's node-osc in the
+//! long run.
 
 use std::net::UdpSocket;
 use std::process::Command;

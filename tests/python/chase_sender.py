@@ -3,8 +3,8 @@
     chase_sender.py --name NAME --result FILE --seconds S [--port PORT | --mtc | --ltc] [--fps 25] [--jump S] [--seed N]
 
 `--port`: ArtTimeCode over UDP, this file's own bytes by the table of Art-Net 4, with jitter, skew, loss and a stall.
-`--mtc`: quarter frames by the library mido, to standard output. `--ltc`: sound by Debian's libltc, to standard output, on
-the second of two channels.
+`--mtc`: quarter frames by the library mido, to standard output. `--ltc`: sound by Debian's libltc, to standard output,
+on the second of two channels.
 It begins when frames come and a chase reports its state. Writes a JSON object with the errors of the published
 simulated time, from 3 s after the beginning.
 """

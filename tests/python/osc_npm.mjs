@@ -1,5 +1,5 @@
-// Receives or sends OSC by npm's node-osc: the package's folder, the port, then the messages to send, each an address with
-// numbers after commas. Without messages it prints `listening`, and a JSON line for each message that comes.
+// Receives or sends OSC by npm's node-osc: the package's folder, the port, then the messages to send, each an address
+// with numbers after commas. Without messages it prints `listening`, and a JSON line for each message that comes.
 
 import { pathToFileURL } from 'node:url';
 
