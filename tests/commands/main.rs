@@ -7,6 +7,8 @@ mod contest;
 mod draw;
 mod files;
 mod first_scene;
+mod fit;
+
 mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]
