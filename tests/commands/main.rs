@@ -8,6 +8,8 @@ mod design;
 mod draw;
 mod files;
 mod first_scene;
+mod fit;
+
 mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]

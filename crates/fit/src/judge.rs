@@ -16,9 +16,10 @@ use bench_dragon_motion::model::shape::ShapeKind;
 use bench_dragon_motion::solve::{Chain, Positions, Velocities};
 use bench_dragon_motion::{Method, MotionError};
 use bench_dragon_show::scene::Scene;
+use bench_dragon_show::solve_at_or_just_before;
 
 /// The metres that the fastest head goes between two samples, if the show is not too long.
-const STEP: f64 = 0.25;
+const STEP: f64 = 0.5;
 /// The greatest number of samples.
 const MOST_SAMPLES: f64 = 20_000.0;
 /// The margin of a motion that locks before its end, less the share of the way that is left.
@@ -189,7 +190,8 @@ impl Sampler {
         let mut parts: Vec<Part> = Vec::new();
         for sample in 0..=samples as usize {
             let time = end * sample as f64 / samples;
-            if solver.solve(time, &mut self.chain).is_err() {
+            // The last sample is the end of the path, which rounding may put past it.
+            if solve_at_or_just_before(solver.as_mut(), time, &mut self.chain).is_err() {
                 let margin = LOCKED - left(&self.ensemble, time);
                 parts.push(Part { what: What::PathEnd, margin, time, benches: (0, None) });
                 break;
@@ -240,7 +242,7 @@ impl Sampler {
 
 /// Returns a clearance; of a board outside the boundary how far outside, so that a search knows where to go.
 fn finite(obstacle: &Obstacle, board: &Board, clearance: f64) -> f64 {
-    if clearance.is_finite() {
+    if clearance > f64::NEG_INFINITY {
         return clearance;
     }
     let (on_board, on_side) = obstacle.shape.nearest_points(board);
@@ -255,5 +257,27 @@ fn note(parts: &mut Vec<Part>, part: Part) {
     match parts.iter_mut().find(|other| other.what == part.what) {
         Some(other) => *other = part,
         None => parts.push(part),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_dragon_motion::event::unreported;
+
+    #[test]
+    fn samples_bound_every_exact_margin_from_above() {
+        for text in [include_str!("../../../config/village.toml"), include_str!("../../../config/square.toml")] {
+            let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
+            let rules = Rules::new(&scene, 0.2);
+            let (exact, sampled) = (rules.exact(&scene, &mut unreported), rules.sampled(&scene, f64::NEG_INFINITY));
+            let (exact, sampled) = (exact.unwrap(), sampled.unwrap());
+            assert_eq!(exact.parts.len(), sampled.parts.len(), "{exact:?} {sampled:?}");
+            for part in &exact.parts {
+                let at_samples = sampled.parts.iter().find(|other| other.what == part.what).unwrap();
+                let over = at_samples.margin - part.margin;
+                assert!((-1e-6..0.2).contains(&over), "{part:?} {at_samples:?}");
+            }
+        }
     }
 }

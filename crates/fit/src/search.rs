@@ -16,14 +16,14 @@ use crate::judge::{Judgement, Rules};
 use crate::numbers::{Number, numbers, replaced};
 
 /// Scattered starts, and more for each number.
-const SCATTERED: usize = 24;
-const SCATTERED_MORE: usize = 8;
+const SCATTERED: usize = 16;
+const SCATTERED_MORE: usize = 6;
 /// The starts from which a simplex searches at samples, and its steps.
-const DESCENTS: usize = 3;
-const DESCENT_STEPS: u64 = 45;
+const DESCENTS: usize = 2;
+const DESCENT_STEPS: u64 = 30;
 /// The simplices that search exactly, each smaller than the one before, and their steps.
 const SIZES: [f64; 2] = [0.06, 0.01];
-const EXACT_STEPS: u64 = 40;
+const EXACT_STEPS: u64 = 30;
 /// The size of a first simplex, in ranges.
 const SIZE: f64 = 0.12;
 /// The part of a shortfall that other distances add to the least one, so that a candidate with fewer of them is better.
@@ -174,9 +174,10 @@ impl CostFunction for Costs<'_, '_, '_> {
         // Outside the ranges, the cost is that of the nearest place, and more with the distance.
         let inside: Vec<f64> = place.iter().map(|part| part.clamp(0.0, 1.0)).collect();
         let outside: f64 = place.iter().zip(&inside).map(|(part, inside)| (part - inside).abs()).sum();
-        let cost =
-            if self.exact { self.search.exact(&inside) } else { self.search.sampled(&inside, f64::NEG_INFINITY) };
-        cost.map(|cost| cost + outside).ok_or_else(|| Error::msg("stopped"))
+        let (search, exact) = (self.search, self.exact);
+        let cost = if exact { search.exact(&inside) } else { search.sampled(&inside, f64::NEG_INFINITY) };
+        // The first costs of a simplex must not fail, so a search that is stopped runs out of steps.
+        Ok(cost.unwrap_or(REFUSED) + outside)
     }
 }
 
@@ -220,7 +221,8 @@ impl Search<'_, '_> {
         // A tolerance that is not negative is accepted.
         let solver = NelderMead::new(simplex).with_sd_tolerance(1e-6).ok()?;
         let executor = Executor::new(Costs { search: self, exact }, solver);
-        executor.configure(|state| state.max_iters(steps)).timer(false).run().ok().map(|_| ())
+        executor.configure(|state| state.max_iters(steps)).timer(false).run().ok()?;
+        (!self.state.borrow().stopped).then_some(())
     }
 
     /// Returns the values at a place, rounded as they are written.
@@ -277,6 +279,7 @@ impl Search<'_, '_> {
         let mut state = self.state.borrow_mut();
         state.judged.1 += 1;
         if cost < best {
+            log::info!("an exact margin of {} m, with {values:?}", judgement.margin());
             state.best = Some(Best { values, place: place.to_vec(), judgement });
         }
         Some(cost)
