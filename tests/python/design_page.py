@@ -534,7 +534,8 @@ def png(width, height):
 def ground_picture(page):
     page.set_input_files("#ground-file", {"name": "ground.png", "mimeType": "image/png", "buffer": png(600, 400)})
     until(lambda: page.is_visible("#ground-picture"), "the picture of the ground")
-    # A picture that shows everything may move between the clicks.
+    # A picture that shows everything may move between the clicks, and so may one that makes room for the curve.
+    until(lambda: page.is_visible("#curve"), "the curve")
     page.evaluate("design.picture.camera.release()")
     x, y = middle(page.locator("#stage"))
     page.mouse.click(x - 100, y + 40)
