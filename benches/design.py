@@ -134,6 +134,7 @@ def table():
             if scene == "paper.toml":
                 stopped = stopped_search(page, pid)
     print(f"\nProcessor time of the server in the second after a stopped proof: {stopped:.0f} ms.")
+    print(f"Load average: {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores.")
 
 
 def picture():
