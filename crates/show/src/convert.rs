@@ -275,7 +275,7 @@ fn stage_dragon(
     first_handle: u32,
     segments: &mut Vec<StageSegment>,
 ) -> StageDragon {
-    let Team { benches, head_length, body_length, width, hole_inset } = *motion.team();
+    let Team { benches, head_length, body_length, width, hole_inset, ends } = *motion.team();
     let (mut pitch, mut start_turn) = (f64::NAN, f64::NAN);
     let first_segment = segments.len() as u32;
     // A route's team stands on a line.
@@ -296,7 +296,10 @@ fn stage_dragon(
     StageDragon {
         head_length,
         body_length,
+        tail_length: ends.tail_length.unwrap_or(body_length),
+        head_width: ends.head_width.unwrap_or(width),
         width,
+        tail_width: ends.tail_width.unwrap_or(width),
         hole_inset,
         pitch,
         start_turn,

@@ -202,10 +202,18 @@ impl Trial {
         let limit = path.length() - length(radius / pitch);
         // A board that touches one of the first two from more than two turns away also touches a board before it.
         let benches = ((length(start + 2.0) - path.length()) / team.link(1)).ceil() as usize + 3;
-        let team = Team { benches: benches.min(team.benches), ..*team };
+        // No other board touches where only a tail with a size of its own does.
+        let team = if team.own_tail().is_some() { *team } else { team.foremost(benches) };
         // A link turns round or locks only where the spiral is narrower than the link is long.
         let singularities = if radius > team.longest_link() {
-            Singularities { stall: None, end: None, searched_until: limit, head_turns: vec![], body_turns: vec![] }
+            Singularities {
+                stall: None,
+                end: None,
+                searched_until: limit,
+                head_turns: vec![],
+                body_turns: vec![],
+                tail_turns: vec![],
+            }
         } else {
             Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, progress))
         };
@@ -213,8 +221,8 @@ impl Trial {
     }
 
     fn advancement(&self) -> ConservativeAdvancement<'_> {
-        let Singularities { head_turns, body_turns, .. } = &self.singularities;
-        ConservativeAdvancement::new(&self.path, &self.team, head_turns, body_turns)
+        let Singularities { head_turns, body_turns, tail_turns, .. } = &self.singularities;
+        ConservativeAdvancement::new(&self.path, &self.team, head_turns, body_turns).with_tail_turns(tail_turns)
     }
 
     fn locks(&self) -> bool {

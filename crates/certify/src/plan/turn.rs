@@ -144,7 +144,7 @@ pub fn least_turn(
         let upper = value_lo + further * WIDTH;
         let passage = |team: &Team| Passage::new(team, (pitch, family.arc_ratio), upper);
         // The first benches fail as soon as the whole team does, at less cost.
-        let few = Team { benches: team.benches.min(FEW), ..*team };
+        let few = team.foremost(FEW);
         if !passage(&few).is_some_and(|passage| passage.is_free(&few, closely, &mut |_| ask())) {
             continue;
         }

@@ -1,6 +1,6 @@
 // The drawing: one picture of the stage on a canvas. Knows nothing of the network; keeps the ground.
 
-import { rectangle } from "./boards.js";
+import { longestOf, rectangle } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 import { NARROW } from "./labels.js";
 import { SHADES } from "./palette.js";
@@ -404,7 +404,7 @@ function halved(text) {
 
 /** The benches that are in the picture. */
 function inSight(camera, stage, places) {
-  const count = places.length / STRIDE - 1, reach = Math.max(stage.head_length, stage.body_length), seen = [];
+  const count = places.length / STRIDE - 1, reach = longestOf(stage), seen = [];
   const across = camera.width / camera.scale / 2, down = camera.height / camera.scale / 2, { c, s } = camera;
   const wide = Math.abs(c) * across + Math.abs(s) * down + reach, high = Math.abs(s) * across + Math.abs(c) * down +
       reach;
@@ -421,9 +421,9 @@ function inSight(camera, stage, places) {
  */
 export function fillBoards(context, stage, places, benches, colour, edge) {
   context.strokeStyle = colour;
-  context.lineWidth = stage.width;
   for (const bench of benches) {
-    const { x, y, c, s, l } = rectangle(stage, places, bench);
+    const { x, y, c, s, l, w } = rectangle(stage, places, bench);
+    context.lineWidth = 2 * w;
     context.beginPath();
     context.moveTo(x - l * c, y - l * s);
     context.lineTo(x + l * c, y + l * s);

@@ -66,7 +66,7 @@ impl<'a> Nearest<'a> {
         let benches: Vec<(usize, usize)> = (0..ensemble.dragons().len()).flat_map(of).collect();
         let longest = |k: usize| {
             let team = ensemble.dragons()[k].motion.team();
-            (0..2).map(|bench| team.link(bench) + 2.0 * team.hole_inset + team.width).fold(0.0, f64::max)
+            team.longest_link() + 2.0 * team.hole_inset + team.widest()
         };
         let square = NEAR + (0..ensemble.dragons().len()).map(longest).fold(0.0, f64::max);
         let none = vec![None; ensemble.handles()];

@@ -4,9 +4,10 @@
 use super::{LeastTurn, least_turn};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::unreported;
-use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::model::team::{Ends, Team};
 
-const TEAM: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+const TEAM: Team =
+    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 const PITCH: f64 = 1.7;
 const A: f64 = PITCH / std::f64::consts::TAU;
 
