@@ -325,7 +325,7 @@ fn field<'f>(query: &'f Fields, wanted: &str) -> Option<&'f str> {
 
 impl Server {
     /// Returns the publisher that a page from an admitted origin may watch.
-    #[expect(clippy::result_large_err, reason = "the error is the answer")]
+    #[allow(clippy::result_large_err, reason = "the error is the answer")]
     fn watched(&self, headers: &HeaderMap, query: &Fields) -> Result<Channel, Response> {
         if !self.admission.allows(text_of(headers, header::ORIGIN), text_of(headers, header::HOST)) {
             let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
@@ -344,7 +344,7 @@ impl Server {
 type Upgrade = Result<WebSocketUpgrade, WebSocketUpgradeRejection>;
 
 /// Returns the upgrade to a WebSocket with small requests; `instead` answers another request.
-#[expect(clippy::result_large_err, reason = "the error is the answer")]
+#[allow(clippy::result_large_err, reason = "the error is the answer")]
 fn upgraded(upgrade: Upgrade, instead: &'static str) -> Result<WebSocketUpgrade, Response> {
     let upgrade = upgrade.map_err(|_| (StatusCode::UPGRADE_REQUIRED, instead).into_response())?;
     Ok(upgrade.max_frame_size(MAX_REQUEST_BYTES).max_message_size(MAX_REQUEST_BYTES))
