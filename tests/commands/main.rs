@@ -7,7 +7,6 @@ mod contest;
 mod draw;
 mod files;
 mod first_scene;
-mod fit;
 
 mod ground;
 mod hard_scenes;
