@@ -85,7 +85,7 @@ impl SavedFile {
     }
 }
 
-/// What the pages of this command share.
+/// The file and the rights that the pages of this command share.
 struct Desk {
     file: Option<Arc<SavedFile>>,
     save: bool,

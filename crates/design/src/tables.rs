@@ -220,7 +220,7 @@ fn split(text: &str) -> (&str, &str) {
 /// Removes an element with the comment behind it.
 fn remove_element(array: &mut Array, index: usize) {
     let (own, next) = (before(array, index), before(array, index + 1));
-    // What stands after the comma belongs to the element before the comma.
+    // A comment after the comma belongs to the element before the comma.
     let kept = if index == 0 && !own.contains('\n') { own } else { format!("{}{}", split(&own).0, split(&next).1) };
     array.remove(index);
     set_before(array, index, kept);

@@ -95,7 +95,7 @@ pub trait Studio: Send + Sync {
     fn save(&self, text: &str) -> Result<(), SaveError>;
 }
 
-/// What the requests of all browsers share.
+/// The studio, the admission, the token and the sessions that the requests of all browsers share.
 #[derive(Clone)]
 struct Server {
     studio: Arc<dyn Studio>,

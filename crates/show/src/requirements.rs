@@ -42,8 +42,8 @@ pub struct Verdict {
     because: String,
 }
 
-/// Returns the proved bounds of the least clearance of boards, or of boards and the obstacle of a name: the lower one
-/// if it is proved to the end of the motion, and the upper one.
+/// Returns the proved bounds of the least clearance of boards, or of boards and the obstacle of a name. The lower one is
+/// given if it is proved to the end of the motion.
 pub type Bounds<'b> = &'b dyn Fn(Option<&str>) -> (Option<f64>, Option<f64>);
 
 /// The results of the search.

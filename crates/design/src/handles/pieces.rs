@@ -19,16 +19,16 @@ use bench_dragon_motion::placement::Placement;
 const MOST_RADIUS: f64 = 1e4;
 const LEAST_LENGTH: f64 = 1e-3;
 
-/// The place of a piece on the stage.
+/// The beginning of a piece on the stage, and its length.
 #[derive(Debug, Clone, Copy)]
-struct Leg {
+struct Begin {
     start: Point,
     /// The direction at the start, of length 1.
     along: Vector,
     length: f64,
 }
 
-impl Leg {
+impl Begin {
     fn new(outline: &SegmentOutline) -> Self {
         let (sine, cosine) = outline.heading.sin_cos();
         Self { start: outline.start, along: Vector::new(cosine, sine), length: outline.length }
@@ -56,17 +56,17 @@ pub(super) fn add(found: &mut Found<'_>, prefix: &str, motion: &Motion) {
         let is_turn = found.scene.values.words(&format!("{name}.kind")) == Some("turn");
         let Some((own, after)) = rest.split_at_checked(if is_turn { 2 } else { 1 }) else { return };
         let end = after.first().map_or(last, |next| next.start);
-        let leg = Leg::new(&own[0]);
+        let begin = Begin::new(&own[0]);
         match own[0].kind {
             _ if is_turn => {
-                let across = Ray::towards(leg.start, end);
-                add_arc_ratio(found, format!("{name}.arc_ratio"), across, (end - leg.start).norm(), ratio(own));
+                let across = Ray::towards(begin.start, end);
+                add_arc_ratio(found, format!("{name}.arc_ratio"), across, (end - begin.start).norm(), ratio(own));
             }
-            OutlineKind::Line => add_line(found, &name, &leg),
-            OutlineKind::Arc { curvature } => add_arc(found, (&route, k), &leg, curvature),
+            OutlineKind::Line => add_line(found, &name, &begin),
+            OutlineKind::Arc { curvature } => add_arc(found, (&route, k), &begin, curvature),
             OutlineKind::Spiral { direction, pitch, first, last, curvature } => {
                 let side = if curvature > 0.0 { Side::Left } else { Side::Right };
-                let bend = Bend { leg, side, direction, pitch, first, last };
+                let bend = Bend { begin, side, direction, pitch, first, last };
                 bend.add(found, &name, &own[0], end);
             }
         }
@@ -79,10 +79,10 @@ fn ratio(arcs: &[SegmentOutline]) -> f64 {
     arcs[0].length / arcs[1].length
 }
 
-fn add_line(found: &mut Found<'_>, name: &str, leg: &Leg) {
-    let (ray, field) = (leg.ray(), format!("{name}.length"));
-    found.add_on_ray((format!("{name}.end"), "end"), field.clone(), (ray, leg.length), 1.0, positive);
-    found.add_on_ray((format!("{name}.middle"), "middle"), field, (ray, 0.5 * leg.length), 2.0, |metres| {
+fn add_line(found: &mut Found<'_>, name: &str, begin: &Begin) {
+    let (ray, field) = (begin.ray(), format!("{name}.length"));
+    found.add_on_ray((format!("{name}.end"), "end"), field.clone(), (ray, begin.length), 1.0, positive);
+    found.add_on_ray((format!("{name}.middle"), "middle"), field, (ray, 0.5 * begin.length), 2.0, |metres| {
         positive(2.0 * metres)
     });
 }
@@ -91,7 +91,7 @@ fn positive(metres: f64) -> f64 {
     metres.max(LEAST_LENGTH)
 }
 
-/// Returns the radius and the angle, radians, of the arc that begins as a leg does and leads through a place. `towards`
+/// Returns the radius and the angle, radians, of the arc that begins as another piece does and leads through a place. `towards`
 /// is the direction to the centre. A place on the other side becomes the nearest one that such an arc reaches.
 pub(crate) fn arc_through(start: Point, along: Vector, towards: Vector, to: Point) -> (f64, f64) {
     let by = to - start;
@@ -101,11 +101,11 @@ pub(crate) fn arc_through(start: Point, along: Vector, towards: Vector, to: Poin
     (radius.clamp(LEAST_LENGTH, MOST_RADIUS), 2.0 * aside.atan2(ahead))
 }
 
-fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), leg: &Leg, curvature: f64) {
+fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), begin: &Begin, curvature: f64) {
     let name = format!("{route}[{k}]");
     let radius = 1.0 / curvature.abs();
-    let angle = leg.length / radius;
-    let towards = curvature.signum() * leg.left();
+    let angle = begin.length / radius;
+    let towards = curvature.signum() * begin.left();
     let values = &found.scene.values;
     let is_turns = values.number(&format!("{name}.turns")).is_some();
     let extent = format!("{name}.{}", if is_turns { "turns" } else { "length" });
@@ -116,13 +116,13 @@ fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), leg: &Leg, curvatur
     let side = values.words(&format!("{name}.side")).unwrap_or_default();
     let other_side = if side == "left" { "right" } else { "left" };
     let fields = vec![format!("{name}.radius"), extent.clone()];
-    let (leg_of, of, extent_of) = (*leg, name.clone(), extent.clone());
-    let end = on_arc(leg, towards, radius, angle);
+    let (begin_of, of, extent_of) = (*begin, name.clone(), extent.clone());
+    let end = on_arc(begin, towards, radius, angle);
     found.add((format!("{name}.end"), "end"), end, fields, move |pull| {
         let to = pull.place();
-        let is_other = pull.alt && (to - leg_of.start).dot(&towards) < 0.0;
+        let is_other = pull.alt && (to - begin_of.start).dot(&towards) < 0.0;
         let towards = if is_other { -towards } else { towards };
-        let (radius, bent) = arc_through(leg_of.start, leg_of.along, towards, to);
+        let (radius, bent) = arc_through(begin_of.start, begin_of.along, towards, to);
         // Whole turns remain.
         let bent = bent + TAU * ((angle - bent) / TAU).round().max(0.0);
         let mut changes =
@@ -133,11 +133,11 @@ fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), leg: &Leg, curvatur
         changes
     });
     let neighbours = [k.checked_sub(1), Some(k + 1)].map(|k| k.and_then(|k| line_length(found, route, k)));
-    let middle = on_arc(leg, towards, radius, 0.5 * angle);
+    let middle = on_arc(begin, towards, radius, 0.5 * angle);
     let mut fields = vec![format!("{name}.radius")];
     if let ([Some(before), Some(after)], true) = (neighbours, angle < 3.0) {
         let half = (0.5 * angle).tan();
-        let corner = leg.start + radius * half * leg.along;
+        let corner = begin.start + radius * half * begin.along;
         let ray = Ray::towards(corner, middle);
         let per_metre = 1.0 / (0.5 * angle).cos() - 1.0;
         let most = radius + (before.1.min(after.1) - LEAST_LENGTH) / half;
@@ -153,7 +153,7 @@ fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), leg: &Leg, curvatur
         });
         return;
     }
-    let ray = Ray::towards(leg.start, middle);
+    let ray = Ray::towards(begin.start, middle);
     let chord = 2.0 * (0.25 * angle).sin();
     if chord.abs() > 1e-6 {
         found.add((format!("{name}.middle"), "middle"), middle, fields, move |pull| {
@@ -175,15 +175,15 @@ fn line_length(found: &Found<'_>, route: &str, k: usize) -> Option<(String, f64)
 }
 
 /// Returns the place of an arc after an angle.
-fn on_arc(leg: &Leg, towards: Vector, radius: f64, angle: f64) -> Point {
+fn on_arc(begin: &Begin, towards: Vector, radius: f64, angle: f64) -> Point {
     let (sine, cosine) = angle.sin_cos();
-    leg.start + radius * (sine * leg.along + (1.0 - cosine) * towards)
+    begin.start + radius * (sine * begin.along + (1.0 - cosine) * towards)
 }
 
 /// A spiral piece.
 #[derive(Debug, Clone, Copy)]
 struct Bend {
-    leg: Leg,
+    begin: Begin,
     side: Side,
     direction: Direction,
     pitch: f64,
@@ -273,7 +273,7 @@ impl Bend {
 
     fn placed(&self, pitch: f64, radius: f64) -> PlacedSpiral {
         let first = DoubleDouble::from_turns(radius / pitch);
-        PlacedSpiral::new(self.leg.start, self.leg.along, self.side, self.spiral(pitch), first)
+        PlacedSpiral::new(self.begin.start, self.begin.along, self.side, self.spiral(pitch), first)
     }
 
     /// Returns the middle of the angles of the spiral with another pitch.
@@ -282,7 +282,7 @@ impl Bend {
         let (begin, spiral) = (DoubleDouble { high: first, low: 0.0 }, self.spiral(pitch));
         let last = match extent {
             Extent::Turns => first + (self.last - self.first),
-            Extent::Length => spiral.advance(begin, self.leg.length).high,
+            Extent::Length => spiral.advance(begin, self.begin.length).high,
             Extent::ToRadius => self.pitch * self.last / pitch,
         };
         self.placed(pitch, radius).point(DoubleDouble { high: 0.5 * (first + last), low: 0.0 })
