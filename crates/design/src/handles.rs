@@ -38,8 +38,11 @@ pub struct Handle {
     /// The names of the numbers that it changes.
     pub fields: Vec<String>,
     #[serde(skip)]
-    changes: Box<dyn Fn(&Pull) -> Vec<Change>>,
+    changes: Box<Changes>,
 }
+
+/// The changes of the text for a pull.
+type Changes = dyn Fn(&Pull) -> Vec<Change>;
 
 /// The place to which a handle is pulled.
 #[derive(Debug, Clone, Copy)]

@@ -139,6 +139,7 @@ fn router(server: Server) -> Router {
 
 impl Server {
     /// Refuses pages of other servers.
+    #[expect(clippy::result_large_err, reason = "the error is the answer")]
     fn admits(&self, headers: &HeaderMap) -> Result<(), Response> {
         if self.admission.allows(text_of(headers, header::ORIGIN), text_of(headers, header::HOST)) {
             return Ok(());
