@@ -1,4 +1,4 @@
-//! The second thumb of the page's time line: frames of another time, bit-equal to `solve --at`, while the show goes on.
+//! The second thumb of the page's time line: frames of another time, bit-equal to `solve --at`, while the show continues.
 //! `tests/python/scrub_page.py` tests the page in Debian's Chromium.
 
 use crate::run_scenario;

@@ -126,12 +126,12 @@ def thumb_shows_another_time():
         assert words(page) == f"t = {float(at):.1f} s, not live" and page.is_visible("#live")
         frame = page.evaluate("getComputedStyle(document.querySelector('main'), '::after').borderTopWidth")
         assert float(frame.removesuffix("px")) >= 4, frame
-        # The live show goes on, its thumb too, and its frames come.
+        # The live show continues, its thumb too, and its frames come.
         before, received = state(), page.evaluate("picture.received")
         share = lambda: float(page.evaluate("document.getElementById('scrub-live').style.getPropertyValue('--share')"))
         place = share()
         until(lambda: share() > place + 0.5 / end, "the live thumb runs on")
-        until(lambda: page.evaluate("picture.received") > received + 40, "the live frames go on")
+        until(lambda: page.evaluate("picture.received") > received + 40, "the live frames continue")
         after = state()
         assert after["playback"] == "playing" and after["sim_time"] > before["sim_time"], (before, after)
         assert after["sim_time"] < 300, "the show has been sought"

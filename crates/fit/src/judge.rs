@@ -1,7 +1,8 @@
 //! The margin of a scene: by how much a show keeps each distance that it must keep.
 //!
-//! In: a scene, the distances. Out: exactly, by the searches of `check` over the whole route; or at samples, which costs
-//! a tenth and is never less than the exact margin, because a least value over some times is not below that over all.
+//! In: a scene, the distances. Out: the margin, exactly, by the searches of `check` over the whole route, or at
+//! samples, which costs a tenth. A margin at samples is never less than the exact one, because a least value over some
+//! times is not below that over all.
 
 use std::ops::ControlFlow;
 

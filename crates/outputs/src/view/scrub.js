@@ -1,4 +1,4 @@
-// The second thumb of the time line: the stage at another time of the show. It sends no command, and the show goes on.
+// The second thumb of the time line: the stage at another time of the show. It sends no command, and the show continues.
 // In: the publishers of the page. Out: the dragons at that time, with ghosts of earlier and later moments, for the
 // drawing. The server computes the frames from the scene's text.
 

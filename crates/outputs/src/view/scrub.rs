@@ -1,12 +1,13 @@
 //! Frames of a scene at times that a browser requests, for the second thumb of its time line. No command is sent, and
-//! the stream of live frames goes on beside it.
+//! the stream of live frames continues beside it.
 //!
 //! In: the scenes that publishers play, and times, over the WebSocket `/scrub`. A request is JSON: `{"id": 7, "times":
-//! [300, 290]}`, at most [`MOST_TIMES`] times. Out: the message `stage` once for each run, then a frame for each time
-//! in the layout of the stream, with the request's `id` as its sequence and its place in the request as its tick; or
-//! `{"type": "unknown", "id": 7}` without a scene. One thread computes for all browsers, with a low priority, because
-//! publishers may run on this machine. The function that opens a scene is a parameter, so that this crate needs no
-//! solver.
+//! [300, 290]}`, at most [`MOST_TIMES`] times.
+//!
+//! Out: the message `stage` once for each run, then a frame for each time in the layout of the stream. Its sequence is
+//! the request's `id`, its tick the place in the request. Without a scene the answer is `{"type": "unknown", "id": 7}`.
+//! One thread computes for all browsers, with a low priority, because publishers may run on this machine. The function
+//! that opens a scene is a parameter, so that this crate needs no solver.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -50,7 +50,7 @@ const WORDS = {
   measure: ["Measure", "测距"],
   measureFirst: ["Measure: click two places, or press Enter for the middle of the picture.", "测距：点击两处，或按 Enter 取画面中点。"],
   measured: ["{metres} m from ({ax}, {ay}) to ({bx}, {by})", "({ax}, {ay}) 至 ({bx}, {by})：{metres} m"],
-  scrubLine: ["Look at another time: the show goes on, and gets no command", "查看其他时刻：演出继续，不受影响"],
+  scrubLine: ["Look at another time: the show continues, and gets no command", "查看其他时刻：演出继续，不受影响"],
   notLive: ["t = {time} s, not live", "t = {time} s，非实时"],
   notLiveYet: ["t = {time} s, not live: computing", "t = {time} s，非实时：计算中"],
   liveAt: ["live, {time} s", "实时，{time} 秒"],
