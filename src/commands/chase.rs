@@ -65,6 +65,9 @@ enum Kind {
     Ltc {
         /// A WAV file, or - for standard input
         file: PathBuf,
+        /// The channel with timecode, counted from 1; without it, the channel that has it is found
+        #[arg(long, value_name = "N")]
+        channel: Option<usize>,
         #[command(flatten)]
         timecode: TimecodeArguments,
     },
@@ -76,18 +79,41 @@ enum Kind {
 /// The options of every timecode.
 #[derive(Debug, Clone, clap::Args)]
 struct TimecodeArguments {
-    /// The label of simulated time 0
-    #[arg(long, value_name = "HH:MM:SS:FF", default_value = "00:00:00:00")]
-    offset: Label,
-    /// Simulated seconds per second of timecode
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
-    speed: f64,
+    #[command(flatten)]
+    schedule: ScheduleArguments,
     /// The time for which the show continues when timecode stops, before it is paused
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = wall_seconds)]
     freewheel: f64,
     /// The frame rate: auto, 23.976, 24, 25, 29.97, 29.97df or 30
     #[arg(long, value_name = "RATE", default_value = "auto", value_parser = fps)]
     fps: Fps,
+}
+
+/// The options of every timecode, followed or sent.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct ScheduleArguments {
+    /// The label of simulated time 0
+    #[arg(long, value_name = "HH:MM:SS:FF", default_value = "00:00:00:00")]
+    offset: Label,
+    /// Simulated seconds per second of timecode
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
+    speed: f64,
+}
+
+impl ScheduleArguments {
+    /// Returns the schedule, whose offset is a label of the rate.
+    ///
+    /// # Errors
+    /// Bad input: the offset names no frame.
+    pub fn schedule(self, rate: Option<FrameRate>) -> Result<Schedule, CommandError> {
+        let Self { offset, speed } = self;
+        if let Some(rate) = rate.filter(|rate| rate.frame(offset).is_none()) {
+            let sentence =
+                format!("--offset {offset} is no label at {rate} frames per second, expected one that exists");
+            return Err(CommandError::BadInput(sentence));
+        }
+        Ok(Schedule { offset, speed })
+    }
 }
 
 /// A frame rate, or that of the source.
@@ -149,9 +175,9 @@ pub fn chase(common: &Common, arguments: &ChaseArguments) -> Result<(), CommandE
             let inputs = sources::mtc(device)?;
             follow(common, &stop, ChaseSource::Mtc, leader, inputs, &format!("MIDI timecode of {}", device.display()))
         }
-        Kind::Ltc { file, timecode } => {
+        Kind::Ltc { file, channel, timecode } => {
             let leader = Leader::Timecode(timecode.leader(ChaseSource::Ltc)?);
-            let inputs = sources::ltc(file)?;
+            let inputs = sources::ltc(file, *channel)?;
             follow(common, &stop, ChaseSource::Ltc, leader, inputs, &format!("LTC of {}", file.display()))
         }
         Kind::Psn(arguments) => psn(common, arguments, &stop),
@@ -160,13 +186,8 @@ pub fn chase(common: &Common, arguments: &ChaseArguments) -> Result<(), CommandE
 
 impl TimecodeArguments {
     fn leader(&self, source: ChaseSource) -> Result<TimecodeLeader, CommandError> {
-        let Self { offset, speed, freewheel, fps: Fps(rate) } = *self;
-        if let Some(rate) = rate.filter(|rate| rate.frame(offset).is_none()) {
-            let sentence =
-                format!("--offset {offset} is no label at {rate} frames per second, expected one that exists");
-            return Err(CommandError::BadInput(sentence));
-        }
-        Ok(TimecodeLeader::new(source, Schedule { offset, speed }, rate, freewheel))
+        let Self { schedule, freewheel, fps: Fps(rate) } = *self;
+        Ok(TimecodeLeader::new(source, schedule.schedule(rate)?, rate, freewheel))
     }
 }
 

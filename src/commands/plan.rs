@@ -1,5 +1,6 @@
 //! `plan`: answers for a choreographer, with the place that decides them.
 
+mod fit;
 mod stage;
 mod turn;
 
@@ -61,6 +62,9 @@ enum Question {
         #[command(flatten)]
         spacing: Spacing,
     },
+    /// Numbers of the scene with which the show keeps what it must, with the greatest margin found
+    #[command(arg = scene_argument())]
+    Fit(fit::FitArguments),
 }
 
 /// The distance that boards must keep.
@@ -141,7 +145,7 @@ fn given_up() -> &'static str {
     if are_searches_stopped() { "was stopped" } else { "was given up" }
 }
 
-/// Plans the pitch, the speed or the turn.
+/// Plans the pitch, the speed, the turn or numbers of the scene.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     stop_searches_on_signals()?;
     match &arguments.question {
@@ -150,6 +154,7 @@ pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandErr
         }
         Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
         Question::Turn { arc_ratio, spacing } => turn::plan_turn(common, *arc_ratio, spacing),
+        Question::Fit(arguments) => fit::plan_fit(common, arguments),
     }
 }
 

@@ -100,19 +100,46 @@ fn selected<'s>(
     times: [f64; 2],
     benches: Option<&Benches>,
 ) -> Result<(Vec<SweptStretch<'s>>, [usize; 2], String), CommandError> {
-    let refused = |sentence: String| Err(CommandError::BadInput(sentence));
     let ensemble = &scene.ensemble;
     let of = |dragon: &'s Dragon, benches: Range<usize>| SweptStretch {
         motion: &dragon.motion,
         travelled: times.map(|time| dragon.travelled_at(time)).into(),
         benches,
     };
+    let Some((number, range)) = chosen(scene, benches)? else {
+        let all = ensemble.dragons().iter().map(|dragon| of(dragon, 0..dragon.motion.team().benches)).collect();
+        return Ok((all, [0, ensemble.handles() - 2], "all benches".to_owned()));
+    };
+    let (dragon, first) = (&ensemble.dragons()[number], ensemble.handles_of(number).start);
+    let words = dragon.titled(&format!("benches {} to {}", range.start + 1, range.end));
+    let ends = [first + range.start, first + range.end - 1];
+    Ok((vec![of(dragon, range)], ends, words))
+}
+
+/// Returns the benches of each dragon that an option names, counted from 0; without the option all.
+///
+/// # Errors
+/// Bad input: a dragon or a bench that the scene has not.
+pub fn ranges(scene: &Scene, benches: Option<&Benches>) -> Result<Vec<Range<usize>>, CommandError> {
+    let dragons = scene.ensemble.dragons().iter().enumerate();
+    let chosen = chosen(scene, benches)?;
+    let of = |(number, dragon): (usize, &Dragon)| match &chosen {
+        Some((one, range)) if *one == number => range.clone(),
+        Some(_) => 0..0,
+        None => 0..dragon.motion.team().benches,
+    };
+    Ok(dragons.map(of).collect())
+}
+
+/// Returns the dragon that an option names and its benches, counted from 0; `None` for all benches of several dragons.
+fn chosen(scene: &Scene, benches: Option<&Benches>) -> Result<Option<(usize, Range<usize>)>, CommandError> {
+    let refused = |sentence: String| Err(CommandError::BadInput(sentence));
+    let ensemble = &scene.ensemble;
     let name = benches.and_then(|benches| benches.dragon.as_deref()).unwrap_or_default();
     let named = ensemble.dragons().iter().position(|dragon| dragon.name == name);
     let Some(number) = named else {
         if benches.is_none() {
-            let all = ensemble.dragons().iter().map(|dragon| of(dragon, 0..dragon.motion.team().benches)).collect();
-            return Ok((all, [0, ensemble.handles() - 2], "all benches".to_owned()));
+            return Ok(None);
         }
         if ensemble.only().is_some() {
             return refused("--benches names a dragon and the scene has one, expected benches as in 1-20".to_owned());
@@ -121,11 +148,7 @@ fn selected<'s>(
         let names = names.join(", ");
         return refused(format!("--benches names no dragon of the scene, expected one of {names}, as in gold:1-20"));
     };
-    let (dragon, first) = (&ensemble.dragons()[number], ensemble.handles_of(number).start);
-    let range = range(benches, dragon.motion.team().benches)?;
-    let words = dragon.titled(&format!("benches {} to {}", range.start + 1, range.end));
-    let ends = [first + range.start, first + range.end - 1];
-    Ok((vec![of(dragon, range)], ends, words))
+    Ok(Some((number, range(benches, ensemble.dragons()[number].motion.team().benches)?)))
 }
 
 /// Returns benches of a team counted from 0.
@@ -186,7 +209,8 @@ impl Swept {
         let Self { area, from, until, words, .. } = self;
         let rings = area.polygons().len();
         format!(
-            "Ground covered from {} s to {} s by {words}: {:.3} m2, in {rings} polygon{}.",
+            "Ground covered from {} s to {} s by {words}: {:.3} m2, in {rings} polygon{}. Left out: rings narrower than \
+             1 mm, and the ground of a real tail that whips by its momentum.",
             figure(*from),
             figure(*until),
             area.area(),

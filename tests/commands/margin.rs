@@ -5,7 +5,7 @@ use std::process::Command;
 
 use crate::harness::{all, can_run, json_lines, python, python_modules, text};
 use bench_dragon::motion::model::path::Path;
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::proof::{Proved, Refused, verify};
@@ -15,7 +15,8 @@ use serde_json::{Value, json};
 /// 17 with 30 digits, its least over places of the head found by golden section.
 const PITCH: f64 = 0.650_013_396_502_777_8;
 
-const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+const PAPER: Team =
+    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 
 /// A scene of the paper's benches. With 40 of them, those that come nearest are the same as with 223.
 fn coil(rest: &str) -> tempfile::NamedTempFile {

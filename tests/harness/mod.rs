@@ -58,6 +58,14 @@ impl Process {
         (Self(child), input)
     }
 
+    /// Starts two processes: the standard output of the first is the standard input of the second.
+    pub fn start_piped(first: &mut Command, second: &mut Command) -> (Self, Self) {
+        let mut first = Self::start(first);
+        let output = first.0.stdout.take().unwrap();
+        let piped = second.stdin(Stdio::from(output)).stdout(Stdio::piped()).stderr(Stdio::piped());
+        (first, Self(piped.spawn().unwrap()))
+    }
+
     pub fn id(&self) -> u32 {
         self.0.id()
     }
@@ -485,6 +493,21 @@ pub fn python_modules(modules: &[&str]) -> Result<(), String> {
 }
 
 /// Requires the browser that `tests/python/stage_picture.py` starts.
+/// Installs a package of npm in a folder of its own; returns the folder, and the package's folder in it.
+pub fn npm(package: &str) -> Result<(tempfile::TempDir, PathBuf), String> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut npm = Command::new("npm");
+    npm.args(["install", "--no-audit", "--no-fund", package]).current_dir(folder.path());
+    let output = npm.output().map_err(|error| format!("no npm ({error})"))?;
+    if !output.status.success() {
+        return Err(text(&output.stderr));
+    }
+    // A name may begin with @, as its version does.
+    let name = package.rsplit_once('@').map_or(package, |(name, _)| name);
+    let installed = folder.path().join("node_modules").join(name);
+    Ok((folder, installed))
+}
+
 pub fn chromium() -> Result<(), String> {
     let program = Path::new("/usr/bin/chromium");
     if program.exists() { Ok(()) } else { Err(format!("no {}; tests/run installs it", program.display())) }

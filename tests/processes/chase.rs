@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::harness::{Lines, Process, can_run, json_lines, long, not_run, program, python, text, unique};
+use crate::harness::{Lines, Process, json_lines, long, not_run, npm, program, python, text, unique};
 use nix::sys::signal::Signal;
 
 /// Returns a port that no other test has.
@@ -247,6 +247,14 @@ fn the_log_of_a_chased_show_replays_bit_for_bit() {
 #[test]
 fn bad_options_are_refused_with_one_sentence() {
     let name = "chase_options";
+    let folder = tempfile::tempdir().unwrap();
+    let stereo = folder.path().join("stereo.wav");
+    std::fs::write(
+        &stereo,
+        b"RIFF\0\0\0\0WAVEfmt \x10\0\0\0\x01\0\x02\0\x40\x1f\0\0\x80\x3e\0\0\x02\0\x08\0data\0\0\0\0",
+    )
+    .unwrap();
+    let stereo = stereo.to_str().unwrap();
     for (arguments, expected) in [
         (&["artnet", "--fps", "23"][..], "29.97df"),
         (&["artnet", "--offset", "1:2:3"], "01:00:00:00"),
@@ -255,6 +263,7 @@ fn bad_options_are_refused_with_one_sentence() {
         (&["artnet", "--freewheel", "never"], "a time above 0"),
         (&["mtc", "/nowhere/midi"], "a raw MIDI device"),
         (&["ltc", "Cargo.toml"], "RIFF WAVE"),
+        (&["ltc", stereo, "--channel", "3"], "expected --channel from 1 to 2"),
         (&["psn", "--tracker", "0"], "1..=65535"),
         (&["psn", "--axes", "x,y"], "once each"),
         (&["psn", "--group", "desk.local"], "an IPv4 address"),
@@ -277,19 +286,13 @@ fn a_show_follows_the_art_net_timecode_of_another_library() {
     if !long() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let mut npm = Command::new("npm");
-    npm.args(["install", "--no-audit", "--no-fund", "@arcanewizards/artnet@0.1.8"]).current_dir(folder.path());
-    let installed = npm.output().map_err(|error| format!("no npm ({error})"));
-    let installed =
-        installed.and_then(|output| if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) });
-    if !can_run(installed) {
-        return;
-    }
+    let (_folder, package) = match npm("@arcanewizards/artnet@0.1.8") {
+        Ok(installed) => installed,
+        Err(why) => return not_run(&why),
+    };
     let (name, port) = ("chase_npm", port().to_string());
     let _publisher = publisher(name, &["--paused"]);
     let (_chase, lines) = chase(name, &["artnet", "--listen", &format!("127.0.0.1:{port}")]);
-    let package = folder.path().join("node_modules/@arcanewizards/artnet");
     let mut sender = Command::new("node");
     sender.arg("tests/python/artnet_npm.mjs").arg(package).args([&port, "8"]);
     let sender = Process::start(&mut sender);

@@ -11,8 +11,8 @@ use bench_dragon::motion::Method;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::show::scene::Scene;
 use harness::{
-    Lines, Process, can_run, long, program, python, python_modules, scene_file, stopped, summary, text, unique, wait,
-    wait_until,
+    Lines, Process, can_run, long, not_run, npm, program, python, python_modules, scene_file, stopped, summary, text,
+    unique, wait, wait_until,
 };
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
@@ -161,15 +161,11 @@ fn a_second_decoder_sees_the_same() {
     if !long() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let mut npm = std::process::Command::new("npm");
-    npm.args(["install", "--no-audit", "--no-fund", "@jwetzell/posistagenet@2.1.1"]).current_dir(folder.path());
-    let installed = npm.output().map_err(|error| format!("no npm ({error})"));
-    let installed =
-        installed.and_then(|output| if output.status.success() { Ok(()) } else { Err(text(&output.stderr)) });
-    if can_run(installed) {
-        let package = folder.path().join("node_modules/@jwetzell/posistagenet");
-        Sending { name: "psn_npm", frames: 600, npm: package.to_str(), ..Sending::default() }.of_the_paper();
+    match npm("@jwetzell/posistagenet@2.1.1") {
+        Ok((_folder, package)) => {
+            Sending { name: "psn_npm", frames: 600, npm: package.to_str(), ..Sending::default() }.of_the_paper();
+        }
+        Err(why) => not_run(&why),
     }
 }
 

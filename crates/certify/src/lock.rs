@@ -30,7 +30,7 @@ impl Chain<'_> {
         follower: Span,
         (front, last): (&Spanned, &Spanned),
     ) -> Option<Span> {
-        let Chain { path, exact, team, links, .. } = self;
+        let Chain { path, exact, team, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let (before, rear) = (at.handles[link].param, at.handles[link + 1].param);
         let origin = path.point(before);
@@ -47,7 +47,7 @@ impl Chain<'_> {
             }
         }
         let top = bisect_predicate(|metres| product(metres) <= 0.0, 0.0, beyond);
-        let length = links[link.min(1)];
+        let length = self.link(link);
         let square = length.square();
         WIDER.iter().find_map(|wider| {
             let behind = path.param_at(path.travelled(rear) - top * (1.0 + wider));
@@ -91,10 +91,10 @@ impl Chain<'_> {
         follower: Span,
         (front, last): (&Spanned, &Spanned),
     ) -> Option<Span> {
-        let Chain { path, exact, team, links, .. } = self;
+        let Chain { path, exact, team, .. } = self;
         at.extend_to(link + 1, path, team).ok()?;
         let rear = at.handles[link + 1].param;
-        let square = links[link.min(1)].square();
+        let square = self.link(link).square();
         let (from, to) = (path.travelled(rear), path.travelled(at.handles[link].param));
         let origin = last.first.map(Interval::middle);
         let distance = |travelled: f64| {

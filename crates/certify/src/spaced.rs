@@ -11,9 +11,10 @@ use bench_dragon_motion::model::team::Team;
 /// ```
 /// use bench_dragon_certify::plan::{Spaced, least_pitch};
 /// use bench_dragon_motion::event::unreported;
-/// use bench_dragon_motion::model::team::Team;
+/// use bench_dragon_motion::model::team::{Ends, Team};
 ///
-/// let team = Team { benches: 20, head_length: 0.52, body_length: 0.57, width: 0.054, hole_inset: 0.135 };
+/// let (head_length, body_length, ends) = (0.52, 0.57, Ends::NONE);
+/// let team = Team { benches: 20, head_length, body_length, width: 0.054, hole_inset: 0.135, ends };
 /// let apart = least_pitch(&team, 0.5, &mut unreported).unwrap();
 /// let spaced = least_pitch(Spaced { team: &team, clearance: 0.02 }, 0.5, &mut unreported).unwrap();
 /// assert!(spaced.value_lo > apart.value_lo);

@@ -17,7 +17,7 @@ use super::pitch::clear_beyond;
 use super::place::{Place, Span};
 use super::search::{CertificateSearch, MOST_SPANS, path_end};
 use super::spaced::Spaced;
-use super::step::{Chain, Claim, Listed, links_of};
+use super::step::{Chain, Claim, Listed, link_of};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::linkage::follower;
@@ -75,7 +75,7 @@ impl<'a> Turns<'a> {
             exact,
             point,
             tangent: if ahead { tangent } else { tangent.map(std::ops::Neg::neg) },
-            square: links_of(self.team)[link.min(1)].square(),
+            square: link_of(self.team, link).square(),
             left: Cell::new(MOST_STRETCHES),
         };
         let stretch = if ahead { Span(pivot, end) } else { Span(end, pivot) };
@@ -117,9 +117,8 @@ impl<'a> Turns<'a> {
         let (Some(still), Some(all)) = (still, all) else { return false };
         let Some(velocities) = self.velocities(&all, rate) else { return false };
         let handle = |number: usize| FirstOrderHandle::moving(&still[number].capsule, velocities[number], half);
-        let shape = Shape::new(self.team);
         let board = |bench: usize| {
-            let link = links_of(self.team)[bench.min(1)];
+            let (link, shape) = (link_of(self.team, bench), Shape::new(self.team, bench));
             FirstOrderBoard::new(&shape, handle(bench), handle(bench + 1), link, half)
         };
         board(a).at_most(&board(b), When::Always) < self.clearance

@@ -1,5 +1,5 @@
-//! ArtTimeCode of Art-Net 4 (Artistic Licence, "Art-Net 4 Protocol Release", ArtTimeCode). In: datagrams. Out: labels.
-//! Pure.
+//! ArtTimeCode of Art-Net 4 (Artistic Licence, "Art-Net 4 Protocol Release", ArtTimeCode): from datagrams to labels, and
+//! back. Pure.
 
 use crate::timecode::{FrameRate, Label};
 
@@ -55,21 +55,15 @@ pub fn decode(datagram: &[u8]) -> Result<TimeCode, NotTimeCode> {
     Ok(TimeCode { stream, label, rate })
 }
 
-/// Returns the packet of a label, for tests and senders.
+/// Returns the packet of a label.
 pub fn encode(timecode: &TimeCode) -> [u8; BYTES] {
     let TimeCode { stream, label, rate } = *timecode;
     let Label { hours, minutes, seconds, frames } = label;
-    let kind = match rate {
-        FrameRate::Film24 | FrameRate::Film23976 => 0,
-        FrameRate::Ebu25 => 1,
-        FrameRate::Drop2997 => 2,
-        FrameRate::NonDrop2997 | FrameRate::Smpte30 => 3,
-    };
     let mut packet = [0; BYTES];
     packet[..8].copy_from_slice(ID);
     packet[8..10].copy_from_slice(&OP_TIME_CODE.to_le_bytes());
     packet[10..12].copy_from_slice(&LEAST_VERSION.to_be_bytes());
-    packet[13..].copy_from_slice(&[stream, frames, seconds, minutes, hours, kind]);
+    packet[13..].copy_from_slice(&[stream, frames, seconds, minutes, hours, rate.type_code()]);
     packet
 }
 

@@ -1,5 +1,5 @@
-//! MIDI timecode (MIDI 1.0, "MIDI Time Code", quarter frames and full frames). In: the bytes of a MIDI device. Out:
-//! labels. Pure.
+//! MIDI timecode (MIDI 1.0, "MIDI Time Code", quarter frames and full frames). From the bytes of a MIDI
+//! device to labels, and back. Pure.
 //!
 //! Eight quarter frames carry a label in two frames of time. The label belongs to the moment of piece 0, so 7/4 frames
 //! have passed when piece 7 has come. While timecode runs backward the pieces come from 7 to 0.
@@ -136,6 +136,25 @@ fn full_frame(message: &[u8]) -> Option<Event> {
     Some(located(rest).unwrap_or(Event::Malformed))
 }
 
+/// Returns the message of a piece, 0 to 7, of a label.
+pub fn encode_quarter(label: Label, rate: FrameRate, piece: u8) -> [u8; 2] {
+    let Label { hours, minutes, seconds, frames } = label;
+    let value = match piece / 2 {
+        0 => frames,
+        1 => seconds,
+        2 => minutes,
+        _ => hours | rate.type_code() << 5,
+    };
+    let nibble = if piece.is_multiple_of(2) { value & 0xf } else { value >> 4 };
+    [0xf1, piece << 4 | nibble]
+}
+
+/// Returns the full frame of a label, for all devices.
+pub fn encode_full(label: Label, rate: FrameRate) -> [u8; 10] {
+    let Label { hours, minutes, seconds, frames } = label;
+    [0xf0, 0x7f, 0x7f, 0x01, 0x01, hours | rate.type_code() << 5, minutes, seconds, frames, 0xf7]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,6 +178,8 @@ mod tests {
         let (label, rate) = known();
         assert_eq!(events(QUARTERS), [Event::Running { label, rate }]);
         assert_eq!(events(FULL), [Event::Located { label, rate }]);
+        assert_eq!(Vec::from_iter((0..8).flat_map(|piece| encode_quarter(label, rate, piece))), QUARTERS);
+        assert_eq!(encode_full(label, rate), FULL);
         // A clock byte within a message, a note between messages.
         let mixed = QUARTERS.chunks(2).flat_map(|pair| [pair[0], 0xf8, pair[1], 0x90, 0x40, 0x7f]);
         assert_eq!(events(mixed), [Event::Running { label, rate }]);

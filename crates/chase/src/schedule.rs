@@ -1,4 +1,4 @@
-//! From a position of timecode to the simulated time of a show. Pure.
+//! From a position of timecode to the simulated time of a show, and back. Pure.
 
 use crate::steering::{Goal, Limits};
 use crate::synchronizer::{Motion, wrapped};
@@ -29,12 +29,26 @@ impl Schedule {
     /// eighteen hours after.
     pub fn time(&self, position: f64, rate: FrameRate) -> f64 {
         let day = rate.seconds(f64::from(rate.frames_per_day()));
+        let middle = 0.5 * day - BEFORE;
+        let since = wrapped(position - rate.seconds(f64::from(self.first_frame(rate))) - middle, day) + middle;
+        self.speed * since
+    }
+
+    /// Returns the frame of simulated time 0.
+    fn first_frame(&self, rate: FrameRate) -> u32 {
         // A label that this rate leaves out counts as the next one.
         let next = Label { frames: 2, ..self.offset };
-        let offset = rate.frame(self.offset).or(rate.frame(next)).unwrap_or(0);
-        let middle = 0.5 * day - BEFORE;
-        let since = wrapped(position - rate.seconds(f64::from(offset)) - middle, day) + middle;
-        self.speed * since
+        rate.frame(self.offset).or(rate.frame(next)).unwrap_or(0)
+    }
+
+    /// Returns the place of a simulated time in frames since 00:00:00:00. It may be past the end of a day.
+    pub fn place(&self, time: f64, rate: FrameRate) -> f64 {
+        f64::from(self.first_frame(rate)) + self.pace(1.0, rate) * time
+    }
+
+    /// Returns the frames per second of a show with this rate in simulated seconds per second.
+    pub fn pace(&self, show: f64, rate: FrameRate) -> f64 {
+        show / self.speed * rate.per_second()
     }
 
     /// Returns the goal of a show while its timecode has this motion. `was_locked` is true once the source has been

@@ -88,6 +88,22 @@ impl FrameRate {
         }
     }
 
+    /// Returns the frames per second.
+    pub fn per_second(self) -> f64 {
+        1.0 / self.seconds(1.0)
+    }
+
+    /// Returns the type code, which Art-Net and MIDI timecode share. It cannot distinguish 23.976 from 24, nor 29.97
+    /// without drop frame from 30.
+    pub const fn type_code(self) -> u8 {
+        match self {
+            Self::Film24 | Self::Film23976 => 0,
+            Self::Ebu25 => 1,
+            Self::Drop2997 => 2,
+            Self::NonDrop2997 | Self::Smpte30 => 3,
+        }
+    }
+
     /// Returns the frames of a day of labels.
     pub const fn frames_per_day(self) -> u32 {
         match self {

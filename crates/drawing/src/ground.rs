@@ -98,7 +98,7 @@ fn label(name: &str, (x, y): (f64, f64), camera: &Camera, palette: &Palette) -> 
 }
 
 /// Returns a point of a shape for its name: the middle of the corners; for a line, the middle of a side halfway along.
-fn middle(shape: &Shape) -> Point {
+pub fn middle(shape: &Shape) -> Point {
     let points = shape.points();
     match shape.kind() {
         ShapeKind::Line => {

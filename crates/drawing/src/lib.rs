@@ -12,7 +12,7 @@ pub mod camera;
 pub mod dragons;
 mod eye;
 mod figure;
-mod ground;
+pub mod ground;
 mod labels;
 mod lanterns;
 mod light;
@@ -102,7 +102,7 @@ impl<'a> Drawing<'a> {
                 let mut boards = extent.boards;
                 ground::include(motion.ground(), &mut boards);
                 let margin = match look.style {
-                    Style::Plan => 0.04 * boards.width().max(boards.height()) + motion.team().width,
+                    Style::Plan => 0.04 * boards.width().max(boards.height()) + motion.team().widest(),
                     Style::Lanterns | Style::Seat(_) => lanterns::MARGIN,
                 };
                 boards.padded(margin)
@@ -375,6 +375,11 @@ fn covered(area: &SweptArea, palette: &Palette) -> Path {
 /// Returns metres as SVG data, to a tenth of a micrometre.
 fn metres(value: f64) -> String {
     rounded(value, 7)
+}
+
+/// Returns text with the special characters of HTML escaped.
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Returns text without the control characters that XML forbids.

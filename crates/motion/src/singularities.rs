@@ -16,9 +16,12 @@
 //! link for all places that handle 1 has come to. They are solved in lockstep. Every step is proven to hold nothing
 //! unseen (`certificate`) or halved, down to the resolution of doubles (`trace`). Between two turning points of handle
 //! 1 its place is monotone in the head's place, so the head's place is found from handle 1's place by bisection.
+//!
+//! A tail whose link has a length of its own is a third problem, for the places that its front handle comes to (`tail`).
 
 mod certificate;
 mod inward;
+mod tail;
 mod trace;
 
 use crate::model::Point;
@@ -53,6 +56,8 @@ pub struct Singularities {
     pub head_turns: Vec<f64>,
     /// The places of a body link's front handle, in metres of travel, at which its rear handle turns round, in order.
     pub body_turns: Vec<f64>,
+    /// The same of the tail's link, if it has a length of its own.
+    pub tail_turns: Vec<f64>,
 }
 
 impl Singularities {
@@ -66,14 +71,17 @@ impl Singularities {
         let trace = |link: usize, start| LinkTrace::new(Link { path, length: team.link(link) }, start);
         let traces = trace(0, Some(0.0)).and_then(|head| {
             let body = if team.benches > 1 { Some(trace(1, None)?) } else { None };
-            Ok((head, body))
+            let own_tail = team.own_tail().filter(|tail| team.link(*tail) != team.link(1));
+            let tail = own_tail.map(|tail| trace(tail, None)).transpose()?;
+            Ok((head, body, tail))
         });
-        let Ok((head, body)) = traces else {
-            return Self { stall: None, end: None, searched_until: 0.0, head_turns: vec![], body_turns: vec![] };
+        let Ok((head, body, tail)) = traces else {
+            let (stall, end, [head_turns, body_turns, tail_turns]) = (None, None, [const { Vec::new() }; 3]);
+            return Self { stall, end, searched_until: 0.0, head_turns, body_turns, tail_turns };
         };
-        let mut search = SingularitySearch { path, team, head, body };
+        let mut search = SingularitySearch { path, team, head, body, tail };
         search.run(budget);
-        search.conclude()
+        search.conclude(budget)
     }
 }
 
@@ -84,18 +92,23 @@ struct SingularitySearch<'a> {
     head: LinkTrace<'a>,
     /// In metres of travel of the body link's front handle; `None` for one bench.
     body: Option<LinkTrace<'a>>,
+    /// In metres of travel of the tail's front handle, if its link has a length of its own.
+    tail: Option<LinkTrace<'a>>,
 }
 
 impl SingularitySearch<'_> {
-    /// Traces the head's link, and the body link up to the place of handle 1, until one of them ends the motion.
+    /// Traces the head's link, and the body link up to the place of handle 1, until one of them ends the motion. The
+    /// tail's link follows.
     fn run(&mut self, budget: &mut Budget) {
         for step in 0u64.. {
             if step % 256 == 0 {
                 budget.report(self.head.at().front / self.path.length());
             }
             let body_is_behind = self.body_lags();
-            let spent = match &mut self.body {
-                Some(body) if body_is_behind && body.end().is_none() => !body.advance(budget),
+            let tail_is_behind = self.tail_lags();
+            let spent = match (&mut self.body, &mut self.tail) {
+                (Some(body), _) if body_is_behind && body.end().is_none() => !body.advance(budget),
+                (_, Some(tail)) if tail_is_behind && tail.end().is_none() => !tail.advance(budget),
                 _ if body_is_behind || self.head.end().is_some() => break,
                 _ => !self.head.advance(budget),
             };
@@ -110,13 +123,13 @@ impl SingularitySearch<'_> {
         self.body.as_ref().is_some_and(|body| body.at().front < self.head.furthest_rear())
     }
 
-    fn conclude(self) -> Singularities {
+    fn conclude(self, budget: &mut Budget) -> Singularities {
         let limit = self.head.at().front.max(0.0);
         let body_limit = self.body.as_ref().filter(|_| self.body_lags()).and_then(|body| {
             let reached = self.handle_1_reaches(body.at().front, limit)?;
             Some((body.end(), reached.next_down().max(0.0)))
         });
-        let (end, searched_until) = match (body_limit, self.head.end()) {
+        let (mut end, mut searched_until) = match (body_limit, self.head.end()) {
             (Some((Some(TraceEnd::Lock), at)), _) => {
                 let at = self.before_jump(at, 1);
                 (Some(self.event(EventKind::Lock, at, 1)), at)
@@ -132,13 +145,21 @@ impl SingularitySearch<'_> {
             }
             (None, Some(TraceEnd::Undecided) | None) => (None, limit),
         };
-        let stall = self.stall(searched_until).filter(|stall| stall.travelled < searched_until);
+        let tail = self.of_tail(searched_until, budget);
+        if let Some(at) = tail.until.filter(|at| *at < searched_until) {
+            let link = self.team.benches - 1;
+            let at = if tail.locks { self.before_jump(at, link) } else { at };
+            end = tail.locks.then(|| self.event(EventKind::Lock, at, link));
+            searched_until = at;
+        }
+        let stall = self.stall(searched_until, tail.stall).filter(|stall| stall.travelled < searched_until);
         let head_turns: Vec<_> = self.head.turns().iter().copied().filter(|at| *at <= searched_until).collect();
         let places = head_turns.iter().chain([&0.0, &searched_until]).filter_map(|at| self.handle_1(*at));
         let furthest = places.fold(f64::NEG_INFINITY, f64::max);
         let body_turns = self.body.as_ref().map_or(&[][..], LinkTrace::turns);
         let body_turns = body_turns.iter().copied().filter(|at| *at <= furthest).collect();
-        Singularities { stall, end, searched_until, head_turns, body_turns }
+        let tail_turns = self.tail.as_ref().map_or_else(Vec::new, |tail| tail.turns().to_vec());
+        Singularities { stall, end, searched_until, head_turns, body_turns, tail_turns }
     }
 
     /// Returns the metres of travel of handle 1.
@@ -163,14 +184,16 @@ impl SingularitySearch<'_> {
         None
     }
 
-    /// Returns the first stall up to `limit` metres of travel of the head.
-    fn stall(&self, limit: f64) -> Option<Event> {
+    /// Returns the first stall up to `limit` metres of travel of the head. `tail` is the first of the tail's link.
+    fn stall(&self, limit: f64, tail: Option<f64>) -> Option<Event> {
         let start = self.head.link().configuration(0.0).ok()?;
         if start.is_stalled() {
             return Some(self.event(EventKind::Stall, 0.0, 0));
         }
         let head = self.head.turns().first().copied().filter(|at| *at <= limit);
         let body = self.body_stall(&start, head.unwrap_or(limit));
+        let tail = tail.filter(|at| *at <= limit).map(|at| (at, self.team.benches - 1));
+        let body = [body, tail].into_iter().flatten().min_by(|one, other| one.0.total_cmp(&other.0));
         match (head, body) {
             (Some(at), Some((body, _))) if at <= body => Some(self.event(EventKind::Stall, at, 0)),
             (_, Some((at, link))) => Some(self.event(EventKind::Stall, at, link)),
@@ -185,7 +208,7 @@ impl SingularitySearch<'_> {
         let innermost = *body.turns().first()?;
         let mut first: Option<(f64, usize)> = None;
         let mut front = head.rear;
-        for link in 1..self.team.benches {
+        for link in 1..self.team.benches - usize::from(self.tail.is_some()) {
             let configuration = body.link().configuration(front).ok()?;
             if configuration.is_stalled() {
                 return Some((0.0, link));
@@ -206,14 +229,7 @@ impl SingularitySearch<'_> {
 
     /// Returns the head's first travel up to `limit` at which a handle reaches `place`, if no handle turned before.
     fn handle_reaches(&self, handle: usize, place: f64, limit: f64) -> Option<f64> {
-        let reached = |head: f64| {
-            let body = self.body.as_ref().unwrap_or(&self.head).link();
-            let body_links = (1..handle).try_fold(self.handle_1(head)?, |front, _| {
-                body.configuration(front).ok().map(|configuration| configuration.rear)
-            });
-            body_links.map(|at| at >= place)
-        };
-        let reached = |head: f64| reached(head).unwrap_or(true);
+        let reached = |head: f64| self.handle(handle, head).is_none_or(|at| at >= place);
         reached(limit).then(|| bisect_predicate(reached, 0.0, limit))
     }
 

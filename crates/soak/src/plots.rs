@@ -2,6 +2,7 @@
 
 use plotters::prelude::*;
 
+use bench_dragon_drawing::escaped;
 use bench_dragon_drawing::palette::{LIGHT, SERIES, channels};
 
 /// Width and height in pixels: words are still readable at half the size, on a phone.
@@ -78,11 +79,6 @@ fn legend(lines: &[PlotLine]) -> String {
         )
     };
     format!("<p class=\"legend\">\n{}</p>\n", lines.iter().zip(SERIES.iter().cycle()).map(key).collect::<String>())
-}
-
-/// Returns text with the special characters of HTML escaped.
-pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Returns a suitable unit for a span of time: its seconds and its name.

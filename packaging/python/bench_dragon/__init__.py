@@ -7,7 +7,7 @@
 
 `subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands; one that is
 refused raises `CommandRefused`. `HermiteReader` gives the handles between two frames, `name_in` the names of benches and
-obstacles. All messages have the layouts of the program of the same version; `print` shows their fields, states and
+obstacles. `ask` has the program compute: the lines of a command. All messages have the layouts of the program of the same version; `print` shows their fields, states and
 levels by name.
 """
 
@@ -44,6 +44,7 @@ from bench_dragon.layouts import (
     StageSegment,
 )
 from bench_dragon.names import name_in
+from bench_dragon.program import ProgramError, ask
 
 if TYPE_CHECKING:
     from bench_dragon.control import CODES, COMMANDS, CommandRefused, Controller, described
@@ -93,6 +94,7 @@ __all__ = [
     "NO_BENCH",
     "OBSTACLES",
     "PLAYBACK",
+    "ProgramError",
     "SEGMENTS",
     "STATES",
     "SceneHeader",
@@ -102,6 +104,7 @@ __all__ = [
     "StageEvent",
     "StageObstacle",
     "StageSegment",
+    "ask",
     "described",
     "handles_of",
     "indices_of",

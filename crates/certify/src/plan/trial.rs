@@ -39,6 +39,9 @@ pub(super) enum Obstacle {
 pub(super) fn obstacle(asked: Spaced<'_>, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Obstacle> {
     let near = Trial::near(asked, pitch, radius, progress);
     near.obstacle(progress).or_else(|| {
+        if progress(pitch).is_break() {
+            return None;
+        }
         // Boards with almost no room between them and the next but one touch in a bend that may be anywhere.
         let outer = clear_beyond(asked, pitch, radius)?;
         let far = Trial::new(asked, (pitch, radius), outer, progress);
@@ -71,6 +74,9 @@ pub(super) fn free_from(asked: Spaced<'_>, (from, to): (f64, f64), radius: f64, 
             if pitch > to {
                 return Proposal { last: None, ..proposal };
             }
+        }
+        if progress(pitch).is_break() {
+            break;
         }
         proposal.last = Some(found);
         let free_at = match found {
@@ -201,10 +207,18 @@ impl Trial {
         let limit = path.length() - length(radius / pitch);
         // A board that touches one of the first two from more than two turns away also touches a board before it.
         let benches = ((length(start + 2.0) - path.length()) / team.link(1)).ceil() as usize + 3;
-        let team = Team { benches: benches.min(team.benches), ..*team };
+        // No other board touches where only a tail with a size of its own does.
+        let team = if team.own_tail().is_some() { *team } else { team.foremost(benches) };
         // A link turns round or locks only where the spiral is narrower than the link is long.
         let singularities = if radius > team.longest_link() {
-            Singularities { stall: None, end: None, searched_until: limit, head_turns: vec![], body_turns: vec![] }
+            Singularities {
+                stall: None,
+                end: None,
+                searched_until: limit,
+                head_turns: vec![],
+                body_turns: vec![],
+                tail_turns: vec![],
+            }
         } else {
             Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, progress))
         };
@@ -212,8 +226,8 @@ impl Trial {
     }
 
     fn advancement(&self) -> ConservativeAdvancement<'_> {
-        let Singularities { head_turns, body_turns, .. } = &self.singularities;
-        ConservativeAdvancement::new(&self.path, &self.team, head_turns, body_turns)
+        let Singularities { head_turns, body_turns, tail_turns, .. } = &self.singularities;
+        ConservativeAdvancement::new(&self.path, &self.team, head_turns, body_turns).with_tail_turns(tail_turns)
     }
 
     fn locks(&self) -> bool {

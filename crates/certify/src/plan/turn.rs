@@ -159,7 +159,7 @@ pub fn least_turn<'a>(
         let upper = value_lo + further * WIDTH;
         let passage = |asked: Spaced<'_>| Passage::new(asked, (pitch, family.arc_ratio), upper);
         // The first benches fail as soon as the whole team does, at less cost.
-        let few = Team { benches: team.benches.min(FEW), ..*team };
+        let few = team.foremost(FEW);
         let few = Spaced { team: &few, clearance };
         if !passage(few).is_some_and(|passage| passage.is_free(few, closely, &mut |_| ask())) {
             continue;

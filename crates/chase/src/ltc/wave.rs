@@ -1,4 +1,4 @@
-//! Sound as `arecord`, `ffmpeg` and files have it: RIFF WAVE. In: a stream of bytes. Out: samples of the first channel.
+//! Sound as `arecord`, `ffmpeg` and files have it: RIFF WAVE. In: a stream of bytes. Out: samples of each channel.
 //!
 //! A program that records into a pipe does not know the length of its sound, and writes 0 or the greatest number
 //! instead. So the samples continue to the end of the stream, whatever length is stated.
@@ -7,6 +7,8 @@ use std::io::{self, ErrorKind, Read};
 
 /// The most bytes of a chunk before the samples.
 const MOST_CHUNK_BYTES: u32 = 1 << 20;
+/// The bytes before the samples in a sound that is written.
+pub const HEADER_BYTES: usize = 44;
 const PCM: u16 = 1;
 const FLOAT: u16 = 3;
 const EXTENSIBLE: u16 = 0xfffe;
@@ -82,9 +84,15 @@ impl Format {
         is_valid.then_some(Self { sample_rate, block_bytes, sample_bytes, is_float: kind == FLOAT })
     }
 
-    /// Returns the first channel's sample of a block: -1 to 1, or -4 to 4 for floats.
-    pub fn sample(&self, block: &[u8]) -> f32 {
-        let sample = block.get(..self.sample_bytes).unwrap_or_default();
+    /// Returns the number of channels.
+    pub fn channels(&self) -> usize {
+        self.block_bytes / self.sample_bytes
+    }
+
+    /// Returns the sample of a channel, counted from 0, in a block: -1 to 1, or -4 to 4 for floats.
+    pub fn sample(&self, block: &[u8], channel: usize) -> f32 {
+        let begin = channel * self.sample_bytes;
+        let sample = block.get(begin..begin + self.sample_bytes).unwrap_or_default();
         match *sample {
             [byte] => (f32::from(byte) - 128.0) / 128.0,
             [a, b] => f32::from(i16::from_le_bytes([a, b])) / 32_768.0,
@@ -97,6 +105,35 @@ impl Format {
             _ => 0.0,
         }
     }
+}
+
+/// Returns the bytes of a sample from -1 to 1 in 16 bits.
+pub fn sample_bytes(value: f64) -> [u8; 2] {
+    ((value * 32_767.0).round() as i16).to_le_bytes()
+}
+
+/// Returns the header of a sound of one channel in 16 bits, with `sound_bytes` bytes of samples. The greatest number
+/// stands for a length that is not known.
+pub fn header(sample_rate: u32, sound_bytes: u32) -> [u8; HEADER_BYTES] {
+    let mut header = [0; HEADER_BYTES];
+    let mut rest = &mut header[..];
+    let mut put = |bytes: &[u8]| {
+        let (begin, end) = std::mem::take(&mut rest).split_at_mut(bytes.len());
+        begin.copy_from_slice(bytes);
+        rest = end;
+    };
+    put(b"RIFF");
+    put(&sound_bytes.saturating_add(HEADER_BYTES as u32 - 8).to_le_bytes());
+    put(b"WAVEfmt ");
+    put(&16u32.to_le_bytes());
+    // The form, the channels.
+    [PCM, 1].iter().for_each(|number| put(&number.to_le_bytes()));
+    [sample_rate, 2 * sample_rate].iter().for_each(|number| put(&number.to_le_bytes()));
+    // The bytes of a block, the bits of a sample.
+    [2u16, 16].iter().for_each(|number| put(&number.to_le_bytes()));
+    put(b"data");
+    put(&sound_bytes.to_le_bytes());
+    header
 }
 
 fn fill(stream: &mut impl Read, bytes: &mut [u8]) -> Result<(), WaveError> {
@@ -131,7 +168,9 @@ mod tests {
         ] {
             let format = Format::read(&mut &header(kind, 2, 48_000, bits)[..]).unwrap();
             assert_eq!((format.sample_rate, format.block_bytes), (48_000, usize::from(bits / 4)));
-            assert_eq!(format.sample(&sample), value, "{bits} bits");
+            assert_eq!(format.sample(&sample, 0), value, "{bits} bits");
+            let second = [vec![0; sample.len()], sample].concat();
+            assert_eq!((format.channels(), format.sample(&second, 1)), (2, value), "{bits} bits");
         }
     }
 

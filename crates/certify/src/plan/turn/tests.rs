@@ -4,9 +4,10 @@
 use super::{LeastTurn, least_turn};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::unreported;
-use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::model::team::{Ends, Team};
 
-const TEAM: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+const TEAM: Team =
+    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 const PITCH: f64 = 1.7;
 const A: f64 = PITCH / std::f64::consts::TAU;
 
@@ -68,7 +69,7 @@ fn a_long_head_has_a_least_turn() {
 fn the_least_turns_of_small_pitches_are_those_of_another_search() {
     let (head_length, body_length) = (2.858_797_812_609_963_4, 1.129_623_834_955_691_3);
     let (width, hole_inset) = (0.709_611_512_447_701_9, 0.100_144_665_101_351_5);
-    let team = Team { benches: 3, head_length, body_length, width, hole_inset };
+    let team = Team { benches: 3, head_length, body_length, width, hole_inset, ends: Ends::NONE };
     let pitch = 0.118_065_039_656_572_54;
     let found = least_with(&team, pitch, Some(1.765_681_679_243_429_8));
     encloses_with(&found, pitch, 3.676_184_759_284, 2e-12);

@@ -313,7 +313,8 @@ const ROUGHLY: f64 = 4.0;
 
 /// Makes the table for `team` on `path`; `None` if there is none, or it would be too large. On a path of many junctions
 /// it covers as much of the beginning as its limit allows.
-pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<Rows> {
+/// `all_centres`: the places of the pieces' centres are for frames, too, in every row.
+pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance, all_centres: bool) -> Option<Rows> {
     let junctions = |reach: f64| track.path.junctions().take_while(|at| *at <= reach).count();
     // Each junction cuts all rows.
     let bytes = |reach: f64| {
@@ -323,17 +324,17 @@ pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<R
     let mut reach = longest_reach(track, team);
     while junctions(reach) > MANY_JUNCTIONS {
         if bytes(reach) < ROUGHLY * MOST_BYTES as f64
-            && let Some(rows) = rows_up_to(track, team, tolerance, reach)
+            && let Some(rows) = rows_up_to(track, team, tolerance, all_centres, reach)
         {
             return Some(rows);
         }
         reach *= 0.5;
     }
-    rows_up_to(track, team, tolerance, reach)
+    rows_up_to(track, team, tolerance, all_centres, reach)
 }
 
 /// Makes the table for the first `reach` metres of the head's travel.
-fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, reach: f64) -> Option<Rows> {
+fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, all_centres: bool, reach: f64) -> Option<Rows> {
     let beginning = Beginning::new(track, team)?;
     let link = team.link(1);
     let foremost = foremost(track, team, reach)?;
@@ -377,7 +378,7 @@ fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, reach: f64) -> O
             lengths,
             end_row,
             needed: end - steps - 2,
-            with_centres: first_row <= end - behind_second,
+            with_centres: all_centres || first_row <= end - behind_second,
             budget: MOST_BYTES.saturating_sub(table.memory_bytes()),
         };
         let mut made = builder.nothing(table.valid_from);
