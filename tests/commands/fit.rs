@@ -28,7 +28,7 @@ fn a_lane_is_walked_in_its_middle_and_only_that_number_changes() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, fitted) = (lane(folder.path()), folder.path().join("fitted.toml"));
     let fitted = fitted.to_str().unwrap();
-    let arguments = ["plan", "fit", &scene, "--vary", "path.start[1]=-5..9", "--json", "-o", fitted];
+    let arguments = ["plan", "fit", &scene, "--vary", "path.start[1]=0.5..3.6", "--json", "-o", fitted];
     let output = run(&arguments);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let line = json_lines(&output).pop().unwrap();
@@ -56,7 +56,7 @@ fn a_lane_is_walked_in_its_middle_and_only_that_number_changes() {
 fn what_cannot_fit_is_said_with_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let scene = lane(folder.path());
-    let output = run(&["plan", "fit", &scene, "--vary", "path.start[1]=-5..0.6"]);
+    let output = run(&["plan", "fit", &scene, "--vary", "path.start[1]=0.1..0.6"]);
     let (printed, said) = (text(&output.stdout), text(&output.stderr));
     assert_eq!(output.status.code(), Some(1), "{printed}{said}");
     assert!(printed.contains("path.start[1] = 0.6") && printed.contains("and the south at "), "{printed}");
