@@ -5,6 +5,7 @@ use crate::elementary::pi;
 use crate::interval::Interval;
 use crate::spaced::Spaced;
 use crate::step::link_of;
+use bench_dragon_motion::model::team::Ends;
 
 /// Limit of doublings of the longest link or the radius, the greater of the two, to find a radius for which
 /// the lemma holds.
@@ -52,8 +53,8 @@ fn holds(asked: Spaced<'_>, pitch: f64, radius: f64) -> bool {
     let half = Interval::point(clearance) * 0.5;
     let shapes = team.kinds().map(|bench| Shape::new(team, bench));
     let inset = shapes[1].inset + half;
-    let [of_head, of_body, of_tail] = shapes.map(|shape| shape.half_width);
-    let half_width = of_head.max(of_body).max(of_tail) + half;
+    let [of_head, of_body, of_tail] = shapes.map(|shape| shape.half_width + half);
+    let half_width = of_head.max(of_body).max(of_tail);
     // 1. Boards less than a turn apart.
     let growth = |link: Interval| a * pi() * link.over(r * 3.0);
     let lean = |link: Interval| {

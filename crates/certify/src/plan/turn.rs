@@ -14,7 +14,6 @@ use crate::spaced::Spaced;
 use crate::turn::{Passage, Turns};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Progress;
-use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
 /// The least radius of a turnaround with which a team turns round. The head comes in from any distance, and until the

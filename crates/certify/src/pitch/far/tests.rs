@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 use super::{holds, least_radius};
+use crate::spaced::Spaced;
 use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::path::Path;
