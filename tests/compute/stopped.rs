@@ -165,6 +165,8 @@ fn plans_enclose_no_more_than_they_have_proved() {
             },
         );
     }
+    // One step suffices for the paper's scene.
+    let scene = SceneText::load(Path::new("config/turnaround.toml")).unwrap().parse().unwrap();
     let timeline = scene.ensemble.timeline(&mut unreported);
     stopped(
         |progress| greatest_speed(&scene, &timeline, 2.0, progress).unwrap(),

@@ -53,8 +53,12 @@ pub const LOOKED_UP: &[Line] =
     &[("cargo test", "a test, which tests/run runs"), ("cargo bench", "measures for minutes")];
 
 /// Commands that are run if these programs are installed.
-pub const NEEDS: &[Line] =
-    &[("curl", "curl promtool"), ("ffmpeg", "ffmpeg rsvg-convert"), ("for svg in", "rsvg-convert")];
+pub const NEEDS: &[Line] = &[
+    ("bench-dragon send timecode ltc - | aplay", "aplay"),
+    ("curl", "curl promtool"),
+    ("ffmpeg", "ffmpeg rsvg-convert"),
+    ("for svg in", "rsvg-convert"),
+];
 
 /// Commands that are run with `BENCH_DRAGON_LONG=1`.
 pub const LONG: &[Line] = &[
