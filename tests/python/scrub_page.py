@@ -17,21 +17,14 @@ import time
 import numpy as np
 
 from chromium import be_patient, browser as chromium
+from show_process import ShowProcess
 
 # No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 550
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
-
-
-@contextlib.contextmanager
-def started(*arguments):
-    child = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdout=subprocess.PIPE, text=True)
-    try:
-        yield child
-    finally:
-        child.kill()
-        child.wait()
+SHOW = ShowProcess(PROGRAM, NAME)
+started, state, until = SHOW.started, SHOW.state, SHOW.until
 
 
 @contextlib.contextmanager
@@ -40,21 +33,6 @@ def served(*arguments, control=()):
         until(state, "a publisher")
         with started("view", "--json", "--port", "0", *control) as server:
             yield json.loads(server.stdout.readline())["url"]
-
-
-def state():
-    """Returns the state of the show, or None if no publisher runs."""
-    asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
-    return json.loads(asked.stdout) if asked.returncode == 0 else None
-
-
-def until(condition, what, seconds=120):
-    """Returns the value of a condition as soon as it is true."""
-    deadline = time.monotonic() + seconds
-    while not (value := condition()):
-        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
-        time.sleep(0.05)
-    return value
 
 
 def opened(browser, url, complaints):
@@ -195,7 +173,8 @@ def address_and_keys():
         # An audience sees the live show.
         for look in ("show", "seat"):
             page = opened(browser, url + f"#{look}&at=300", complaints)
-            time.sleep(0.5)
+            passed = page.evaluate("picture.passes")
+            until(lambda: page.evaluate("picture.passes") >= passed + 3, "passes of the page")
             assert shown(page) is None and not page.is_visible("#scrubbed") and not page.is_visible("#scrub"), look
             page.close()
         assert not complaints, complaints
