@@ -20,9 +20,13 @@ const PAPER: Team =
 
 /// A scene of the paper's benches. With 40 of them, those that come nearest are the same as with 223.
 fn coil(rest: &str) -> tempfile::NamedTempFile {
-    written(&format!(
-        "[team]\nbenches = 40\n[path]\nkind = \"spiral\"\npitch = 0.55\nstart_turn = 16\n[motion]\nhead_speed = 1.0\n{rest}"
-    ))
+    team_of_40("", rest)
+}
+
+/// A scene of 40 benches with sizes of their own.
+fn team_of_40(sizes: &str, rest: &str) -> tempfile::NamedTempFile {
+    let spiral = "[path]\nkind = \"spiral\"\npitch = 0.55\nstart_turn = 16\n[motion]\nhead_speed = 1.0\n";
+    written(&format!("[team]\nbenches = 40\n{sizes}\n{spiral}{rest}"))
 }
 
 fn written(scene: &str) -> tempfile::NamedTempFile {
@@ -69,6 +73,29 @@ fn the_least_pitch_with_a_clearance_is_that_of_another_search() {
     let (_, said) = run(&required, &REACH);
     let said = text(&said.stdout);
     assert!(said.contains("come as near as 0.2 m before") && said.contains("are nearer than 0.2 m"), "{said}");
+}
+
+/// The expected pitches are of a search as that for [`PITCH`], which finds the two benches by a scan of all pairs.
+#[test]
+fn other_teams_have_the_pitch_of_another_search() {
+    // The sizes of the boards; the radius and the clearance; the pitch and its two benches.
+    let paper = "head_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275";
+    let wide_head = &format!("{paper}\nhead_width = 0.9");
+    let short = "head_length = 1.2\nbody_length = 1.5\nwidth = 0.4\nhole_inset = 0.1";
+    let cases = [
+        (paper, ["3.2", "0.35"], 0.839_706_841_505_223, [0, 15]),
+        // The second bench decides, not the head, which is shorter.
+        (short, ["2.6", "0.05"], 0.533_671_033_585_999_9, [1, 16]),
+        // The place where the radius is reached decides.
+        (paper, ["6", "0.5"], 0.912_837_810_386_087_6, [0, 23]),
+        (wide_head, ["4.5", "0.2"], 0.926_079_753_137_608_7, [0, 18]),
+    ];
+    for (sizes, [radius, clearance], pitch, benches) in cases {
+        let line =
+            planned(&team_of_40(sizes, ""), &["plan", "pitch", "--reach-radius", radius, "--clearance", clearance]);
+        encloses(&line, pitch, 1e-15);
+        assert_eq!([&line["bench_a"], &line["bench_b"]], benches, "{line}");
+    }
 }
 
 /// The lines of a certificate, each changed by a function.
