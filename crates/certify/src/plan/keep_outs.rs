@@ -3,8 +3,7 @@
 //! In: a motion on a stage, and the answer for its boards alone. Out: the least number from there on that the search
 //! finds, with which boards are proved to stay outside all keep-outs. The scene's path is used from its start.
 
-use std::cell::Cell;
-use std::ops::ControlFlow;
+use std::cell::RefCell;
 
 use super::trial::obstacle;
 use super::turn_trial::Family;
@@ -149,8 +148,9 @@ impl OnStage<'_> {
             Planned::Turn { arc_ratio } => {
                 let Some(pitch) = self.motion.description().pitch() else { return true };
                 let Spaced { team, clearance } = self.asked;
-                let (ask, work) = (|| ControlFlow::Continue(()), Cell::new(0));
-                Family { team, clearance, pitch, arc_ratio, ask: &ask, work: &work }.event(value).is_some()
+                let progress = RefCell::new(progress);
+                let ask = |_| progress.borrow_mut()(0.0);
+                Family { team, clearance, pitch, arc_ratio, ask: &ask }.event(value).is_some()
             }
         }
     }

@@ -72,13 +72,14 @@ const FEW: usize = 4;
 /// Limit of intervals of radii.
 const MOST_INTERVALS: u64 = 200_000;
 
-/// Limits of work, in all and for the ratio. A unit is about a millisecond: a step of the head, or as many links as a
-/// search solves before it asks whether it is to stop.
-const MOST_WORK: u64 = 40_000;
-const MOST_WORK_ON_RATIO: u64 = 15_000;
+/// Limits of work, in all and for the ratio, in microseconds on a usual machine.
+const MOST_WORK: u64 = 40_000_000;
+const MOST_WORK_ON_RATIO: u64 = 15_000_000;
 
-/// The benches for which a step of the head is another unit of work.
-const BENCHES_PER_UNIT: usize = 50;
+/// Work on an interval of radii or on a step of the head, and for each bench of a step of the whole team, in
+/// microseconds.
+const STEP_WORK: u64 = 1_000;
+const BENCH_WORK: u64 = 20;
 
 /// The length of an interval in metres, at least and at first; the factors after an interval that is shown and one that
 /// is not.
@@ -114,13 +115,13 @@ pub fn least_turn<'a>(
     }
     let (share, progress) = (Cell::new(0.0_f64), RefCell::new(progress));
     let (work, most) = (Cell::new(0_u64), Cell::new(MOST_WORK_ON_RATIO));
-    let ask = || {
-        work.set(work.get() + 1);
+    let ask = |microseconds| {
+        work.set(work.get() + microseconds);
         let of_work = work.get() as f64 / MOST_WORK as f64;
         let go_on = progress.borrow_mut()(share.get().max(of_work.min(1.0)));
         if work.get() > most.get() { ControlFlow::Break(()) } else { go_on }
     };
-    let family = Family { team, clearance, pitch, arc_ratio: arc_ratio.unwrap_or(1.0), ask: &ask, work: &work };
+    let family = Family { team, clearance, pitch, arc_ratio: arc_ratio.unwrap_or(1.0), ask: &ask };
     let family = if arc_ratio.is_none() { best(family) } else { family };
     most.set(MOST_WORK);
     let from = Accepted::LENGTH.least;
@@ -136,7 +137,7 @@ pub fn least_turn<'a>(
     let mut blocked = Blocked { family, radius: from, witness, intervals: 0, shown: None };
     blocked.extend(&mut |done| {
         share.set(0.5 * done);
-        ask()
+        ask(STEP_WORK)
     });
     let Blocked { radius: value_lo, intervals, shown, .. } = blocked;
     let upper = value_lo + WIDTH;
@@ -151,8 +152,7 @@ pub fn least_turn<'a>(
     let closely = shown.is_some_and(|witness| matches!(witness, Witness::Overlap { .. }));
     let mut of_passage = |done| {
         share.set(0.5 + 0.5 * done);
-        family.spend((team.benches / BENCHES_PER_UNIT) as u64);
-        ask()
+        ask(STEP_WORK + BENCH_WORK * team.benches as u64)
     };
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
@@ -160,7 +160,7 @@ pub fn least_turn<'a>(
         // The first benches fail as soon as the whole team does, at less cost.
         let few = team.foremost(FEW);
         let few = Spaced { team: &few, clearance };
-        if !passage(few).is_some_and(|passage| passage.is_free(few, closely, &mut |_| ask())) {
+        if !passage(few).is_some_and(|passage| passage.is_free(few, closely, &mut |_| ask(STEP_WORK))) {
             continue;
         }
         let Some(passage) = passage(asked) else { break };
