@@ -171,7 +171,7 @@ fn a_route_of_thousands_of_bends_has_a_table_for_its_beginning() {
     let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
     let mut table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed).unwrap();
     let end = table.valid_until();
-    assert!(end > 300.0 && end < 0.9 * path.length() && table.memory_bytes() < 200 << 20, "{end}");
+    assert!(end > 200.0 && end < 0.9 * path.length() && table.memory_bytes() < 200 << 20, "{end}");
     let (mut found, mut wanted) = (Chain::new(TEAM.handles()), Chain::new(TEAM.handles()));
     for k in 0..=100 {
         let time = end * f64::from(k) / 100.0;
