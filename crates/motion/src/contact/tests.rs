@@ -241,6 +241,19 @@ proptest! {
     fn sampling_a_tight_route_shows_nothing_better(team in any_team(), path in any_route()) {
         check(&path, &team, SAMPLES)?;
     }
+
+    #[test]
+    fn a_tail_as_wide_as_the_body_changes_nothing(team in any_team(), path in any_route()) {
+        let plain = Team { ends: Ends::NONE, ..team };
+        let with_tail = Team { ends: Ends { tail_width: Some(team.width), ..Ends::NONE }, ..team };
+        let [(contact, least, end), (other_contact, other_least, other_end)] =
+            [plain, with_tail].map(|team| search(&path, &team, None));
+        prop_assert_eq!(end, other_end);
+        let travels = [contact, other_contact].map(|contact| contact.map_or(f64::MAX, |event| event.travelled));
+        prop_assert!((travels[0] - travels[1]).abs() < 1e-9, "{:?}", travels);
+        let values = [least, other_least].map(|least| least.map_or(f64::MAX, |least| least.value));
+        prop_assert!((values[0] - values[1]).abs() < 1e-9, "{:?}", values);
+    }
 }
 
 const CASES: u32 = 24;
