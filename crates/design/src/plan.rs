@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use crate::edit;
 use crate::request::Setting;
 use crate::scene::DesignedScene;
-use bench_dragon_certify::plan::{greatest_speed, least_pitch, least_turn};
+use bench_dragon_certify::plan::{Spaced, greatest_speed, least_pitch, least_turn};
 use bench_dragon_certify::{CertifiedEvent, MOST_STEPS, Status, certify};
 use bench_dragon_fit::search::{Vary, fit};
 use bench_dragon_motion::Motion;
@@ -115,6 +115,16 @@ fn without_obstacles(scene: &DesignedScene) -> &'static str {
     if is_empty { "" } else { " Obstacles are left out: the plan is about boards alone." }
 }
 
+/// Returns the clearance that the scene requires of boards, in metres.
+fn required(scene: &DesignedScene) -> f64 {
+    scene.scene.require.and_then(|require| require.clearance).unwrap_or(0.0)
+}
+
+/// Returns the words for boards that keep a clearance.
+fn apart(clearance: f64) -> String {
+    if clearance > 0.0 { format!("all boards keep more than {clearance} m") } else { "no two boards touch".to_owned() }
+}
+
 /// Plans the pitch with which the head comes as near to the centre as it does now.
 fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Result<Planned, String> {
     let radius = match motion.description() {
@@ -130,12 +140,15 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
             );
         }
     };
-    let found = least_pitch(motion.team(), radius, progress).map_err(|error| error.to_string())?;
+    let clearance = required(scene);
+    let asked = Spaced { team: motion.team(), clearance };
+    let found = least_pitch(asked, radius, progress).map_err(|error| error.to_string())?;
     let sentence = match found.value_hi {
         Some(pitch) => format!(
-            "With a pitch of {} m the head comes to {} m from the centre, and no two boards touch before.{}",
+            "With a pitch of {} m the head comes to {} m from the centre, and {} before.{}",
             figure(pitch),
             figure(radius),
+            apart(clearance),
             without_obstacles(scene)
         ),
         None => "No pitch was found.".to_owned(),
@@ -160,11 +173,14 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
     let PathDescription::Turnaround { pitch, arc_ratio, .. } = *motion.description() else {
         return Err("the least turn is for a path of kind \"turnaround\"".to_owned());
     };
-    let found = least_turn(motion.team(), pitch, Some(arc_ratio), progress).map_err(|error| error.to_string())?;
+    let clearance = required(scene);
+    let asked = Spaced { team: motion.team(), clearance };
+    let found = least_turn(asked, pitch, Some(arc_ratio), progress).map_err(|error| error.to_string())?;
     let sentence = match (found.value, found.length) {
         (Some(radius), Some(length)) => format!(
-            "With a turn radius of {} m the team turns round on this pitch: the S is {} m long.{}",
+            "With a turn radius of {} m the team turns round on this pitch, and {}: the S is {} m long.{}",
             figure(radius),
+            apart(clearance),
             figure(length),
             without_obstacles(scene)
         ),
@@ -221,7 +237,7 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
     }
     let text = SceneText { text: scene.text.clone(), file: "scene".to_owned(), stem: "scene".to_owned() };
     let vary: Vec<Vary> = vary.iter().map(|field| Vary { field: field.clone(), range: None }).collect();
-    let clearance = scene.scene.require.and_then(|require| require.clearance).unwrap_or(0.0);
+    let clearance = required(scene);
     let found = fit(&text, &vary, clearance, 1, &mut |share, _| progress(share)).map_err(|error| error.to_string())?;
     let margin = found.judgement.margin();
     let sentence = match found.is_found() {
@@ -283,4 +299,27 @@ fn proved_line(event: &CertifiedEvent) -> Value {
         }
     };
     json!({"event": name, "time_lo": lo, "time_hi": hi, "sentence": sentence.replace('_', " ")})
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_dragon_motion::event::unreported;
+
+    #[test]
+    fn the_least_pitch_keeps_the_clearance_that_is_required() {
+        let planned = |rest: &str| {
+            let path = "[path]\nkind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2.0";
+            let text = format!("[team]\nbenches = 40\n{path}\nlead_in = 40\n[motion]\nhead_speed = 1.0\n{rest}");
+            let scene = DesignedScene::read(&text, "scene").unwrap();
+            plan(("pitch", &[]), &scene, &mut unreported).unwrap().answer
+        };
+        // The pitches are those of `tests/commands/margin.rs`.
+        for (rest, pitch) in [("", 0.450_337_393), ("[require]\nclearance = 0.2\n", 0.650_013_396_5)] {
+            let value = planned(rest)["value"].as_f64().unwrap();
+            assert!((value - pitch).abs() < 2e-9, "{value}");
+        }
+        let sentence = planned("[require]\nclearance = 0.2\n")["sentence"].to_string();
+        assert!(sentence.contains("all boards keep more than 0.2 m before"), "{sentence}");
+    }
 }

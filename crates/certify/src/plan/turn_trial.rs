@@ -30,10 +30,11 @@ const TRIAL_BUDGET: u64 = 20_000_000;
 /// The coordinate of a pivot just behind a junction, in radians.
 const BESIDE_JUNCTION: f64 = 1e-13;
 
-/// Work between two calls of a search for folds, and for a pivot, in microseconds. A step of a search for boards takes
-/// about one for each bench.
+/// Work between two calls of a search for folds, for a pivot, and for each bench between two calls of a search for
+/// boards, in microseconds.
 const FOLD_WORK: u64 = 1_000;
 const PIVOT_WORK: u64 = 3_000;
+const BOARD_WORK: u64 = 2;
 
 /// The distances from an event, in links, within which a pivot is searched for. For each distance, a number of offsets
 /// is tried. A pivot keeps a share of a fold's depth off the ends of the S.
@@ -261,7 +262,7 @@ impl Family<'_> {
         let lead_in = self.spiral_between(radius, outer);
         let path = self.path_between(radius, lead_in, team.length())?;
         let advancement = ConservativeAdvancement::new(&path, team, &[], &[]);
-        let mut ask = |_| (self.ask)(self.team.benches as u64);
+        let mut ask = |_| (self.ask)(BOARD_WORK * self.team.benches as u64);
         let mut budget = Budget::new(TRIAL_BUDGET, &mut ask);
         let least = advancement.least_clearance(0.0, path.length(), &mut budget).ok()?.value?;
         let head = self.event_place(radius, path.param_at(least.travelled));
@@ -305,7 +306,7 @@ impl Family<'_> {
         let at = (lead_in + past).clamp(0.0, path.length());
         let parts = [((at - window).max(0.0), at), (at, (at + window).min(path.length()))];
         let pairs = pairs.iter().filter(|pair| (pair.1 as usize) < self.team.benches);
-        let mut ask = |_| (self.ask)(self.team.benches as u64);
+        let mut ask = |_| (self.ask)(BOARD_WORK * self.team.benches as u64);
         let mut budget = Budget::new(u64::MAX, &mut ask);
         let parts = pairs.flat_map(|pair| parts.map(|part| (*pair, part)));
         let found = parts.map(|(pair, part)| (pair, advancement.minimum_of(pair, part, &mut budget)));
