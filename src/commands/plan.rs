@@ -118,7 +118,7 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let (scene, motion) = text.parse_only()?;
-    warn_of_obstacles(&scene);
+    warn_of_omissions(&scene, "its route", "the boards of its team on an inward spiral");
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let mut progress = |share| report(&bar, share);
     let found = if let Some(file) = file {
@@ -230,10 +230,14 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
     output.finish().and(unstopped())
 }
 
-/// Warns that the obstacles of a scene change nothing.
-fn warn_of_obstacles(scene: &Scene) {
-    if !scene.ensemble.ground().is_empty() {
-        log::warn!("the plan leaves out the obstacles of the scene: it is about boards alone");
+/// Warns of what changes nothing: the obstacles of a scene, and what a plan leaves out of a route.
+fn warn_of_omissions(scene: &Scene, of_route: &str, about: &str) {
+    let has_obstacles = !scene.ensemble.ground().is_empty();
+    let is_route = scene.ensemble.dragons().iter().any(|dragon| dragon.motion.description().pitch().is_none());
+    let omitted = [has_obstacles.then_some("the obstacles of the scene"), is_route.then_some(of_route)];
+    let omitted: Vec<&str> = omitted.into_iter().flatten().collect();
+    if !omitted.is_empty() {
+        log::warn!("the plan leaves out {}: it is about {about}", omitted.join(" and "));
     }
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::super::events::bench_name;
 use super::super::signals::{report, unstopped};
 use super::super::{CommandError, Common, Output, progress_bar};
-use super::{given_up, status, warn_of_obstacles};
+use super::{given_up, status, warn_of_omissions};
 
 /// The line of `plan turn --json`.
 #[derive(Serialize)]
@@ -31,7 +31,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
     let (scene, motion) = common.scene_text()?.parse_only()?;
-    warn_of_obstacles(&scene);
+    warn_of_omissions(&scene, "the rest of the route", "boards on an S between two spirals that are long enough");
     let description = motion.description();
     let Some(pitch) = description.pitch().or_else(|| description.pitch_of_turn()) else {
         let sentence = "the scene's path is a route without a turn, or with several: expected path.kind \"spiral\" or \
