@@ -1,10 +1,11 @@
 //! The subcommands, one file each: arguments to calls of the library.
 
-/// Replaces the standard library's, which panics if standard error is closed.
+/// Replaces the standard library's, which panics if standard error is closed. Long lines are folded.
 macro_rules! eprintln {
     ($($text:tt)*) => {{
         use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), $($text)*);
+        let text = $crate::commands::folded::folded(&format!($($text)*), $crate::commands::folded::COLUMNS);
+        let _ = writeln!(std::io::stderr(), "{text}");
     }};
 }
 
@@ -17,6 +18,7 @@ pub mod design;
 pub mod draw;
 mod duration;
 pub mod events;
+pub mod folded;
 mod lines;
 pub mod list;
 mod log_lines;

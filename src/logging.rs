@@ -1,6 +1,9 @@
 //! The program's log: lines on standard error and, with ROS 2, on `/rosout`.
 
+use std::io::{IsTerminal, Write};
+
 use super::commands::Common;
+use super::commands::folded::{COLUMNS, folded};
 
 /// Writes each record that the level admits to standard error, and queues it for `/rosout`.
 struct ProgramLogger(env_logger::Logger);
@@ -39,11 +42,18 @@ pub fn set_up(common: &Common) {
     });
     // RustDDS and ros2-client log every large message and every end, which is of no use to a user.
     let of_dds = if common.verbose > 1 { log::LevelFilter::Warn } else { log::LevelFilter::Off };
-    let logger = env_logger::Builder::new()
-        .filter_level(level)
-        .filter_module("rustdds", of_dds)
-        .filter_module("ros2_client", of_dds)
-        .build();
+    let mut builder = env_logger::Builder::new();
+    builder.filter_level(level).filter_module("rustdds", of_dds).filter_module("ros2_client", of_dds);
+    if std::io::stderr().is_terminal() {
+        // A file or a journal keeps a line for each record.
+        builder.format(|out, record| {
+            let (level, style) = (record.level(), out.default_level_style(record.level()));
+            let (time, target, text) = (out.timestamp(), record.target(), record.args());
+            let line = format!("[{time} {style}{level:<5}{style:#} {target}] {text}");
+            writeln!(out, "{}", folded(&line, COLUMNS))
+        });
+    }
+    let logger = builder.build();
     log::set_max_level(logger.filter());
     // Fails for a second logger of a process, which this program never sets.
     let _ = log::set_boxed_logger(Box::new(ProgramLogger(logger)));

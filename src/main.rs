@@ -6,10 +6,12 @@
 mod commands;
 mod logging;
 
+use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
 
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use commands::folded::{COLUMNS, folded};
 pub use commands::ros_args;
 use commands::scene_argument::{self, scene_argument};
 use commands::{CommandError, Common, argument_errors};
@@ -164,16 +166,22 @@ fn exit_code(done: Result<(), CommandError>) -> ExitCode {
     match done {
         Ok(()) | Err(CommandError::ClosedPipe) => ExitCode::SUCCESS,
         Err(CommandError::BadInput(sentence)) => {
-            eprintln!("{}: {sentence}", error_label());
+            print_error(&sentence);
             ExitCode::from(2)
         }
         Err(CommandError::Failed(sentence)) => {
-            eprintln!("{}: {sentence}", error_label());
+            print_error(&sentence);
             ExitCode::FAILURE
         }
     }
 }
 
-fn error_label() -> &'static str {
-    if commands::shows_colour(&std::io::stderr()) { "\x1b[1;31merror\x1b[0m" } else { "error" }
+/// Prints an error: folded for a terminal, a line for programs and journals.
+fn print_error(sentence: &str) {
+    let mut stderr = io::stderr();
+    let label = if commands::shows_colour(&stderr) { "\x1b[1;31merror\x1b[0m" } else { "error" };
+    let line = format!("{label}: {sentence}");
+    let line = if stderr.is_terminal() { folded(&line, COLUMNS) } else { line };
+    // Nobody reads a closed standard error.
+    let _ = writeln!(stderr, "{line}");
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
-use bench_dragon::motion::ground::Obstacle;
+use bench_dragon::motion::ground::{BOUNDARY, Obstacle};
 use bench_dragon::motion::timeline::{TimedObstacleClearance, Timeline};
 use bench_dragon::show::requirements::{Bounds, Searched, verdicts};
 use bench_dragon::show::results::{clearance_lines, event_sentence};
@@ -172,7 +172,7 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
     let (at, bench) = (figure(time), bench_name(scene, least.bench));
     let up_to = searched_until
         .map_or(String::new(), |until| format!(" up to t = {} s, where the search {}", figure(until), gave_up()));
-    let distance = figure(least.value + keep_out);
+    let distance = least.value + keep_out;
     let beyond = match (*keep_out > 0.0, least.value < 0.0) {
         (false, _) => String::new(),
         (true, false) => format!(", {} m beyond the keep-out of {keep_out} m", figure(least.value)),
@@ -187,8 +187,14 @@ fn obstacle_sentence(scene: &Scene, timeline: &Timeline, found: &TimedObstacleCl
             printable(name)
         );
     }
+    let what = match distance < 0.0 {
+        false => "The least distance from",
+        true if name == BOUNDARY => "The greatest distance outside",
+        true => "The greatest overlap with",
+    };
+    let distance = figure(distance.abs());
     format!(
-        "The least distance from the {}{up_to} is {distance} m{beyond}, at t = {at} s, with {bench} (counting from 1).{first}",
+        "{what} the {}{up_to} is {distance} m{beyond}, at t = {at} s, with {bench} (counting from 1).{first}",
         printable(name)
     )
 }

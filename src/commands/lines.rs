@@ -1,7 +1,7 @@
 //! A non-blocking writer for standard error, because a terminal stopped with Ctrl-S, or an unread pipe, can block
 //! without limit.
 
-use std::io::{self, Write};
+use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ impl Lines {
         let (end, written) = channel();
         let write = move || {
             // A closed standard error loses the line.
-            lines.into_iter().for_each(|line| drop(writeln!(io::stderr(), "{line}")));
+            lines.into_iter().for_each(|line| eprintln!("{line}"));
             drop(end);
         };
         std::thread::Builder::new().name("lines".to_owned()).spawn(write)?;

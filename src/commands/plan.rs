@@ -162,6 +162,7 @@ fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Pat
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let (scene, motion) = text.parse_only()?;
+    warn_of_route(&scene, "its route", "the boards of its team on an inward spiral");
     let clearance = spacing.required(&scene)?;
     let asked = Spaced { team: motion.team(), clearance };
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
@@ -284,6 +285,14 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
         )
     })?;
     output.finish().and(unstopped())
+}
+
+/// Warns of what a plan leaves out of a route. `Stage` is about obstacles.
+fn warn_of_route(scene: &Scene, of_route: &str, about: &str) {
+    let is_route = scene.ensemble.dragons().iter().any(|dragon| dragon.motion.description().pitch().is_none());
+    if is_route {
+        log::warn!("the plan leaves out {of_route}: it is about {about}");
+    }
 }
 
 impl From<PlanError> for CommandError {

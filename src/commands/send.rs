@@ -88,7 +88,7 @@ struct OscArguments {
     /// The greatest rate in bundles of frames per second, up to 60; a slower publisher is sent at its own rate
     #[arg(long, value_name = "HZ", default_value_t = f64::from(MOST_RATE), value_parser = rate::<MOST_RATE>)]
     rate: f64,
-    /// Send each message by itself, for receivers that read no bundles
+    /// Send each message by itself in place of bundles, for receivers that read none; both would start a cue twice
     #[arg(long)]
     messages: bool,
     /// A file (TOML) with addresses and arguments of cues, levels and events, which are sent in place of all others

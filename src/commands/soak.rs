@@ -23,6 +23,7 @@ use bench_dragon::soak::report::{LoadAverage, Machine, Report, SCHEMA, Subscribe
 use bench_dragon::soak::verdict::SoakVerdict;
 use indicatif::{FormattedDuration, ProgressBar};
 
+use super::folded::{COLUMNS, folded};
 use super::parent::Parent;
 use super::realtime_scheduling::RealtimeScheduling;
 use super::{CommandError, Common, Output, progress_bar, stop_on_signals, wall_seconds};
@@ -221,7 +222,7 @@ fn print(report: &Report, common: &Common) -> Result<(), CommandError> {
     if common.json {
         output.json(report)?;
     } else {
-        report.lines().iter().try_for_each(|line| output.line(line))?;
+        report.lines().iter().try_for_each(|line| output.line(&folded(line, COLUMNS)))?;
     }
     output.finish()
 }

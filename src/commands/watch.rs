@@ -25,6 +25,7 @@ use bench_dragon::outputs::monitor::{IntervalReport, Latency, Monitor, Presence}
 use keys::{KEY_INTERVAL, KeyOutcome, Keyboard};
 use serde::Serialize;
 
+use super::folded::{self, COLUMNS};
 use super::{CommandError, Common, severity_colour, shows_colour, stop_on_signals, wall_seconds};
 
 /// Arguments of `watch`.
@@ -65,12 +66,6 @@ struct ChaseLine {
 const DISABLE_LINE_WRAP: &str = "\x1b[?7l";
 const ENABLE_LINE_WRAP: &str = "\x1b[?7h";
 const CLEAR_BELOW_CURSOR: &str = "\x1b[J";
-
-/// Column of an alert's words on the terminal: behind its time.
-const INDENT: &str = "              ";
-
-/// The greatest length of a line in a file or a pipe.
-const LINE_COLUMNS: usize = 120;
 
 /// The form of reports and events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -259,15 +254,14 @@ impl Screen<'_> {
     /// Prints a line above the last report.
     fn print_line(&self, line: &str) -> Result<(), CommandError> {
         let mut output = stdout().lock();
-        let filled = |columns| textwrap::fill(line, textwrap::Options::new(columns).subsequent_indent(INDENT));
         if self.display == Display::Lines {
-            writeln!(output, "{}", filled(LINE_COLUMNS))?;
+            writeln!(output, "{}", folded::folded(line, COLUMNS))?;
             return Ok(output.flush()?);
         }
         self.clear_previous(&mut output)?;
         // Some terminals have no known size.
         let columns = rustix::termios::tcgetwinsize(&output).map_or(0, |size| usize::from(size.ws_col));
-        writeln!(output, "{}", filled(if columns == 0 { 80 } else { columns }))?;
+        writeln!(output, "{}", folded::folded(line, if columns == 0 { 80 } else { columns }))?;
         self.draw(&mut output)?;
         Ok(output.flush()?)
     }
@@ -363,13 +357,13 @@ impl Screen<'_> {
     }
 }
 
-/// Returns the parts of a report as lines that are not longer than [`LINE_COLUMNS`] unless a part is; the first of them
+/// Returns the parts of a report as lines that are not longer than [`COLUMNS`] unless a part is; the first of them
 /// is not indented.
 fn folded(parts: &[String]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for part in parts {
         match lines.last_mut() {
-            Some(line) if line.chars().count() + part.chars().count() + 2 <= LINE_COLUMNS => {
+            Some(line) if line.chars().count() + part.chars().count() + 2 <= COLUMNS => {
                 line.push_str("; ");
                 line.push_str(part);
             }

@@ -189,6 +189,12 @@ fn plans_are_those_without_obstacles_that_are_far() {
     assert!(planned.status.success() && planned.stdout == plain.stdout, "{planned:?} {plain:?}");
     assert_eq!(text(&planned.stderr), "", "{planned:?}");
     assert!(run(&staged, &["plan", "speed", "--max-handle-speed=2"]).status.success());
+    let mut square = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    let planned = square.args(["plan", "pitch", "--reach-radius=4.5", "config/square.toml"]).output().unwrap();
+    let warned = text(&planned.stderr);
+    for omission in ["leaves out its route: it is about", "leaves out the obstacles of the scene, whose path is"] {
+        assert!(warned.contains(omission), "{warned}");
+    }
 }
 
 #[test]
@@ -201,7 +207,7 @@ fn a_team_that_starts_within_a_keep_out_meets_it_at_once_with_a_warning() {
     let events = text(&run(&scene, &["events"]).stdout);
     assert!(events.starts_with(" obstacle  t = 0 s: bench "), "{events}");
     assert!(events.contains("is at the lamp from the start"), "{events}");
-    let lamp = printed.lines().find(|line| line.contains("The least distance from the lamp is "));
+    let lamp = printed.lines().find(|line| line.contains("The greatest overlap with the lamp is "));
     assert!(lamp.is_some_and(|line| line.contains(" m inside the keep-out of 1 m, at t = ")), "{printed}");
 }
 

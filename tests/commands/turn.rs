@@ -1,7 +1,7 @@
 //! `plan turn`: a ratio that no formula gives and wide boards against another search, and bad input.
 
 use std::io::Write;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use crate::harness::{all, can_run, json_lines, python, python_modules, text};
 use serde_json::Value;
@@ -71,12 +71,16 @@ fn other_search(ratio_and_team: &[&str], line: usize) -> (f64, String) {
 
 /// Runs the program with a scene, and returns the lines of its JSON.
 fn answers(scene: &str, arguments: &[&str]) -> Vec<Value> {
+    json_lines(&output(scene, arguments))
+}
+
+fn output(scene: &str, arguments: &[&str]) -> Output {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     file.write_all(scene.as_bytes()).unwrap();
     let mut program = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
     let output = program.args(["--json", "--scene"]).arg(file.path()).args(arguments).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    json_lines(&output)
+    output
 }
 
 /// A scene of the paper's benches with one spiral piece inward, a turn, and a spiral outward. `inward` has the rest of
@@ -145,7 +149,12 @@ fn a_turn_in_a_route_is_that_of_a_turnaround() {
 fn a_turn_of_a_route_is_planned_as_that_of_a_turnaround() {
     let turnaround = include_str!("../../config/turnaround.toml").replace("benches = 223", "benches = 12");
     let arguments = ["plan", "turn", "--arc-ratio", "2"];
-    assert_eq!(answers(&coil(12, "to_radius = 5", "left", ""), &arguments), answers(&turnaround, &arguments));
+    let route = coil(12, "to_radius = 5", "left", "");
+    let planned = [&route, &turnaround].map(|scene| output(scene, &arguments));
+    assert_eq!(json_lines(&planned[0]), json_lines(&planned[1]));
+    // The rest of the route is left out, and the plan says so.
+    let warns = planned.map(|of| text(&of.stderr).contains("leaves out the rest of the route: it is about boards on"));
+    assert_eq!(warns, [true, false]);
 }
 
 #[test]

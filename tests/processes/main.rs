@@ -33,3 +33,4 @@ mod timecode;
 mod transports;
 mod tunnel;
 mod watch;
+mod widths;

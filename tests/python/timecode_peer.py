@@ -7,6 +7,8 @@
 Debian's libltc. Prints a JSON line for each label: `label`, `kind` (`running` or `located`), and `late`, the seconds by
 which it came after the moment at which the show was there (null while the show stands). A label of sound has the moment
 of its last sample. The clock of samples is that of the earliest piece of the last second, and begins with 0 in a file.
+A frame of sound that does not begin where the one before it ended is left out: where sound is cut, libltc may join the
+parts of two frames.
 """
 
 import argparse
@@ -138,6 +140,7 @@ def receive_ltc(arguments, output):
     samples, frame, parts = 0, LtcFrame(), Timecode()
     is_file = stat.S_ISREG(os.fstat(0).st_mode)
     began, pieces = 0.0, collections.deque()
+    ended, bit = -rate, rate / output.per_second / 80
     while piece := sys.stdin.buffer.read1(4096):
         moment = time.monotonic()
         assert len(piece) % 2 == 0
@@ -150,6 +153,10 @@ def receive_ltc(arguments, output):
                 pieces.popleft()
             began = min(began for _, began in pieces)
         while libltc.ltc_decoder_read(decoder, ctypes.byref(frame)):
+            is_whole = abs(frame.off_start - ended) < bit / 2
+            ended = frame.off_end + 1
+            if not is_whole:
+                continue
             assert frame.reverse == 0
             assert frame.bits[1] >> 2 & 1 == int(arguments.drop), "the flag of drop frame"
             libltc.ltc_frame_to_time(ctypes.byref(parts), ctypes.byref(frame), 0)

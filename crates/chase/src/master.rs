@@ -48,7 +48,7 @@ pub struct MasterSummary {
     pub sent: u64,
     /// Jumps: starts, seeks, loops.
     pub jumps: u64,
-    /// Milliseconds of sound that the reader did not take in time.
+    /// Milliseconds of sound that were left out, because they were late.
     pub lost_ms: u64,
 }
 

@@ -31,7 +31,7 @@ const LOCKED: f64 = -10.0;
 pub struct Rules {
     /// Between any two boards that share no handle, in metres.
     pub clearance: f64,
-    /// True if the boundary must be kept.
+    /// True if the boundary counts.
     pub with_boundary: bool,
 }
 
@@ -74,8 +74,8 @@ impl Judgement {
 }
 
 impl Rules {
-    /// Creates the rules for a scene and its variations. A boundary outside which a board of the scene stands at the
-    /// start is no rule: a team that waits in a street is outside of its square, whatever the numbers are.
+    /// Creates the rules of a search that begins with a scene. A boundary outside which a board stands at the start does
+    /// not count: a shortfall that hardly depends on the numbers would hide all other distances.
     pub fn new(scene: &Scene, clearance: f64) -> Self {
         let rules = Self { clearance, with_boundary: true };
         let with_boundary = Sampler::new(scene, rules).is_none_or(|mut sampler| sampler.is_inside_at_start());

@@ -65,8 +65,9 @@ pub struct Fitted {
     pub text: String,
     /// The exact margins.
     pub judgement: Judgement,
-    /// False if the boundary was left out, because the team stands outside it at the start.
-    pub with_boundary: bool,
+    /// The margin of the rest, if the search has left out the boundary, because the team stands outside it at the start
+    /// with all numbers that were tried first.
+    pub without_boundary: Option<f64>,
     /// The scenes that were judged, at samples and exactly.
     pub judged: (usize, usize),
 }
@@ -106,7 +107,8 @@ pub fn fit(
     let steps = DESCENTS as u64 * DESCENT_STEPS + SIZES.len() as u64 * EXACT_STEPS;
     let expected = scattered + per_step * steps as usize;
     let state = State { progress, refusal: None, best: None, given: Vec::new(), judged: (0, 0), stopped: false };
-    let search = Search { text, fields, rules, expected, state: RefCell::new(state) };
+    let mut search = Search { text, fields, rules, expected, state: RefCell::new(state) };
+    search.rules.with_boundary |= search.can_start_inside(scattered, seed);
     search.run(scattered, seed);
     search.finish()
 }
@@ -208,6 +210,16 @@ impl Search<'_, '_> {
                 return;
             }
         }
+    }
+
+    /// Returns true if one of the scattered starts has a team that stands inside the boundary.
+    fn can_start_inside(&self, scattered: usize, seed: u64) -> bool {
+        let mut random = fastrand::Rng::with_seed(seed);
+        (0..scattered).any(|_| {
+            let place: Vec<f64> = self.fields.iter().map(|_| random.f64()).collect();
+            let scene = self.scene(&self.values(&place));
+            scene.is_some_and(|scene| Rules::new(&scene, self.rules.clearance).with_boundary)
+        })
     }
 
     /// Searches by a simplex of a size from a place; `None` if it was stopped.
@@ -326,8 +338,18 @@ impl Search<'_, '_> {
             }
         };
         let text = self.changed(&values);
+        let without_boundary = (!self.rules.with_boundary).then(|| judgement.margin());
+        let judgement = match without_boundary {
+            None => judgement,
+            Some(_) => {
+                let changed = SceneText { text: text.clone(), ..self.text.clone() };
+                let scene = changed.parse().map_err(FitError::Refused)?;
+                let rules = Rules { with_boundary: true, ..self.rules };
+                rules.exact(&scene, &mut unreported).ok_or(FitError::GaveUp)?
+            }
+        };
         let fields = self.fields.iter().map(|field| field.name.clone()).zip(values).collect();
-        Ok(Fitted { fields, text, judgement, with_boundary: self.rules.with_boundary, judged })
+        Ok(Fitted { fields, text, judgement, without_boundary, judged })
     }
 }
 

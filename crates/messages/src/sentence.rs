@@ -6,7 +6,7 @@
 use std::fmt::Display;
 use std::io;
 
-use super::layouts::{ChaseStatus, CollisionAlert, Cue, Stage};
+use super::layouts::{ChaseStatus, CollisionAlert, Cue, OBSTACLE_BOUNDARY, Stage};
 pub use super::roster::name_in;
 use super::roster::obstacle_number;
 use crate::chase::{ChaseSource, ChaseState};
@@ -164,7 +164,10 @@ fn nearest(alert: &CollisionAlert, stage: &Stage, figures: Figures) -> Option<St
     if figures == Figures::Omitted {
         return Some(nearest);
     }
-    Some(format!("{nearest}, {}", apart(alert.clearance, keep_out(stage, alert.bench_b), 4)))
+    let obstacle = obstacle_number(stage, alert.bench_b).and_then(|index| stage.obstacles.get(index));
+    let is_boundary = obstacle.is_some_and(|obstacle| obstacle.kind == OBSTACLE_BOUNDARY);
+    let overlap = if is_boundary { "outside by" } else { "overlap by" };
+    Some(format!("{nearest}, {}", apart(alert.clearance, keep_out(stage, alert.bench_b), overlap)))
 }
 
 /// Returns the metres that boards stay away from the obstacle of a number that follows the handles; 0 for a bench.
@@ -174,20 +177,15 @@ pub fn keep_out(stage: &Stage, number: u32) -> f64 {
 }
 
 /// Returns the distance that belongs to a clearance in words, and the part of it beyond the keep-out, if there is one.
-pub fn apart(clearance: f64, keep_out: f64, decimals: usize) -> String {
-    let scale = 10f64.powi(decimals as i32);
+fn apart(clearance: f64, keep_out: f64, overlap: &str) -> String {
     // Without the sign of zero: the clearance of a touch is solved to the last bits, on either side.
-    let [clearance, distance] = [clearance, clearance + keep_out].map(|metres| (metres * scale).round() / scale + 0.0);
-    let apart = if distance < 0.0 {
-        format!("overlap by {:.decimals$} m", -distance)
-    } else {
-        format!("{distance:.decimals$} m apart")
-    };
+    let [clearance, distance] = [clearance, clearance + keep_out].map(|metres| (metres * 1e4).round() / 1e4 + 0.0);
+    let apart = if distance < 0.0 { format!("{overlap} {:.4} m", -distance) } else { format!("{distance:.4} m apart") };
     if keep_out == 0.0 {
         return apart;
     }
     let side = if clearance < 0.0 { "inside" } else { "beyond" };
-    format!("{apart}, {:.decimals$} m {side} the keep-out of {} m", clearance.abs(), number(keep_out))
+    format!("{apart}, {:.4} m {side} the keep-out of {} m", clearance.abs(), number(keep_out))
 }
 
 fn names(concerned: impl Iterator<Item = u32>, stage: &Stage) -> String {
@@ -249,6 +247,11 @@ mod tests {
             let sentence = alert_sentence(&CollisionAlert { clearance, ..near }, &kept, SHOWN);
             assert!(sentence.contains(words), "{sentence}");
         }
+        let boundary =
+            StageObstacle { name: SceneName::new("boundary"), kind: OBSTACLE_BOUNDARY, keep_out: 0.0, ..lamp };
+        let outside = Stage { obstacles: List::of([boundary]), ..team(12) };
+        let sentence = alert_sentence(&CollisionAlert { clearance: -156.0, ..near }, &outside, SHOWN);
+        assert!(sentence.contains("bench 1 (the head) and the boundary, outside by 156.0000 m"), "{sentence}");
         // A number that the stage does not list, and a stage that has not come.
         assert_eq!(name_in(&stage, 14), "obstacle 2");
         assert_eq!(name_in(&Stage::default(), 14), "bench 15");

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::results::figure;
 use crate::scene::{Requirements, Scene, printable};
 use bench_dragon_messages::sentence::number;
+use bench_dragon_motion::ground::BOUNDARY;
 use bench_dragon_motion::timeline::{TimedClearance, TimedObstacleClearance, Timeline};
 
 /// The outcome for one requirement.
@@ -148,7 +149,7 @@ impl Verdict {
         let least = match (self.clearance, self.time) {
             (Some(f64::NEG_INFINITY), _) => "no board fits inside".to_owned(),
             (Some(clearance), Some(time)) => {
-                format!("{} m at the least, at t = {} s", figure(clearance), figure(time))
+                format!("{}, at t = {} s", self.least_distance(clearance), figure(time))
             }
             _ if self.verdict == Outcome::Pass => "no two could meet".to_owned(),
             _ => "no least distance was found".to_owned(),
@@ -158,5 +159,16 @@ impl Verdict {
             _ => String::new(),
         };
         format!("{word}: {who}: {least}; required: {} m{undecided}.", number(self.required))
+    }
+
+    /// Returns a least distance in words, a negative one as an overlap.
+    fn least_distance(&self, clearance: f64) -> String {
+        let metres = figure(clearance.abs());
+        match self.obstacle.as_deref() {
+            _ if clearance >= 0.0 => format!("{metres} m at the least"),
+            None => format!("two overlap by {metres} m"),
+            Some(BOUNDARY) => format!("a board is outside by {metres} m"),
+            Some(_) => format!("a board overlaps it by {metres} m"),
+        }
     }
 }

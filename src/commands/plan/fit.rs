@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use bench_dragon::fit::judge::{Part, What};
 use bench_dragon::fit::search::{FitError, Fitted, Vary, fit};
+use bench_dragon::motion::ground::BOUNDARY;
 use bench_dragon::show::scene::{Scene, SceneText, printable};
 use serde::Serialize;
 
@@ -130,13 +131,26 @@ fn print(text: &SceneText, fitted: &Fitted, clearance: f64, output: &mut Output)
     for part in fitted.limits() {
         output.line(&format!("Limited by {}.", limit(&scene, part, clearance)))?;
     }
-    if !fitted.with_boundary {
-        output.line("The boundary is left out, because the team stands outside it at the start.")?;
+    if let Some(rest) = fitted.without_boundary {
+        let rest =
+            if rest >= 0.0 { format!("{} m to spare", figure(rest)) } else { format!("{} m missing", figure(-rest)) };
+        output.line(&format!(
+            "The search has left out the boundary, because the team stands outside it at the start: without it there are \
+             {rest}. Boards stay inside a boundary, so draw it round the street in which the team waits as well."
+        ))?;
     }
     let (sampled, exact) = fitted.judged;
     let judged = format!("{sampled} scenes were judged at samples, {exact} of them exactly");
     let stopped = if are_searches_stopped() { "A signal stopped the search: " } else { "" };
     output.line(&format!("{stopped}{judged}. Found, not proved to be the greatest; `check --prove` proves the result."))
+}
+
+fn apart(distance: f64) -> String {
+    if distance < 0.0 {
+        format!("overlapping by {} m", figure(-distance))
+    } else {
+        format!("{} m apart", figure(distance))
+    }
 }
 
 /// Returns a distance that limits the margin, in words.
@@ -145,14 +159,16 @@ fn limit(scene: &Scene, part: &Part, clearance: f64) -> String {
     match (part.what, part.benches.1) {
         (What::Boards, other) => {
             let other = other.map_or(String::new(), |other| format!(" and {}", bench_name(scene, other)));
-            let distance = figure(part.margin + clearance);
-            format!("{bench}{other} at {at} s, {distance} m apart (benches count from 1)")
+            format!("{bench}{other} at {at} s, {} (benches count from 1)", apart(part.margin + clearance))
         }
         (What::Obstacle(number), _) => {
             let obstacle = &scene.ensemble.ground().obstacles()[number];
-            let name = printable(&obstacle.name);
-            let distance = figure(part.margin + obstacle.keep_out);
-            format!("{bench} and the {name} at {at} s, {distance} m apart (benches count from 1)")
+            let (name, distance) = (printable(&obstacle.name), part.margin + obstacle.keep_out);
+            if name == BOUNDARY && distance < 0.0 {
+                let outside = figure(-distance);
+                return format!("{bench} at {at} s, outside the boundary by {outside} m (benches count from 1)");
+            }
+            format!("{bench} and the {name} at {at} s, {} (benches count from 1)", apart(distance))
         }
         (What::PathEnd, _) => format!("{bench} at {at} s, where it locks (benches count from 1)"),
     }

@@ -9,7 +9,7 @@ use super::super::events::bench_name;
 use super::super::signals::{report, unstopped};
 use super::super::{CommandError, Common, Output, progress_bar};
 use super::stage::Stage;
-use super::{Spacing, are_too_near, given_up, status};
+use super::{Spacing, are_too_near, given_up, status, warn_of_route};
 
 /// The line of `plan turn --json`.
 #[derive(Serialize)]
@@ -38,6 +38,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
     let (scene, motion) = common.scene_text()?.parse_only()?;
+    warn_of_route(&scene, "the rest of the route", "boards on an S between two spirals that are long enough");
     let clearance = spacing.required(&scene)?;
     let description = motion.description();
     let Some(pitch) = description.pitch().or_else(|| description.pitch_of_turn()) else {

@@ -96,7 +96,8 @@ pub(super) fn timecode(common: &Common, arguments: &TimecodeArguments) -> Result
             let mut stream = Stream::sound(file)?;
             stream.write(&wave::header(SOUND_RATE, u32::MAX))?;
             let what = format!("LTC to {}", file.display());
-            let stream = run(common, clock, Box::new(Ltc::new(clock.fps)), stream, &what)?;
+            let signal = if stream.is_file()? { Ltc::to_file(clock.fps) } else { Ltc::to_reader(clock.fps) };
+            let stream = run(common, clock, Box::new(signal), stream, &what)?;
             Ok(stream.complete_sound().map_err(|error| named(file, error))?)
         }
     }
@@ -127,7 +128,7 @@ fn run<S: Sink>(
     let MasterSummary { frames, sent, jumps, lost_ms } = summary;
     if sink.is_standard_output() {
         if lost_ms > 0 {
-            log::warn!("{lost_ms} ms of sound were not read");
+            log::warn!("{lost_ms} ms of sound were left out");
         }
         return Ok(sink);
     }
@@ -135,7 +136,7 @@ fn run<S: Sink>(
     if common.json {
         output.json(&summary)?;
     } else {
-        let lost = if lost_ms > 0 { format!("; {lost_ms} ms of sound were not read") } else { String::new() };
+        let lost = if lost_ms > 0 { format!("; {lost_ms} ms of sound were left out") } else { String::new() };
         output.line(&format!("{frames} frames received; {sent} messages of timecode sent, {jumps} jumps{lost}"))?;
     }
     output.finish()?;
@@ -200,9 +201,13 @@ impl Stream {
         File::create(file).map(Self::of).map_err(|error| not_writable(file.display(), &error))
     }
 
+    fn is_file(&self) -> io::Result<bool> {
+        Ok(self.file.metadata()?.is_file())
+    }
+
     /// Writes the length of a sound into its header, if it is in a file.
     fn complete_sound(mut self) -> io::Result<()> {
-        if self.is_standard_output || !self.file.metadata()?.is_file() {
+        if self.is_standard_output || !self.is_file()? {
             return Ok(());
         }
         let sound = self.bytes.saturating_sub(wave::HEADER_BYTES as u64);

@@ -17,7 +17,7 @@ const LEVEL: f64 = 0.5;
 /// The least and the most samples of a piece of sound: a pipe with room for a page has room for it.
 const LEAST_SAMPLES: u64 = 48;
 const MOST_SAMPLES: u64 = 1920;
-/// The time by which a reader of sound may be behind before sound is left out, in nanoseconds.
+/// The time by which the sound for a reader may be late before sound is left out, in nanoseconds.
 const MOST_BEHIND_NS: u64 = 250_000_000;
 /// The frames by which labels may be late before they are left out.
 const MOST_LATE: f64 = 2.0;
@@ -39,7 +39,7 @@ pub trait Signal {
     fn next(&mut self, course: Option<&Course>, now_ns: u64, until_ns: u64) -> Option<Due>;
     /// Handles a jump of the course.
     fn jump(&mut self);
-    /// Returns the milliseconds that a reader has lost.
+    /// Returns the milliseconds of sound that were left out.
     fn lost_ms(&self) -> u64 {
         0
     }
@@ -184,13 +184,20 @@ pub struct Ltc {
     samples: u64,
     /// The frame of the latest sample.
     frame: i64,
+    most_behind_ns: u64,
     lost_ns: u64,
 }
 
 impl Ltc {
-    /// Creates the sound of a rate.
-    pub fn new(rate: FrameRate) -> Self {
-        Self { generator: Generator::new(rate), began_ns: None, samples: 0, frame: 0, lost_ns: 0 }
+    /// Creates the sound of a rate for a reader, who hears it as it comes: late sound is left out.
+    pub fn to_reader(rate: FrameRate) -> Self {
+        let generator = Generator::new(rate);
+        Self { generator, began_ns: None, samples: 0, frame: 0, most_behind_ns: MOST_BEHIND_NS, lost_ns: 0 }
+    }
+
+    /// Creates the sound of a rate for a file, which has every sample, however late it is written.
+    pub fn to_file(rate: FrameRate) -> Self {
+        Self { most_behind_ns: u64::MAX, ..Self::to_reader(rate) }
     }
 
     /// Returns the sample of a moment.
@@ -216,9 +223,13 @@ impl Signal for Ltc {
         let mut began_ns = *self.began_ns.get_or_insert(now_ns);
         let sample_ns = 1e9 / f64::from(SOUND_RATE);
         let behind_ns = (now_ns - began_ns).saturating_sub((self.samples as f64 * sample_ns) as u64);
-        if behind_ns > MOST_BEHIND_NS {
+        if behind_ns > self.most_behind_ns {
             if self.lost_ns == 0 {
-                log::warn!("the reader of the sound is too slow: timecode jumps over what it does not read");
+                let behind_ms = behind_ns / 1_000_000;
+                log::warn!(
+                    "the sound is {behind_ms} ms late, because its reader or this machine is too slow: it jumps over \
+                     that time"
+                );
             }
             self.lost_ns += behind_ns;
             began_ns += behind_ns;
@@ -351,7 +362,7 @@ mod tests {
     fn the_sound_has_each_label_at_its_moment_and_stands_with_the_show() {
         let rate = FrameRate::Ebu25;
         let changes = [(0.0, 50.0, 1.0, Playing, 0), (2.0, 52.02, 0.0, Paused, 0)];
-        let all = written(&mut Ltc::new(rate), rate, 4.0, &changes);
+        let all = written(&mut Ltc::to_reader(rate), rate, 4.0, &changes);
         let sound = Vec::from_iter(all.iter().flat_map(|due| due.bytes.iter().copied()));
         assert!((sound.len() / 2).abs_diff(192_000) < 100, "{} samples", sound.len() / 2);
         assert!((99..=102).contains(&all.iter().map(|due| due.counts).sum::<u64>()));
@@ -370,5 +381,24 @@ mod tests {
             }
         }
         assert!(ran > 46 && stood > 46, "{ran} {stood}");
+    }
+
+    #[test]
+    fn a_second_of_late_sound_is_left_out_for_a_reader_and_written_to_a_file() {
+        let rate = FrameRate::Ebu25;
+        let header = FrameHeader { sim_time: 50.0, time_scale: 1.0, ..Default::default() };
+        let schedule = Schedule { offset: "01:00:00:00".parse().unwrap(), speed: 1.0 };
+        let course = Course::of(&header, BEGAN_NS, &schedule, rate);
+        let written = |mut signal: Ltc| {
+            let mut bytes = 0;
+            for now_ns in [BEGAN_NS + 2_000_000, BEGAN_NS + 1_000_000_000] {
+                while let Some(due) = signal.next(Some(&course), now_ns, now_ns) {
+                    bytes += due.bytes.len();
+                }
+            }
+            (bytes / 2, signal.lost_ms())
+        };
+        assert!(matches!(written(Ltc::to_file(rate)), (47_900..48_100, 0)));
+        assert!(matches!(written(Ltc::to_reader(rate)), (0..200, 990..1000)));
     }
 }
