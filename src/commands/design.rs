@@ -2,7 +2,7 @@
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bench_dragon::design::session::{self, DesignFile, Session, greeting};
@@ -22,7 +22,7 @@ pub struct DesignArguments {
     /// The address to listen on; beyond loopback the page needs the token that is printed
     #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     listen: IpAddr,
-    /// Let the page write the scene's file; it is refused if the file has changed meanwhile
+    /// Let the page write the scene's file; a file that has changed since the page read it stays as it is
     #[arg(long)]
     save: bool,
 }
@@ -31,7 +31,10 @@ pub struct DesignArguments {
 pub fn design(common: &Common, arguments: &DesignArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
     let file = match &common.scene {
-        Some(file) => Some(Arc::new(SavedFile::read(file)?)),
+        Some(file) => {
+            SceneText::load(file)?;
+            Some(Arc::new(SavedFile { path: file.clone(), writing: Mutex::new(()) }))
+        }
         None if arguments.save => {
             return Err(CommandError::BadInput(
                 "--save needs a scene file to write, expected design FILE --save".into(),
@@ -43,32 +46,26 @@ pub fn design(common: &Common, arguments: &DesignArguments) -> Result<(), Comman
     serve(Arc::new(desk), SocketAddr::new(arguments.listen, arguments.port), &stop, |ready| announce(common, ready))
 }
 
-/// The scene's file, and its text when it was last read or written.
+/// The scene's file.
 struct SavedFile {
     path: PathBuf,
-    known: Mutex<String>,
+    /// Held from the comparison of the file to its end, since several pages may save.
+    writing: Mutex<()>,
 }
 
 impl SavedFile {
-    fn read(path: &Path) -> Result<Self, CommandError> {
-        Ok(Self { path: path.to_owned(), known: Mutex::new(SceneText::load(path)?.text) })
+    fn read(&self) -> Result<String, String> {
+        Ok(SceneText::load(&self.path).map_err(|error| error.to_string())?.text)
     }
 
-    /// Reads the file again.
-    fn again(&self) -> Result<String, String> {
-        let SceneText { text, .. } = SceneText::load(&self.path).map_err(|error| error.to_string())?;
-        self.known.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&text);
-        Ok(text)
-    }
-
-    /// Writes a text, unless the file has changed since it was read.
-    fn save(&self, text: &str) -> Result<(), SaveError> {
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+    /// Writes a text, unless the file is another one than `base`.
+    fn save(&self, base: &str, text: &str) -> Result<(), SaveError> {
+        let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         let shown = self.path.display();
-        let found = SceneText::load(&self.path).map_err(|error| SaveError::Failed(error.to_string()))?.text;
-        if found != *known {
+        if self.read().map_err(SaveError::Failed)? != base {
             let sentence = format!(
-                "{shown} has changed since it was read, so nothing was written: read the file again, or download the scene"
+                "{shown} has changed since this page read it, so nothing was written: load the page again to see the \
+                 file (undo brings your text back), or download the scene"
             );
             return Err(SaveError::Changed(sentence));
         }
@@ -79,9 +76,7 @@ impl SavedFile {
         written.map_err(|error| match error {
             CommandError::BadInput(sentence) | CommandError::Failed(sentence) => SaveError::Failed(sentence),
             CommandError::ClosedPipe => SaveError::Failed(format!("{shown} is a closed pipe")),
-        })?;
-        text.clone_into(&mut known);
-        Ok(())
+        })
     }
 }
 
@@ -95,7 +90,7 @@ impl Desk {
     fn design_file(&self) -> Option<DesignFile> {
         let file = Arc::clone(self.file.as_ref()?);
         let shown = file.path.display().to_string();
-        Some(DesignFile { shown, read: Arc::new(move || file.again()), save: self.save })
+        Some(DesignFile { shown, read: Arc::new(move || file.read()), save: self.save })
     }
 }
 
@@ -115,9 +110,9 @@ impl Studio for Desk {
         Ok(Box::new(Open(Session::start(self.design_file(), Arc::new(answers))?)))
     }
 
-    fn save(&self, text: &str) -> Result<(), SaveError> {
+    fn save(&self, base: &str, text: &str) -> Result<(), SaveError> {
         match &self.file {
-            Some(file) if self.save => file.save(text),
+            Some(file) if self.save => file.save(base, text),
             _ => Err(SaveError::Failed("this server was started without --save: download the scene".to_owned())),
         }
     }

@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use bench_dragon::chase::timecode::{FrameRate, Label};
-use bench_dragon::messages::hexadecimal;
 use bench_dragon::proof::scene_hash;
-use bench_dragon::sheets::page::{Wishes, html, pages};
-use bench_dragon::sheets::walk::{MOST_BENCHES, Searched, Walk};
-use bench_dragon::sheets::{Language, csv};
+use bench_dragon::sheets::page::{Wishes, html};
+use bench_dragon::sheets::walk::{MOST_BENCHES, Searched};
+use bench_dragon::sheets::{Language, csv, followed, minutes_and_seconds};
 
 use super::events::find_least_clearance;
 use super::signals::{report, stop_searches_on_signals, unstopped};
@@ -38,9 +37,6 @@ pub struct SheetsArguments {
     fps: FrameRate,
 }
 
-/// The digits of a scene's hash on a sheet.
-const DIGITS: usize = 8;
-
 /// Writes the sheets.
 pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), CommandError> {
     stop_searches_on_signals()?;
@@ -59,11 +55,7 @@ pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), Comman
     let bar = progress_bar(1000, common).with_message("following every bench");
     let obstacles = scene.ensemble.obstacle_clearances(timeline.end(), &mut |share| report(&bar, 0.1 * share));
     let searched = Searched { boards: find_least_clearance(&scene, &timeline, common).of_show, obstacles: &obstacles };
-    let is_drawn = |bench| {
-        let Some((dragon, bench)) = scene.ensemble.owner(bench) else { return false };
-        bench == 0 || pages(&chosen[dragon]).any(|(middle, _)| middle == bench)
-    };
-    let walk = Walk::new(&scene, &timeline, &searched, is_drawn, &mut |share| report(&bar, share));
+    let walk = followed(&scene, &timeline, &searched, &chosen, &mut |share| report(&bar, share));
     bar.finish_and_clear();
     unstopped()?;
     if let Some(file) = &arguments.csv {
@@ -71,7 +63,7 @@ pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), Comman
         output.text(&csv(&walk, arguments.lang, &chosen, &clock))?;
         output.finish()?;
     }
-    let hash = &hexadecimal(&scene_hash(&text.text))[..DIGITS];
+    let hash = &scene_hash(&text.text);
     let wishes = Wishes { language: arguments.lang, benches: &chosen, clock: &clock, hash };
     let mut output = arguments.output.as_deref().map_or_else(|| Ok(Output::standard()), Output::file)?;
     output.text(&html(&walk, &wishes))?;
@@ -90,10 +82,7 @@ impl SheetsArguments {
         let begin = begin.transpose()?;
         Ok(move |time: f64| match begin {
             Some(begin) => rate.label(begin.wrapping_add((time / rate.seconds(1.0)).round() as u32)).to_string(),
-            None => {
-                let seconds = time.round() as u64;
-                format!("{}:{:02}", seconds / 60, seconds % 60)
-            }
+            None => minutes_and_seconds(time),
         })
     }
 }

@@ -1,10 +1,15 @@
-//! The page of `design` in a real browser: `tests/python/design_page.py`. No test asserts a speed.
+//! The page of `design` in a real browser: `tests/python/design_page.py`, and `design_files.py` about files. No test
+//! asserts a speed.
 
 use crate::run_scenario;
 
 fn in_a_browser(scenario: &str) {
+    played("design_page.py", scenario);
+}
+
+fn played(script: &str, scenario: &str) {
     let folder = tempfile::tempdir().unwrap();
-    run_scenario("design_page.py", scenario, &[folder.path().to_str().unwrap()]);
+    run_scenario(script, scenario, &[folder.path().to_str().unwrap()]);
 }
 
 #[test]
@@ -40,6 +45,21 @@ fn texts_of_all_kinds() {
 #[test]
 fn gestures() {
     in_a_browser("gestures");
+}
+
+#[test]
+fn saving() {
+    played("design_files.py", "saving");
+}
+
+#[test]
+fn token() {
+    played("design_files.py", "token");
+}
+
+#[test]
+fn hand_outs() {
+    played("design_files.py", "hand_outs");
 }
 
 #[test]

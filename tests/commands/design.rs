@@ -17,6 +17,7 @@ type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
 struct Design {
     _process: Process,
     address: String,
+    token: Option<String>,
     place: Place,
 }
 
@@ -30,7 +31,8 @@ impl Design {
         let mut process = Process::start(program.args(["design", "--json", "--port", "0"]).arg(&file).args(options));
         let ready: Value = serde_json::from_str(&process.first_line()).unwrap();
         let address = ready["url"].as_str().unwrap().trim_start_matches("http://").trim_end_matches('/').to_owned();
-        Self { _process: process, address, place }
+        let token = ready["token"].as_str().map(str::to_owned);
+        Self { _process: process, address, token, place }
     }
 
     fn connect(&self, origin: Option<&str>) -> Result<Socket, Box<tungstenite::Error>> {
@@ -45,12 +47,19 @@ impl Design {
         Ok(socket)
     }
 
-    /// Posts a text to be saved; returns the answer's status.
-    fn save(&self, text: &str, origin: &str) -> u16 {
+    /// Posts a text to be saved in place of a base; returns the answer's status.
+    fn save(&self, [base, text]: [&str; 2]) -> u16 {
+        let own = format!("http://{}", self.address);
+        self.post(&json!({"base": base, "text": text}).to_string(), &own, self.token.as_deref())
+    }
+
+    /// Posts to the address for saving; returns the answer's status.
+    fn post(&self, body: &str, origin: &str, token: Option<&str>) -> u16 {
         let mut stream = TcpStream::connect(&self.address).unwrap();
-        let (address, length) = (&self.address, text.len());
+        let (address, length) = (&self.address, body.len());
+        let token = token.map_or_else(String::new, |token| format!("Authorization: Bearer {token}\r\n"));
         let head = format!("POST /design/save HTTP/1.1\r\nHost: {address}\r\nOrigin: {origin}\r\nConnection: close");
-        write!(stream, "{head}\r\nContent-Type: text/plain\r\nContent-Length: {length}\r\n\r\n{text}").unwrap();
+        write!(stream, "{head}\r\n{token}Content-Length: {length}\r\n\r\n{body}").unwrap();
         let mut answer = String::new();
         stream.read_to_string(&mut answer).unwrap();
         answer.split(' ').nth(1).unwrap().parse().unwrap()
@@ -120,22 +129,74 @@ fn a_text_is_saved_unless_the_file_has_changed() {
     let own = format!("http://{}", design.address);
     let file = design.place.folder().join("scene.toml");
     let other = paper.replace("pitch = 0.55", "pitch = 0.6");
-    assert_eq!(design.save(&other, &own), 200);
+    assert_eq!(design.save([paper, &other]), 200);
     assert_eq!(std::fs::read_to_string(&file).unwrap(), other);
-    assert_eq!(design.save(paper, "http://evil.example"), 403);
-    std::fs::write(&file, "# by another program").unwrap();
-    assert_eq!(design.save(paper, &own), 409);
-    assert_eq!(std::fs::read_to_string(&file).unwrap(), "# by another program");
-    // The page reads the file again, and may write it then.
+    assert_eq!(design.post(&json!({"base": other, "text": paper}).to_string(), "http://evil.example", None), 403);
+    assert_eq!(design.post(paper, &own, None), 400);
+    // A second page that has read the first text.
+    assert_eq!(design.save([paper, paper]), 409);
+    let foreign = "# by another program";
+    std::fs::write(&file, foreign).unwrap();
+    // A page that connects again has not read the file, although the server has.
     let mut socket = design.connect(Some(&own)).unwrap();
     let error = answer(&mut socket, 0, "error");
-    assert_eq!(error["text"], "# by another program", "{error}");
+    assert_eq!(error["text"], foreign, "{error}");
     send(&mut socket, &json!({"id": 1, "file": true}));
     answer(&mut socket, 1, "error");
-    assert_eq!(design.save(paper, &own), 200);
+    assert_eq!(design.save([&other, paper]), 409);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), foreign);
+    assert_eq!(design.save([foreign, paper]), 200);
     assert_eq!(std::fs::read_to_string(&file).unwrap(), paper);
     let read_only = Design::start("design-read", paper, &[]);
-    assert_eq!(read_only.save(&other, &format!("http://{}", read_only.address)), 422);
+    assert_eq!(read_only.save([paper, &other]), 422);
+}
+
+#[test]
+fn beyond_loopback_every_request_needs_the_token() {
+    let paper = include_str!("../../config/paper.toml");
+    let design = Design::start("design-token", paper, &["--listen", "0.0.0.0", "--save"]);
+    let token = design.token.clone().expect("a token beyond loopback");
+    let mut socket = design.connect(None).unwrap();
+    let hello = until(&mut socket, |message| message["hello"].is_object());
+    assert_eq!(hello["hello"]["token"], true);
+    let refused = [json!({"id": 1, "template": "square"}), json!({"token": "wrong"}), json!({"token": &token[1..]})];
+    for request in refused {
+        send(&mut socket, &request);
+        // The next message, whatever it is.
+        assert_eq!(until(&mut socket, |_| true), json!({"id": 0, "allowed": false}), "{request}");
+    }
+    let own = format!("http://{}", design.address);
+    let body = json!({"base": paper, "text": "# other"}).to_string();
+    for wrong in [None, Some("wrong"), Some(&token[1..])] {
+        assert_eq!(design.post(&body, &own, wrong), 401, "{wrong:?}");
+    }
+    assert_eq!(std::fs::read_to_string(design.place.folder().join("scene.toml")).unwrap(), paper);
+    send(&mut socket, &json!({"token": token}));
+    assert_eq!(until(&mut socket, |_| true), json!({"id": 0, "allowed": true}));
+    assert_eq!(answer(&mut socket, 0, "scene")["text"], paper);
+    assert_eq!(design.post(&body, &own, Some(&token)), 200);
+}
+
+#[test]
+fn the_least_turn_of_a_route_is_that_of_the_command() {
+    let village = include_str!("../../config/village.toml");
+    let design = Design::start("design-turn", village, &[]);
+    let mut socket = design.connect(None).unwrap();
+    answer(&mut socket, 0, "scene");
+    send(&mut socket, &json!({"id": 1, "plan": "turn"}));
+    let found = until(&mut socket, |message| message["id"] == 1 && !message["plan"].is_null());
+    let file = design.place.folder().join("scene.toml");
+    let command = ["plan", "turn", "--json", "--arc-ratio", "1"];
+    let printed = json_lines(&Process::start(design.place.program().args(command).arg(&file)).output());
+    assert_eq!(printed[0]["status"], "proved", "{printed:?}");
+    printed[0].as_object().unwrap().iter().for_each(|(key, value)| assert_eq!(found["plan"][key], *value, "{key}"));
+    let planned = format!("to_radius = {}", printed[0]["value_hi"]);
+    assert_eq!(found["text"], village.replace("to_radius = 2.99", &planned));
+    send(&mut socket, &json!({"id": 2, "text": include_str!("../../config/procession.toml")}));
+    answer(&mut socket, 2, "scene");
+    send(&mut socket, &json!({"id": 3, "plan": "turn"}));
+    let refused = answer(&mut socket, 3, "error");
+    assert!(refused["sentence"].as_str().unwrap().contains("one piece of kind \"turn\""), "{refused}");
 }
 
 #[test]

@@ -107,6 +107,11 @@ def drag(page, locator, right, down, steps=5):
     exact(page)
 
 
+def passes(page):
+    """Waits until the page has placed its handles: for the pass after the next one."""
+    page.evaluate("new Promise((next) => requestAnimationFrame(() => requestAnimationFrame(next)))")
+
+
 def undo(page):
     page.keyboard.press("Control+z")
     exact(page)

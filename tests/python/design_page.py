@@ -13,13 +13,12 @@ import signal
 import struct
 import subprocess
 import sys
-import time
 import urllib.parse
 import zlib
 
 from chromium import browser as chromium
 from design_driver import FOLDER, PROGRAM, SCENARIO, drag, exact, field, handle, is_exact, middle, no_complaints, opened
-from design_driver import same_results, server, set_field, set_text, skeleton, template, text_of, undo, until
+from design_driver import passes, same_results, server, set_field, set_text, skeleton, template, text_of, undo, until
 
 # No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 550
@@ -161,7 +160,7 @@ def drag_one(page, one, text):
     page.evaluate("({ x, y }) => design.picture.camera.view(x, y, 12)", one)
     until(lambda: node.is_visible(), one["name"])
     node.evaluate("(node) => node.parentElement.append(node)")
-    time.sleep(0.05)
+    passes(page)
     for right, down in [(25, -40), (-40, 30)]:
         drag(page, node, right, down)
         now = text_of(page)
@@ -333,7 +332,7 @@ def events_and_time(page):
     page.locator("#events [data-event=contact] button").click()
     until(lambda: abs(page.evaluate("design.picture.time") - 412.473837682115) < 1e-9, "the time of the contact")
     page.click("#play")
-    page.wait_for_timeout(100)
+    until(lambda: page.evaluate("design.picture.time") > 412.5, "play from the contact")
     page.click("#play")
     when = page.locator("#when")
     drag(page, when, -200, 0)

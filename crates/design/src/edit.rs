@@ -9,8 +9,8 @@ use toml_edit::DocumentMut;
 use crate::request::Setting;
 use crate::scene::{DesignedScene, Fault, written};
 use crate::tables::Path;
-use crate::text::{Found, Value};
 use bench_dragon_motion::model::Point;
+use bench_dragon_show::scene::values::{Found, Value, replaced};
 
 /// A change of the text.
 #[derive(Debug, Clone)]
@@ -103,11 +103,7 @@ pub fn apply(scene: &DesignedScene, changes: &[Change]) -> Result<String, Fault>
             },
         }
     }
-    spans.sort_by_key(|(span, _)| span.start);
-    let mut text = scene.text.clone();
-    for (span, new) in spans.into_iter().rev() {
-        text.replace_range(span, &new);
-    }
+    let text = replaced(&scene.text, spans);
     if missing.is_empty() {
         return Ok(text);
     }

@@ -45,17 +45,8 @@ impl Frames {
     /// Creates the frames of a scene of a number. They are of exact motion, each follower bracketed, because a table
     /// would take longer than the first frame. Without `timeline` they know no events.
     pub fn new(scene: &Scene, run: u64, timeline: Option<Timeline>) -> Self {
-        // The paper's rules stay: only a change to them can fail.
-        let exact = scene.ensemble.try_map(|motion| match motion.method() {
-            Method::Paper(_) => Ok(motion.clone()),
-            _ => motion.with_method(Method::Newton),
-        });
-        let exact = Scene {
-            ensemble: exact.unwrap_or_else(|_| scene.ensemble.clone()),
-            // A clearance in each frame would cost more than the frame.
-            alerts: None,
-            ..scene.clone()
-        };
+        // A clearance in each frame would cost more than the frame.
+        let exact = Scene { alerts: None, ..without_tables(scene) };
         let knowledge = if timeline.is_some() { Knowledge::All } else { Knowledge::PathEnd };
         let timeline = timeline.unwrap_or_else(|| path_end(&exact));
         Self { moments: Moments::new(&exact, timeline), exact, run, knowledge }
@@ -82,6 +73,17 @@ impl Frames {
         let stamps = Stamps { run_id: self.run, sequence: id, stamp_ns: 0, deadline_ns: 0 };
         Some((frame_header(frame, stamps), handle_poses(&frame.chain).collect()))
     }
+}
+
+/// Returns a scene in exact motion, whose solvers make no tables: to make one takes as long as hundreds of frames, and
+/// nothing can stop it.
+pub fn without_tables(scene: &Scene) -> Scene {
+    // The paper's rules stay: only a change to them can fail.
+    let exact = scene.ensemble.try_map(|motion| match motion.method() {
+        Method::Paper(_) => Ok(motion.clone()),
+        _ => motion.with_method(Method::Newton),
+    });
+    Scene { ensemble: exact.unwrap_or_else(|_| scene.ensemble.clone()), ..scene.clone() }
 }
 
 /// Returns the timeline of a motion of which nothing but the length of the path is known.

@@ -1,7 +1,8 @@
-//! The plans of a page: the least pitch, the least turn, the greatest speed, numbers that fit, and the proof of the
-//! events.
+//! The plans of a page: the least pitch, the least turn, the greatest speed, numbers that fit, the proof of the events,
+//! and hand-outs.
 //!
-//! In: a scene with its text. Out: the answer of `plan --json` with a sentence, and the text with the planned number.
+//! In: a scene with its text. Out: the answer of `plan --json` with a sentence, and the text with the planned number, or
+//! a file.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -12,6 +13,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::edit;
+use crate::hand_outs::{Form, HandOut, hand_outs};
 use crate::request::Setting;
 use crate::scene::DesignedScene;
 use bench_dragon_certify::plan::{Spaced, greatest_speed, least_pitch, least_turn};
@@ -19,10 +21,11 @@ use bench_dragon_certify::{CertifiedEvent, MOST_STEPS, Status, certify};
 use bench_dragon_fit::search::{Vary, fit};
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::event::Progress;
-use bench_dragon_motion::model::description::PathDescription;
+use bench_dragon_motion::model::description::{PathDescription, RouteTurn};
 use bench_dragon_motion::timeline::Timeline;
+use bench_dragon_sheets::Language;
 use bench_dragon_show::results::figure;
-use bench_dragon_show::scene::SceneText;
+use bench_dragon_show::scene::{ARC_RATIO, SceneText};
 
 /// The speed that no handle may exceed in the plan of the greatest speed, in metres per second: a brisk walk.
 const MOST_SPEED: f64 = 2.0;
@@ -38,6 +41,15 @@ pub struct Planned {
     pub answer: Value,
     /// The text with the planned number; `None` where there is none.
     pub text: Option<String>,
+    /// The file that was asked for.
+    pub file: Option<HandOut>,
+}
+
+impl Planned {
+    /// A plan that gives numbers to the text, if it has found some.
+    fn numbers(answer: Value, text: Option<String>) -> Self {
+        Self { answer, text, file: None }
+    }
 }
 
 /// A plan that runs on a thread of its own until it is found, or until it is dropped.
@@ -76,7 +88,7 @@ impl RunningPlan {
             let planned = plan((&kind, &vary), &scene, &mut progress);
             answers(&match planned {
                 _ if of_thread.load(Ordering::Relaxed) => json!({"id": id, "cancelled": true}),
-                Ok(Planned { answer, text }) => json!({"id": id, "plan": answer, "text": text}),
+                Ok(Planned { answer, text, file }) => json!({"id": id, "plan": answer, "text": text, "file": file}),
                 Err(sentence) => json!({"id": id, "error": {"sentence": sentence, "line": null, "field": null}}),
             });
         })?;
@@ -92,6 +104,9 @@ fn plan((kind, vary): (&str, &[String]), scene: &DesignedScene, progress: Progre
     match kind {
         "prove" => return prove(scene, progress),
         "fit" => return fitted(vary, scene, progress),
+        "sheets" => return handed_out(scene, Form::Pages(Language::English), progress),
+        "sheets-zh" => return handed_out(scene, Form::Pages(Language::Chinese), progress),
+        "csv" => return handed_out(scene, Form::Csv, progress),
         _ => {}
     }
     let motion = scene.scene.ensemble.only();
@@ -100,7 +115,9 @@ fn plan((kind, vary): (&str, &[String]), scene: &DesignedScene, progress: Progre
         "pitch" => pitch(scene, motion, progress),
         "turn" => turn(scene, motion, progress),
         "speed" => speed(scene, progress),
-        _ => Err(format!("there is no plan {kind:?}, expected pitch, turn, speed, fit or prove")),
+        _ => {
+            Err(format!("there is no plan {kind:?}, expected pitch, turn, speed, fit, prove, sheets, sheets-zh or csv"))
+        }
     }
 }
 
@@ -165,13 +182,48 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
         "head_radius": found.overlap.map(|overlap| overlap.head_radius),
         "sentence": sentence,
     });
-    Ok(Planned { answer, text: with(scene, "path.pitch", found.value_hi) })
+    Ok(Planned::numbers(answer, with(scene, "path.pitch", found.value_hi)))
 }
 
-/// Plans the turn of a turnaround with its ratio of arcs.
+/// The turn of a scene: its pitch, its ratio of arcs, and the number of the text that a radius of the turn gives to a
+/// field.
+struct TurnInText {
+    pitch: f64,
+    arc_ratio: f64,
+    number: Box<dyn Fn(f64) -> Option<(String, f64)>>,
+}
+
+impl TurnInText {
+    /// Returns the turn of a turnaround, or the only turn of a route.
+    fn of(scene: &DesignedScene, description: &PathDescription) -> Option<Self> {
+        if let PathDescription::Turnaround { pitch, arc_ratio, .. } = *description {
+            let number = Box::new(|radius: f64| Some(("path.turn_radius".to_owned(), radius)));
+            return Some(Self { pitch, arc_ratio, number });
+        }
+        let RouteTurn { spiral, pitch, radius: beginning } = description.turn()?;
+        let [spiral, turn] = [spiral, spiral + 1].map(|number| format!("path.pieces[{number}]"));
+        // Two arcs of the text that happen to be a turn are not one any longer behind another spiral.
+        if scene.values.words(&format!("{turn}.kind")) != Some("turn") {
+            return None;
+        }
+        let arc_ratio = scene.values.number(&format!("{turn}.arc_ratio")).unwrap_or(ARC_RATIO);
+        let has = |field: &str| scene.values.number(&format!("{spiral}.{field}")).is_some();
+        let (has_radius, has_turns) = (has("to_radius"), has("turns"));
+        let number = Box::new(move |radius: f64| match (has_radius, has_turns) {
+            (true, _) => Some((format!("{spiral}.to_radius"), radius)),
+            (_, true) => Some((format!("{spiral}.turns"), ((beginning - radius) / pitch).next_down())),
+            _ => None,
+        });
+        Some(Self { pitch, arc_ratio, number })
+    }
+}
+
+/// Plans the turn with its ratio of arcs.
 fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Result<Planned, String> {
-    let PathDescription::Turnaround { pitch, arc_ratio, .. } = *motion.description() else {
-        return Err("the least turn is for a path of kind \"turnaround\"".to_owned());
+    let Some(TurnInText { pitch, arc_ratio, number }) = TurnInText::of(scene, motion.description()) else {
+        return Err("the least turn is for a path of kind \"turnaround\", and for a route with one piece of kind \
+                    \"turn\""
+            .to_owned());
     };
     let clearance = required(scene);
     let asked = Spaced { team: motion.team(), clearance };
@@ -199,7 +251,9 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
         "bench_b": found.limit.and_then(|limit| limit.bench_b),
         "sentence": sentence,
     });
-    Ok(Planned { answer, text: with(scene, "path.turn_radius", found.value_hi.or(found.value)) })
+    let planned = found.value_hi.or(found.value).and_then(number);
+    let text = planned.and_then(|(field, value)| with(scene, &field, Some(value)));
+    Ok(Planned::numbers(answer, text))
 }
 
 fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
@@ -223,7 +277,7 @@ fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Strin
         "ratio": found.ratio,
         "sentence": sentence,
     });
-    Ok(Planned { answer, text: with(scene, "motion.head_speed", Some(found.value_lo)) })
+    Ok(Planned::numbers(answer, with(scene, "motion.head_speed", Some(found.value_lo))))
 }
 
 fn status(proved: bool) -> &'static str {
@@ -259,7 +313,7 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
         "margin": margin,
         "sentence": sentence,
     });
-    Ok(Planned { answer, text: found.is_found().then_some(found.text) })
+    Ok(Planned::numbers(answer, found.is_found().then_some(found.text)))
 }
 
 /// Proves the events, as `events --certify` does, without a certificate.
@@ -281,7 +335,14 @@ fn prove(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Strin
     };
     let list: Vec<Value> = found.iter().map(proved_line).collect();
     let answer = json!({"plan": "prove", "status": status(undecided == 0), "list": list, "sentence": sentence});
-    Ok(Planned { answer, text: None })
+    Ok(Planned::numbers(answer, None))
+}
+
+/// Makes the hand-outs.
+fn handed_out(scene: &DesignedScene, form: Form, progress: Progress<'_>) -> Result<Planned, String> {
+    let file = hand_outs(scene, form, progress)?;
+    let sentence = format!("{} is for {} benches.", file.name, scene.scene.ensemble.benches());
+    Ok(Planned { answer: json!({"plan": "sheets", "sentence": sentence}), text: None, file: Some(file) })
 }
 
 fn proved_line(event: &CertifiedEvent) -> Value {

@@ -7,11 +7,11 @@ use std::ops::Range;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::text::{Found, Lines, Value, Values};
 use bench_dragon_messages::sentence::number;
 use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::model::shape::ShapeKind;
 use bench_dragon_show::scene::cue::CueMoment;
+use bench_dragon_show::scene::values::{Found, Lines, Value, Values};
 use bench_dragon_show::scene::{CheckedNumber, Scene};
 
 /// The greatest length of a text, in bytes.

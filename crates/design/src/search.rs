@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use crate::frame::without_tables;
 use crate::scene::DesignedScene;
 use bench_dragon_motion::event::Event;
 use bench_dragon_motion::timeline::{TimedClearance, TimedObstacleClearance, Timeline};
@@ -156,7 +157,8 @@ impl Search<'_> {
         let mut facts = json!({"state": state(gave_up), "list": list, "curve": []});
         found(&json!({"id": id, "facts": facts}));
         let Some(nearest) = nearest(least.of_show, &beside).filter(|_| !gave_up) else { return };
-        let curve = clearance_curve(scene, &timeline, timeline.end().time, nearest, &mut |_| self.ask());
+        let curve =
+            clearance_curve(&without_tables(scene), &timeline, timeline.end().time, nearest, &mut |_| self.ask());
         if let Some(curve) = curve {
             facts["curve"] = json!(curve);
             found(&json!({"id": id, "facts": facts}));

@@ -81,6 +81,8 @@ impl Session {
                 is_refused: false,
                 at: 0.0,
                 run: 0,
+                shown_later: None,
+                drawn_later: None,
             };
             new.serve(&received);
         })?;
@@ -111,16 +113,27 @@ struct Desk {
     at: f64,
     /// Grows with every scene.
     run: u64,
+    /// The request whose scene is not shown yet, and the request of a time whose picture is not.
+    shown_later: Option<u64>,
+    drawn_later: Option<u64>,
 }
 
 impl Desk {
     fn serve(mut self, requests: &Receiver<String>) {
         self.answer(0, Wish::File);
+        self.show();
         while let Ok(request) = requests.recv() {
-            match Request::read(&request) {
-                Ok((id, wish)) => self.answer(id, wish),
-                Err(sentence) => self.refuse(0, &sentence.into()),
-            }
+            self.read(&request);
+            // Pictures may take longer than changes: only the newest of those that wait is drawn.
+            requests.try_iter().take(MOST_WAITING).for_each(|request| self.read(&request));
+            self.show();
+        }
+    }
+
+    fn read(&mut self, request: &str) {
+        match Request::read(request) {
+            Ok((id, wish)) => self.answer(id, wish),
+            Err(sentence) => self.refuse(0, &sentence.into()),
         }
     }
 
@@ -145,7 +158,8 @@ impl Desk {
             },
             Wish::At(time) => {
                 self.at = if time.is_finite() { time.max(0.0) } else { 0.0 };
-                return self.draw(id);
+                self.drawn_later = Some(id);
+                return;
             }
             Wish::Cancel => {
                 self.plan = None;
@@ -162,7 +176,7 @@ impl Desk {
             }),
         };
         match text.and_then(|text| DesignedScene::read(&text, &self.shown())) {
-            Ok(scene) => self.show(id, scene),
+            Ok(scene) => self.accept(id, scene),
             Err(fault) => self.refuse(id, &fault),
         }
     }
@@ -186,8 +200,10 @@ impl Desk {
     /// Takes a whole text.
     fn take(&mut self, id: u64, text: &str) {
         match DesignedScene::read(text, &self.shown()) {
-            Ok(scene) => self.show(id, scene),
+            Ok(scene) => self.accept(id, scene),
             Err(fault) => {
+                // The last good picture stays, so it has to be there.
+                self.show();
                 self.is_refused = true;
                 (self.frames, self.plan) = (None, None);
                 self.searcher.search(None);
@@ -197,21 +213,36 @@ impl Desk {
         }
     }
 
-    /// Shows a scene: its fields, its picture, and its events as they are found.
-    fn show(&mut self, id: u64, scene: DesignedScene) {
-        let scene = Arc::new(scene);
+    /// Takes a scene in place of the last one. It is shown later, unless another one replaces it before.
+    fn accept(&mut self, id: u64, scene: DesignedScene) {
+        if let Some(replaced) = self.shown_later.replace(id) {
+            self.json(&json!({"id": replaced, "replaced": id}));
+        }
         self.is_refused = false;
-        self.scene = Some(Arc::clone(&scene));
+        self.scene = Some(Arc::new(scene));
         (self.frames, self.plan) = (None, None);
         self.run += 1;
         // The old search ends while this picture is made.
         self.searcher.search(None);
-        self.json(&described(id, &scene));
-        let stage = Box::new(stage(&scene.scene, self.run, scene.path_end()));
-        (self.answers)(Answer::Stage(stage, scene.scene.name.clone()));
-        self.draw(id);
-        self.json(&json!({"id": id, "events": {"state": "computing"}}));
-        self.searcher.search(Some(Job { id, run: self.run, scene }));
+    }
+
+    /// Shows the newest scene, if it is not shown yet: its fields, its picture, and its events as they are found. Draws
+    /// the picture of another time.
+    fn show(&mut self) {
+        let (shown, drawn) = (self.shown_later.take(), self.drawn_later.take());
+        let Some(scene) = self.scene.clone() else { return };
+        if let Some(id) = shown {
+            self.json(&described(id, &scene));
+            let stage = Box::new(stage(&scene.scene, self.run, scene.path_end()));
+            (self.answers)(Answer::Stage(stage, scene.scene.name.clone()));
+        }
+        if let Some(id) = shown.max(drawn) {
+            self.draw(id);
+        }
+        if let Some(id) = shown {
+            self.json(&json!({"id": id, "events": {"state": "computing"}}));
+            self.searcher.search(Some(Job { id, run: self.run, scene }));
+        }
     }
 
     /// Starts a plan, and ends another one.

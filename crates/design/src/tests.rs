@@ -297,9 +297,17 @@ fn hostile_texts_get_one_sentence() {
 
 /// A session whose answers are received as JSON, frames and stages as their kinds.
 fn session() -> (Session, Receiver<Value>) {
+    session_held_up(|| ())
+}
+
+/// The same; `hold` is called before each stage is sent.
+fn session_held_up(hold: impl Fn() + Send + Sync + 'static) -> (Session, Receiver<Value>) {
     let (sender, answers) = channel();
     let sender = Mutex::new(sender);
     let send = move |answer| {
+        if matches!(answer, Answer::Stage(..)) {
+            hold();
+        }
         let answer = match answer {
             Answer::Json(json) => serde_json::from_str(&json).unwrap(),
             Answer::Stage(stage, _) => json!({"stage": stage.stage.run_id}),
@@ -342,6 +350,33 @@ fn after_a_storm_of_changes_the_last_state_is_exact() {
         }
     }
     assert_eq!(until(&answers, 300, "facts", "exact")["list"][0]["check"], "clearance");
+}
+
+#[test]
+fn of_changes_that_wait_only_the_newest_is_drawn() {
+    let (open, gate) = channel::<()>();
+    let gate = Mutex::new(gate);
+    let (session, answers) = session_held_up(move || {
+        let _ = gate.lock().unwrap().recv();
+    });
+    for id in 1..=100_u32 {
+        let pitch = f64::from(5500 + id) / 1e4;
+        session.request(json!({"id": id, "set": {"path.pitch": pitch}}).to_string()).unwrap();
+    }
+    session.request(json!({"id": 101, "text": "pitch ="}).to_string()).unwrap();
+    // The first stage was held up until here.
+    drop(open);
+    let mut all = Vec::new();
+    while all.last().is_none_or(|answer: &Value| answer["id"] != 101) {
+        all.push(answers.recv_timeout(Duration::from_secs(120)).unwrap());
+    }
+    let with = |key: &str| -> Vec<&Value> { all.iter().filter(|answer| !answer[key].is_null()).collect() };
+    let ids = |key: &str| -> Vec<u64> { with(key).iter().map(|answer| answer["id"].as_u64().unwrap()).collect() };
+    assert_eq!(ids("replaced"), (1..100).collect::<Vec<u64>>());
+    assert_eq!(ids("scene"), [0, 100]);
+    assert!(with("scene")[1]["scene"]["text"].as_str().unwrap().contains("pitch = 0.56"));
+    assert_eq!((with("stage").len(), with("frame").len()), (2, 2));
+    assert_eq!(ids("error"), [101], "the last good picture is there before the error");
 }
 
 #[test]

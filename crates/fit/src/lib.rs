@@ -7,5 +7,4 @@
 #![deny(missing_docs)]
 
 pub mod judge;
-pub mod numbers;
 pub mod search;

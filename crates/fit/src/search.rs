@@ -10,10 +10,10 @@ use std::ops::{ControlFlow, Range};
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
 use bench_dragon_motion::event::unreported;
+use bench_dragon_show::scene::values::{Found, Values, replaced};
 use bench_dragon_show::scene::{Scene, SceneError, SceneText};
 
 use crate::judge::{Judgement, Rules};
-use crate::numbers::{Number, numbers, replaced};
 
 /// Scattered starts, and more for each number.
 const SCATTERED: usize = 16;
@@ -98,7 +98,7 @@ pub fn fit(
     progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
 ) -> Result<Fitted, FitError> {
     let scene = text.parse().map_err(FitError::Refused)?;
-    let of_text = numbers(&text.text);
+    let of_text = Values::of(&text.text);
     let fields = vary.iter().map(|vary| field(&of_text, vary)).collect::<Result<Vec<_>, _>>()?;
     let rules = Rules::new(&scene, clearance);
     let dimensions = fields.len();
@@ -123,18 +123,19 @@ struct Field {
     decimals: usize,
 }
 
-fn field(of_text: &[Number], vary: &Vary) -> Result<Field, FitError> {
-    let Some(Number { name, value, span }) = of_text.iter().find(|number| number.name == vary.field) else {
-        let some: Vec<&str> =
-            of_text.iter().map(|number| number.name.as_str()).filter(|name| name.starts_with("path")).take(3).collect();
+fn field(of_text: &Values, vary: &Vary) -> Result<Field, FitError> {
+    let found = of_text.get(&vary.field).zip(of_text.number(&vary.field));
+    let Some((Found { name, span, .. }, value)) = found else {
+        let names = of_text.numbers().map(|number| number.name.as_str());
+        let some: Vec<&str> = names.filter(|name| name.starts_with("path")).take(3).collect();
         return Err(FitError::NoNumber(vary.field.clone(), some.join(", ")));
     };
     let around = (0.25 * value.abs()).max(0.5);
-    let least = if *value > 0.0 { 0.5 * value } else { f64::NEG_INFINITY };
+    let least = if value > 0.0 { 0.5 * value } else { f64::NEG_INFINITY };
     let range = vary.range.unwrap_or(((value - around).max(least), value + around));
     // A ten-thousandth of a metre, and finer in a narrow range.
     let decimals = (4.0 - (range.1 - range.0).log10().floor().min(0.0)).clamp(4.0, 12.0) as usize;
-    Ok(Field { name: name.clone(), span: span.clone(), given: *value, range, decimals })
+    Ok(Field { name: name.clone(), span: span.clone(), given: value, range, decimals })
 }
 
 /// A candidate that was judged exactly.
@@ -248,8 +249,9 @@ impl Search<'_, '_> {
     }
 
     fn changed(&self, values: &[f64]) -> String {
-        let spans = self.fields.iter().map(|field| field.span.clone());
-        replaced(&self.text.text, &spans.zip(values.iter().copied()).collect::<Vec<_>>())
+        // A whole number keeps its point, since TOML distinguishes 3 and 3.0.
+        let spans = self.fields.iter().zip(values).map(|(field, value)| (field.span.clone(), format!("{value:?}")));
+        replaced(&self.text.text, spans.collect())
     }
 
     fn scene(&self, values: &[f64]) -> Option<Scene> {

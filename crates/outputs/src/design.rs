@@ -17,6 +17,7 @@ use axum::extract::{DefaultBodyLimit, State as Served};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::{get, post};
+use serde::Deserialize;
 
 use super::http::Listening;
 use super::view::origin::Admission;
@@ -71,7 +72,7 @@ pub trait DesignSession: Send {
 /// The reason why a text is not saved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SaveError {
-    /// The file has changed since it was read.
+    /// The file has another text than the page has read.
     Changed(String),
     /// There is no file, or it cannot be written.
     Failed(String),
@@ -88,11 +89,11 @@ pub trait Studio: Send + Sync {
     /// The system has no thread left.
     fn open(&self, answers: Answers) -> io::Result<Box<dyn DesignSession>>;
 
-    /// Saves a text in the file of the design.
+    /// Saves a text in the file of the design, whose text has to be `base` still.
     ///
     /// # Errors
     /// [`SaveError`]
-    fn save(&self, text: &str) -> Result<(), SaveError>;
+    fn save(&self, base: &str, text: &str) -> Result<(), SaveError>;
 }
 
 /// The studio, the admission, the token and the sessions that the requests of all browsers share.
@@ -130,7 +131,7 @@ fn router(server: Server) -> Router {
         .route("/", get(|| async { Redirect::temporary("design") }))
         .route("/design", get(|| async { served(HTML, include_str!("design/index.html")) }))
         .route("/design/session", get(sessions))
-        .route("/design/save", post(save).layer(DefaultBodyLimit::max(MAX_MESSAGE_BYTES)));
+        .route("/design/save", post(save).layer(DefaultBodyLimit::max(2 * MAX_MESSAGE_BYTES)));
     for (name, kind, text) in FILES {
         router = router.route(&format!("/design/{name}"), get(move || async move { served(kind, text) }));
     }
@@ -171,8 +172,18 @@ async fn sessions(
         .on_upgrade(move |socket| session::serve(socket, server, place))
 }
 
+/// A text that a page wants to save.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Saved {
+    /// The text of the file as the page has read or written it.
+    base: String,
+    /// The new text.
+    text: String,
+}
+
 /// Saves the text of a page.
-async fn save(Served(server): Served<Server>, headers: HeaderMap, text: String) -> Response {
+async fn save(Served(server): Served<Server>, headers: HeaderMap, body: String) -> Response {
     if let Err(refused) = server.admits(&headers) {
         return refused;
     }
@@ -180,7 +191,15 @@ async fn save(Served(server): Served<Server>, headers: HeaderMap, text: String) 
     if server.token.as_ref().is_some_and(|token| !given.is_some_and(|given| token.is(given))) {
         return (StatusCode::UNAUTHORIZED, session::NEEDS_TOKEN).into_response();
     }
-    match server.studio.save(&text) {
+    let Saved { base, text } = match serde_json::from_str(&body) {
+        Ok(saved) => saved,
+        Err(error) => {
+            let sentence =
+                format!("{error}: expected JSON with the text to save, and with the base that it comes from");
+            return (StatusCode::BAD_REQUEST, sentence).into_response();
+        }
+    };
+    match server.studio.save(&base, &text) {
         Ok(()) => StatusCode::OK.into_response(),
         Err(SaveError::Changed(sentence)) => (StatusCode::CONFLICT, sentence).into_response(),
         Err(SaveError::Failed(sentence)) => (StatusCode::UNPROCESSABLE_ENTITY, sentence).into_response(),

@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use bench_dragon_drawing::escaped;
+use bench_dragon_messages::hexadecimal;
 
 use crate::map::{Map, WIDTH};
 use crate::stop::{Row, Teller};
@@ -36,6 +37,8 @@ const EM: f64 = 2.93;
 const WAY: [f64; 4] = [22.0, 6.0, 51.0, 53.0];
 const CALLS: [f64; 4] = [22.0, 6.0, 66.0, 38.0];
 const TEAM: [f64; 4] = [11.0, 30.0, 43.0, 48.0];
+/// The digits of a scene's hash on a page.
+const DIGITS: usize = 8;
 
 const STYLE: &str = include_str!("page.css");
 
@@ -47,8 +50,8 @@ pub struct Wishes<'w> {
     pub benches: &'w [Range<usize>],
     /// Writes a time of the show: minutes and seconds, or timecode.
     pub clock: &'w dyn Fn(f64) -> String,
-    /// The first digits of the hash of the scene's text, by which an old print is known.
-    pub hash: &'w str,
+    /// The hash of the scene's text, by whose first digits an old print is known.
+    pub hash: &'w [u8],
 }
 
 /// Returns the middle bench of each page of ten, whose trail is drawn, with its page, by the benches of a dragon.
@@ -323,7 +326,7 @@ impl Writer<'_, '_> {
             escaped(&self.tables.walk.scene.name),
             escaped(below),
             self.tables.of(["scene", "场景"]),
-            self.tables.wishes.hash
+            &hexadecimal(self.tables.wishes.hash)[..DIGITS]
         )
     }
 }

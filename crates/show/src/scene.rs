@@ -17,6 +17,7 @@ mod source;
 pub(crate) mod stage;
 mod team;
 mod text;
+pub mod values;
 
 use std::path::Path as FilePath;
 
@@ -28,6 +29,7 @@ use self::cue::{Cue, RawCue};
 pub use self::dragons::{MOST_DRAGON_NAME, MOST_DRAGONS};
 use self::dragons::{Probe, RawEnsemble};
 use self::path::RawPath;
+pub use self::piece::ARC_RATIO;
 use self::precision::Precision;
 pub use self::precision::SinglePrecision;
 use self::require::RawRequire;

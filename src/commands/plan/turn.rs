@@ -41,7 +41,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
     warn_of_route(&scene, "the rest of the route", "boards on an S between two spirals that are long enough");
     let clearance = spacing.required(&scene)?;
     let description = motion.description();
-    let Some(pitch) = description.pitch().or_else(|| description.pitch_of_turn()) else {
+    let Some(pitch) = description.pitch().or_else(|| description.turn().map(|turn| turn.pitch)) else {
         let sentence = "the scene's path is a route without a turn, or with several: expected path.kind \"spiral\" or \
                         \"turnaround\", or a route with one piece of kind \"turn\"";
         return Err(CommandError::BadInput(sentence.to_owned()));

@@ -42,6 +42,17 @@ pub enum PathDescription {
     },
 }
 
+/// The turn of a route.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RouteTurn {
+    /// The number of the inward spiral among the steps of the route.
+    pub spiral: usize,
+    /// The pitch of the spirals, in metres per turn.
+    pub pitch: f64,
+    /// The distance from the centre at which the inward spiral begins, in metres.
+    pub radius: f64,
+}
+
 /// Pieces of a route up to which its ends are plain sums, as they were when no route had more.
 const FEW_PIECES: usize = 31;
 
@@ -97,11 +108,11 @@ impl PathDescription {
         self.pitch().into_iter().chain(of_steps)
     }
 
-    /// Returns the pitch of the spirals of the only turn of a route: an inward spiral and two arcs that lead to the
-    /// outward spiral about the same centre. `None` for another path, and for a route with several turns.
-    pub fn pitch_of_turn(&self) -> Option<f64> {
+    /// Returns the only turn of a route: an inward spiral and two arcs that lead to the outward spiral about the same
+    /// centre. `None` for another path, and for a route with several turns.
+    pub fn turn(&self) -> Option<RouteTurn> {
         let Self::Route { steps, .. } = self else { return None };
-        let mut turns = steps.windows(3).filter_map(|steps| match *steps {
+        let mut turns = steps.windows(3).enumerate().filter_map(|(step, steps)| match *steps {
             [
                 RouteStep::Spiral { side, direction: Direction::Inward, pitch, radius, turns },
                 RouteStep::Arc { side: first_side, radius: first, turns: first_turns },
@@ -113,7 +124,7 @@ impl PathDescription {
                     && side.opposite() == second_side
                     && (first.high + second.high - radii).abs() <= 1e-12 * radii
                     && (TAU * first_turns.high - 2.0 * atan(theta)).abs() <= 1e-12;
-                is_turn.then_some(pitch)
+                is_turn.then_some(RouteTurn { spiral: step, pitch, radius: radius.high })
             }
             _ => None,
         });

@@ -13,6 +13,8 @@ export class History {
     this.steps = [];
     this.at = -1;
     this.gesture = null;
+    /** The text of the file as this page has read or written it. */
+    this.base = null;
     this.timer = null;
     addEventListener("pagehide", () => this.store());
   }
@@ -29,6 +31,12 @@ export class History {
     if (kept && kept.base !== text) this.take(text, 0, null);
     this.base = text;
     return this.now;
+  }
+
+  /** The file has this text now. */
+  saved(text) {
+    this.base = text;
+    this.later();
   }
 
   get now() {

@@ -36,7 +36,7 @@ let scene = null;
 let hello = null, typedAt = -Infinity, typing = 0, sentenceAt = 0;
 /** The name of the handle in use, or null. */
 let used = null;
-let isFitted = false, isConnected = false, isPinned = false;
+let isFitted = false, isConnected = false, isPinned = false, saving = Promise.resolve();
 
 function tell(sentence) {
   element("status").textContent = sentence ?? "";
@@ -68,14 +68,14 @@ const session = new Session({
     beside();
   },
   progress: (id, share) => plans.progress(id, share),
-  plan: (id, plan, text) => plans.result(id, plan, text),
+  plan: (id, plan, text, file) => plans.result(id, plan, text, file),
   cancelled: (id) => plans.cancelled(id),
 });
 const text = new SceneText(typed), results = new Results(select);
 const line = new TimeLine({ at: (time) => session.at(time), drop: () => fields.end(),
   cue: (number, time, gesture) => change({ drag: { handle: `cues[${number}]`, to: [time, 0], free: true, alt: false } },
       gesture) });
-const plans = new Plans(session, (planned) => replace(planned, null));
+const plans = new Plans(session, (planned) => replace(planned, null), keep);
 const fields = new Fields(element("fields"), {
   set: (name, value, gesture) => change({ set: { [name]: value } }, gesture, name),
   remove: (item) => change({ remove: item }, null),
@@ -219,7 +219,8 @@ function greet(greeting) {
       ...greeting.templates.map(({ key, title }) => new Option(title, key)));
   element("save").hidden = !greeting.save;
   // The server is back: it gets the text again.
-  if (history.key !== null && !(greeting.token && token === null)) send(text.value);
+  if (greeting.token && token === null) allowed(false);
+  else if (history.key !== null) send(text.value);
   note();
 }
 
@@ -231,8 +232,12 @@ function allowed(isAllowed) {
  * Takes the scene of the file, or of the first template. Returns true if the page shows it: a kept text has priority.
  */
 function offer({ scene: offered, error }) {
-  if (history.key !== null) return false;
-  const given = offered?.text ?? error.text ?? "", kept = history.begin(hello?.file ?? "", given);
+  const given = offered?.text ?? error.text ?? "";
+  if (history.key !== null) {
+    if (hello.save && given !== history.base) tell(`${hello.file} has changed since this page read it. Load the page again to see the file; undo brings your text back.`);
+    return false;
+  }
+  const kept = history.begin(hello?.file ?? "", given);
   line.time = kept.time;
   if (kept.text !== given) {
     text.set(kept.text);
@@ -293,15 +298,24 @@ function note() {
 
 function download() {
   const name = hello?.file ?? `${(scene?.name ?? "scene").replaceAll(/[^\w\- ]/g, "_")}.toml`;
-  const address = URL.createObjectURL(new Blob([text.value], { type: "application/toml" }));
-  Object.assign(document.createElement("a"), { href: address, download: name.split("/").at(-1) }).click();
+  keep({ name: name.split("/").at(-1), kind: "application/toml", text: text.value });
+}
+
+/** Downloads a file. */
+function keep({ name, kind, text: content }) {
+  const address = URL.createObjectURL(new Blob([content], { type: kind }));
+  Object.assign(document.createElement("a"), { href: address, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(address), 1000);
 }
 
-async function save() {
-  const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
+/** Writes the file, after an earlier save, which changes its base. */
+const save = () => (saving = saving.then(write));
+async function write() {
+  const headers = token === null ? {} : { Authorization: `Bearer ${token}` }, { value } = text;
+  const body = JSON.stringify({ base: history.base, text: value });
   try {
-    const answer = await fetch(new URL("save", import.meta.url), { method: "POST", body: text.value, headers });
+    const answer = await fetch(new URL("save", import.meta.url), { method: "POST", body, headers });
+    if (answer.ok) history.saved(value);
     tell(answer.ok ? `Saved ${hello.file}.` : await answer.text());
   } catch {
     tell("Nothing was saved: the server does not answer.");

@@ -1,13 +1,13 @@
-// The searches: least pitch, least turn, greatest speed, proof. In: clicks, progress and answers. Out: requests; a text
-// that the user uses.
+// The searches: least pitch, least turn, greatest speed, proof, hand-outs. In: clicks, progress and answers. Out:
+// requests; a text that the user uses, or a file.
 
 const element = (id) => document.getElementById(id);
 
 export class Plans {
-  /** `session` sends requests; `use` is called with the text of a result. */
-  constructor(session, use) {
-    Object.assign(this, { session, use, running: null, text: null, varied: null });
-    for (const button of document.querySelectorAll("[data-plan]")) button.onclick = () => this.start(button);
+  /** `session` sends requests; `use` is called with the text of a result, `keep` with a file. */
+  constructor(session, use, keep) {
+    Object.assign(this, { session, use, keep, running: null, text: null, varied: null });
+    for (const button of document.querySelectorAll("[data-plan], [data-action=sheets]")) button.onclick = () => this.start(button);
     element("plan-stop").onclick = () => this.stop();
     element("plan-use").onclick = () => {
       const { text } = this;
@@ -23,7 +23,8 @@ export class Plans {
     if (this.running !== null) this.stop();
     if (!this.session.isOpen) return;
     this.clear();
-    const { plan } = button.dataset;
+    // Hand-outs have a list of their forms.
+    const plan = button.dataset.plan ?? element("sheets-form").value;
     this.running = this.id = this.session.send(plan === "fit" ? { plan, vary: [this.varied] } : { plan });
     this.put(`${button.textContent} …`, { isRunning: true });
     element("plan-progress").removeAttribute("value");
@@ -46,10 +47,11 @@ export class Plans {
     if (id === this.running) element("plan-progress").value = share;
   }
 
-  /** Shows a result; with a text it can be used. */
-  result(id, { sentence, status, list }, text) {
+  /** Shows a result; with a text it can be used, and a file is kept. */
+  result(id, { sentence, status, list }, text, file) {
     if (id !== this.running) return;
     this.running = null;
+    if (file) this.keep(file);
     this.text = text;
     const lines = [sentence ?? status ?? "No result.", ...(list ?? []).map((one) => one.sentence ?? "")];
     this.put(lines.filter(Boolean).join("\n"), { hasText: text !== null, isDone: true });

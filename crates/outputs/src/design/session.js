@@ -131,7 +131,7 @@ export class Session {
       listener[kind](message[kind], id);
     }
     if (message.progress !== undefined) listener.progress(id, message.progress);
-    if (message.plan) listener.plan(id, message.plan, message.text ?? null);
+    if (message.plan) listener.plan(id, message.plan, message.text ?? null, message.file ?? null);
     if (message.cancelled) listener.cancelled(id);
   }
 

@@ -18,7 +18,7 @@ use bench_dragon_motion::solve::reference::{Piece, Turn, TurnArcs};
 /// The turns above which an arc is doubted: a dance has no ten rounds on one circle, and degrees are mostly above.
 const MOST_ARC_TURNS: f64 = 10.0;
 /// The radius of the first arc of a turn over that of the second, unless the scene has another.
-const ARC_RATIO: f64 = 2.0;
+pub const ARC_RATIO: f64 = 2.0;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,6 +1,7 @@
 //! The values of a TOML text, each with its name and its bytes.
 //!
-//! In: a text. Out: the names of its values, such as `path.pieces[2].radius`, and the lines of bytes.
+//! In: a text. Out: the names of its values, such as `path.pieces[2].radius`, the lines of bytes, and the text with other
+//! bytes in place of some values.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -91,6 +92,11 @@ impl Values {
         &self.found
     }
 
+    /// Returns the numbers in the order of their bytes.
+    pub fn numbers(&self) -> impl Iterator<Item = &Found> {
+        self.by_start.values().map(|index| &self.found[*index]).filter(|found| matches!(found.value, Value::Number(_)))
+    }
+
     /// Returns a value by its name.
     pub fn get(&self, name: &str) -> Option<&Found> {
         self.by_name.get(name).map(|index| &self.found[*index])
@@ -132,6 +138,16 @@ impl Values {
     }
 }
 
+/// Returns a text with other bytes in place of some spans, which do not overlap; all other bytes stay.
+pub fn replaced(text: &str, mut spans: Vec<(Range<usize>, String)>) -> String {
+    spans.sort_by_key(|(span, _)| span.start);
+    let mut changed = text.to_owned();
+    for (span, new) in spans.into_iter().rev() {
+        changed.replace_range(span, &new);
+    }
+    changed
+}
+
 /// The first bytes of the lines of a text.
 #[derive(Debug, Clone)]
 pub struct Lines(Vec<usize>);
@@ -145,5 +161,28 @@ impl Lines {
     /// Returns the number of the line with a byte, from 1.
     pub fn line(&self, byte: usize) -> usize {
         self.0.partition_point(|end| *end < byte) + 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "a = 1 # one\n[b]\n\"c\" = [ 2.50,\t-3 ]\n[[d]]\ne = {f=4e0}\n[[d]]\ng.h = 0x10\n";
+
+    #[test]
+    fn numbers_have_the_names_of_their_places() {
+        let values = Values::of(TEXT);
+        let found: Vec<_> = values.numbers().map(|found| (found.name.as_str(), values.number(&found.name))).collect();
+        let expected = [("a", 1.0), ("b.c[0]", 2.5), ("b.c[1]", -3.0), ("d[0].e.f", 4.0), ("d[1].g.h", 16.0)];
+        assert_eq!(found, expected.map(|(name, value)| (name, Some(value))));
+    }
+
+    #[test]
+    fn only_the_bytes_of_a_number_change() {
+        let values = Values::of(TEXT);
+        let span = |name: &str| values.get(name).unwrap().span.clone();
+        let changed = replaced(TEXT, vec![(span("d[0].e.f"), "7.0".to_owned()), (span("b.c[0]"), "0.0625".to_owned())]);
+        assert_eq!(changed, TEXT.replace("2.50", "0.0625").replace("4e0", "7.0"));
     }
 }

@@ -1,0 +1,68 @@
+//! The hand-outs of a design: the pages and the rows of `sheets`, of the text as it stands.
+//!
+//! In: a scene with its text. Out: a file with its name.
+
+use serde::Serialize;
+
+use crate::scene::DesignedScene;
+use bench_dragon_motion::event::Progress;
+use bench_dragon_proof::scene_hash;
+use bench_dragon_sheets::page::{Wishes, html};
+use bench_dragon_sheets::walk::Searched;
+use bench_dragon_sheets::{Language, csv, followed, minutes_and_seconds};
+
+/// The form of hand-outs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Pages to print.
+    Pages(Language),
+    /// The rows of all benches.
+    Csv,
+}
+
+/// A file for the page to download.
+#[derive(Debug, Serialize)]
+pub struct HandOut {
+    /// Its name.
+    pub name: String,
+    /// Its kind, as in HTTP.
+    pub kind: &'static str,
+    /// Its text.
+    pub text: String,
+}
+
+/// Follows all benches and writes their hand-outs. Those of a search that `progress` stops are of no use.
+///
+/// # Errors
+/// One sentence for a motion that is not exact.
+pub fn hand_outs(designed: &DesignedScene, form: Form, progress: Progress<'_>) -> Result<HandOut, String> {
+    let scene = &designed.scene;
+    let ensemble = &scene.ensemble;
+    if !ensemble.is_exact() {
+        return Err(
+            "the scene names the solver \"paper\", whose head is too fast: hand-outs are for exact motion".to_owned()
+        );
+    }
+    let timeline = ensemble.timeline(&mut |share| progress(0.2 * share));
+    let obstacles = ensemble.obstacle_clearances(timeline.end(), &mut |share| progress(0.2 + 0.1 * share));
+    let least = ensemble.least_clearances(&timeline, timeline.end(), &mut |share| progress(0.3 + 0.2 * share));
+    let searched = Searched { boards: least.of_show, obstacles: &obstacles };
+    let benches: Vec<_> = ensemble.dragons().iter().map(|dragon| 0..dragon.motion.team().benches).collect();
+    let walk = followed(scene, &timeline, &searched, &benches, &mut |share| progress(0.5 + 0.5 * share));
+    let name = |end: &str| {
+        let letters = scene.name.chars();
+        let name: String = letters.map(|letter| if letter.is_alphanumeric() { letter } else { '-' }).collect();
+        format!("{name}{end}")
+    };
+    Ok(match form {
+        Form::Pages(language) => {
+            let (clock, hash) = (&minutes_and_seconds, &scene_hash(&designed.text));
+            let text = html(&walk, &Wishes { language, benches: &benches, clock, hash });
+            HandOut { name: name(".html"), kind: "text/html", text }
+        }
+        Form::Csv => {
+            let text = csv(&walk, Language::English, &benches, &minutes_and_seconds);
+            HandOut { name: name(".csv"), kind: "text/csv", text }
+        }
+    })
+}
