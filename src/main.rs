@@ -3,7 +3,7 @@
 //! A subcommand that reads a scene has `arg = scene_argument()`. The others refuse one.
 
 #[macro_use]
-mod commands;
+pub(crate) mod commands;
 mod logging;
 
 use std::io::{self, IsTerminal, Write};

@@ -7,6 +7,9 @@ pub use libfuzzer_sys;
 
 use fastrand::Rng;
 use targets::Target;
+// The program's macros name its module by its path from the root.
+#[allow(unused_imports, reason = "the macros use it")]
+use targets::command_line::program::commands;
 
 /// Makes a program from a target: its function, and its own changes besides those of libFuzzer.
 #[macro_export]

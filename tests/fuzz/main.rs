@@ -16,6 +16,9 @@ use std::sync::{Mutex, MutexGuard, Once, PoisonError, mpsc};
 use std::time::Duration;
 
 use fastrand::Rng;
+// The program's macros name its module by its path from the root.
+#[allow(unused_imports, reason = "the macros use it")]
+use targets::command_line::program::commands;
 use targets::{TARGETS, Target};
 
 /// One case in this many begins with a kept input: those are larger, and slow.

@@ -2,7 +2,7 @@
 
 #[path = "../../../src/main.rs"]
 #[allow(dead_code, unused_imports, reason = "the program's sources, of which its command line is used")]
-mod program;
+pub(crate) mod program;
 
 use std::ffi::OsString;
 use std::sync::OnceLock;
