@@ -11,8 +11,8 @@ use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::proof::{Proved, Refused, verify};
 use serde_json::{Value, json};
 
-/// The least pitch at which the paper's benches reach 4.5 m and keep 0.2 m: the root of the clearance of benches 0 and
-/// 17 with 30 digits, its least over places of the head found by golden section.
+/// The least pitch at which the paper's benches reach 4.5 m and keep 0.2 m. It is the root of the clearance of benches 0
+/// and 17, with 30 digits. A golden section finds the least clearance over places of the head.
 const PITCH: f64 = 0.650_013_396_502_777_8;
 
 const PAPER: Team =
@@ -64,7 +64,7 @@ fn the_least_pitch_with_a_clearance_is_that_of_another_search() {
     encloses(&by_option, PITCH, 1e-15);
     let pair = [&by_option["bench_a"], &by_option["bench_b"], &by_option["clearance"]];
     assert_eq!(pair, [&json!(0), &json!(17), &json!(0.2)], "{by_option}");
-    // What the scene requires counts unless the option says otherwise.
+    // The clearance that the scene requires counts, unless the option has another.
     let required = coil("[require]\nclearance = 0.2\n");
     assert_eq!(planned(&required, &REACH), by_option);
     let apart = planned(&required, &[&REACH[..], &["--clearance", "0"]].concat());
