@@ -4,9 +4,10 @@
 //! steps at the turning points found here.
 //!
 //! **Two links are enough.** Let F be the follower map of a body link, from its front handle's travel to its rear
-//! handle's. Handle k + 1 is behind handle k, so no handle after the first is ever further along the path than handle 1
-//! has been. On the first segment, outside the fold, F is continuous arbitrarily far back. So while F is continuous up
-//! to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
+//! handle's: the continuous map that begins on the first segment, where it leads to the first place behind at the link's
+//! distance. All body links begin there, so all have the same F. Handle k + 1 is behind handle k, so no handle after the
+//! first is ever further along the path than handle 1 has been. On the first segment, outside the fold, F is continuous
+//! arbitrarily far back. So while F exists up to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
 //! is first reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on
 //! the first segment, which is a straight line without singularities, or an inward spiral with singularities near its
 //! centre only (`inward`). Therefore only a start near the centre makes `SingularitySearch::body_stall` consider more
@@ -22,7 +23,7 @@ mod inward;
 mod trace;
 
 use crate::model::Point;
-use crate::model::path::{Param, Path};
+use crate::model::path::{Branch, Param, Path};
 use crate::model::root::bisect_predicate;
 use crate::model::team::Team;
 
@@ -31,14 +32,6 @@ use bench_dragon_messages::state::EventKind;
 use super::event::{Budget, Event};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
-
-/// The margins before a lock, in units in the last place. Rounding can make a handle jump within the last
-/// `JUMP_DIGITS`; `SAFE_DIGITS` more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
-const JUMP_DIGITS: u32 = 256;
-const SAFE_DIGITS: u32 = 32;
-const UNTOUCHED_DIGITS: u32 = 1024;
-/// The least displacement of a handle that jumps, in links: towards any other lock it moves less over those digits.
-const JUMP: f64 = 0.05;
 
 /// The singular configurations of a motion, up to the one that ends it.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +46,8 @@ pub struct Singularities {
     pub head_turns: Vec<f64>,
     /// The places of a body link's front handle, in metres of travel, at which its rear handle turns round, in order.
     pub body_turns: Vec<f64>,
+    /// The stretches in which followers are not the first places at their distances, for [`Path::with_branches`].
+    pub branches: Vec<Branch>,
 }
 
 impl Singularities {
@@ -69,16 +64,23 @@ impl Singularities {
             Ok((head, body))
         });
         let Ok((head, body)) = traces else {
-            return Self { stall: None, end: None, searched_until: 0.0, head_turns: vec![], body_turns: vec![] };
+            return Self::none(0.0);
         };
-        let mut search = SingularitySearch { path, team, head, body };
+        let mut search = SingularitySearch { path: path.clone(), team, head, body };
         search.run(budget);
         search.conclude()
+    }
+
+    /// Returns the result of a search up to a place without a singular configuration before.
+    pub fn none(searched_until: f64) -> Self {
+        let (head_turns, body_turns, branches) = (Vec::new(), Vec::new(), Vec::new());
+        Self { stall: None, end: None, searched_until, head_turns, body_turns, branches }
     }
 }
 
 struct SingularitySearch<'a> {
-    path: &'a Path,
+    /// In the end with the branches of both links.
+    path: Path,
     team: &'a Team,
     /// In metres of travel of the head.
     head: LinkTrace<'a>,
@@ -110,22 +112,19 @@ impl SingularitySearch<'_> {
         self.body.as_ref().is_some_and(|body| body.at().front < self.head.furthest_rear())
     }
 
-    fn conclude(self) -> Singularities {
+    fn conclude(mut self) -> Singularities {
+        let of_body = self.body.as_ref().filter(|_| self.team.link(0) != self.team.link(1));
+        let branches = [self.head.branches(), of_body.map_or_else(Vec::new, LinkTrace::branches)].concat();
+        self.path = self.path.with_branches(branches.clone());
         let limit = self.head.at().front.max(0.0);
         let body_limit = self.body.as_ref().filter(|_| self.body_lags()).and_then(|body| {
             let reached = self.handle_1_reaches(body.at().front, limit)?;
             Some((body.end(), reached.next_down().max(0.0)))
         });
         let (end, searched_until) = match (body_limit, self.head.end()) {
-            (Some((Some(TraceEnd::Lock), at)), _) => {
-                let at = self.before_jump(at, 1);
-                (Some(self.event(EventKind::Lock, at, 1)), at)
-            }
+            (Some((Some(TraceEnd::Lock), at)), _) => (Some(self.event(EventKind::Lock, at, 1)), at),
             (Some((_, at)), _) => (None, at),
-            (None, Some(TraceEnd::Lock)) => {
-                let at = self.before_jump(limit, 0);
-                (Some(self.event(EventKind::Lock, at, 0)), at)
-            }
+            (None, Some(TraceEnd::Lock)) => (Some(self.event(EventKind::Lock, limit, 0)), limit),
             (None, Some(TraceEnd::PathEnd)) => {
                 let kind = EventKind::PathEnd;
                 (Some(Event { kind, travelled: limit, bench_a: None, bench_b: None, place: None }), limit)
@@ -138,12 +137,12 @@ impl SingularitySearch<'_> {
         let furthest = places.fold(f64::NEG_INFINITY, f64::max);
         let body_turns = self.body.as_ref().map_or(&[][..], LinkTrace::turns);
         let body_turns = body_turns.iter().copied().filter(|at| *at <= furthest).collect();
-        Singularities { stall, end, searched_until, head_turns, body_turns }
+        Singularities { stall, end, searched_until, head_turns, body_turns, branches }
     }
 
     /// Returns the metres of travel of handle 1.
     fn handle_1(&self, head: f64) -> Option<f64> {
-        self.head.link().configuration(head).ok().map(|configuration| configuration.rear)
+        self.head.configuration(head).ok().map(|configuration| configuration.rear)
     }
 
     /// Returns the head's first travel up to `limit` at which handle 1 reaches `place`.
@@ -165,7 +164,7 @@ impl SingularitySearch<'_> {
 
     /// Returns the first stall up to `limit` metres of travel of the head.
     fn stall(&self, limit: f64) -> Option<Event> {
-        let start = self.head.link().configuration(0.0).ok()?;
+        let start = self.head.configuration(0.0).ok()?;
         if start.is_stalled() {
             return Some(self.event(EventKind::Stall, 0.0, 0));
         }
@@ -186,7 +185,7 @@ impl SingularitySearch<'_> {
         let mut first: Option<(f64, usize)> = None;
         let mut front = head.rear;
         for link in 1..self.team.benches {
-            let configuration = body.link().configuration(front).ok()?;
+            let configuration = body.configuration(front).ok()?;
             if configuration.is_stalled() {
                 return Some((0.0, link));
             }
@@ -207,7 +206,7 @@ impl SingularitySearch<'_> {
     /// Returns the head's first travel up to `limit` at which a handle reaches `place`, if no handle turned before.
     fn handle_reaches(&self, handle: usize, place: f64, limit: f64) -> Option<f64> {
         let reached = |head: f64| {
-            let body = self.body.as_ref().unwrap_or(&self.head).link();
+            let body = self.body.as_ref().unwrap_or(&self.head);
             let body_links = (1..handle).try_fold(self.handle_1(head)?, |front, _| {
                 body.configuration(front).ok().map(|configuration| configuration.rear)
             });
@@ -222,22 +221,6 @@ impl SingularitySearch<'_> {
         Event { kind, travelled, bench_a: Some(link as u32), bench_b: None, place }
     }
 
-    /// Returns the place of a lock, or a place some digits before it. At a lock where a nearer place of the path comes
-    /// within the link's reach the rear handle jumps there. Frames round differently from this search and may jump some
-    /// digits earlier.
-    fn before_jump(&self, travelled: f64, link: usize) -> f64 {
-        let length = self.team.link(link);
-        let place = |digits: u32| travelled - f64::from(digits) * f64::EPSILON * (travelled + length);
-        let rear = |digits: u32| self.rear(place(digits), link).map(|rear| self.path.travelled(rear));
-        // With digits that large, frames show only jumps.
-        let is_fine = travelled - place(UNTOUCHED_DIGITS) < 1e-6 * length && place(UNTOUCHED_DIGITS) >= 0.0;
-        let Some(before) = rear(UNTOUCHED_DIGITS).filter(|_| is_fine) else { return travelled };
-        let has_jumped = |digits: &u32| rear(*digits).is_some_and(|rear| rear > before + JUMP * length);
-        // All digits are tested, because rounding is not monotone.
-        let first = (0..JUMP_DIGITS).rev().find(has_jumped);
-        first.map_or(travelled, |digits| place(digits + SAFE_DIGITS))
-    }
-
     /// Returns the rear handle of a link; if rounding leaves none in the last digits, the handle at the last place
     /// before.
     fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
@@ -250,7 +233,7 @@ impl SingularitySearch<'_> {
     /// Returns the rear handle of a link as in a frame.
     fn rear(&self, travelled: f64, link: usize) -> Option<Param> {
         let head = self.path.param_at(travelled);
-        let follower = |front, link| crate::linkage::follower(self.path, front, self.team.link(link));
+        let follower = |front, link| crate::linkage::follower(&self.path, front, self.team.link(link));
         (0..=link).try_fold(head, follower).ok()
     }
 }
