@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 
 use super::boards::{MovingBoard, Shape};
+use super::branch::{Branch, branches};
 use super::capsule::{Spanned, moved_back};
 use super::grid::{GridPoint, span};
 use super::ground::Barrier;
@@ -72,6 +73,7 @@ pub(super) struct Chain<'a> {
     pub start: Option<Place>,
     /// The obstacles of the stage.
     pub barriers: Vec<Barrier>,
+    pub branches: Vec<Branch>,
 }
 
 /// Length added to both ends of a span, as a multiple of the rounding of doubles.
@@ -92,7 +94,9 @@ pub(super) fn links_of(team: &Team) -> [Interval; 2] {
 
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
-        Self { path, exact, team, links: links_of(team), shape: Shape::new(team), start: None, barriers: Vec::new() }
+        let branches = branches(path, &exact, team);
+        let (links, shape) = (links_of(team), Shape::new(team));
+        Self { path, exact, team, links, shape, start: None, barriers: Vec::new(), branches }
     }
 
     /// Returns the metres between the handles of a bench.
@@ -295,7 +299,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let padded = self.multiples.iter().enumerate().skip(first).find_map(|(too_small, multiple)| {
             let pad = least + multiple * PAD * size / rear_cosine;
             let rear = Spanned::new(exact, span(exact, ends[0].param, ends[1].param, pad, fine));
-            let sign = follower_within(exact, &front, &rear, length)?;
+            let sign = follower_within(exact, &front, &rear, length, (&self.chain.branches, link))?;
             Some((too_small, pad, rear, sign))
         });
         let (too_small, pad, rear, sign) = padded.ok_or(Obstacle::Link(link))?;
