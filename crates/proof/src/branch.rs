@@ -38,8 +38,8 @@ impl Branches {
         if !path.in_order(behind, front.0) {
             return Err("the place of the branch is not behind the front handle".to_owned());
         }
-        let mut of_link = self.0.iter().filter(|branch| branch.is_head == is_head);
-        if of_link.next_back().is_some_and(|before| !path.in_order(before.front.1, front.0)) {
+        let last = self.0.iter().rfind(|branch| branch.is_head == is_head);
+        if last.is_some_and(|before| !path.in_order(before.front.1, front.0)) {
             return Err("the branch begins before the end of the one before it".to_owned());
         }
         self.0.push(Branch { is_head, front, behind });
