@@ -12,7 +12,7 @@ use bench_dragon::motion::ground::Ground;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::path::Path;
 use bench_dragon::motion::model::separation::{separation_board_board, signed_distance_board_board};
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::table::FollowerTable;
 use bench_dragon::motion::solve::{Chain, Velocities};
@@ -27,7 +27,7 @@ const PITCH: f64 = 0.55;
 const SECONDS: f64 = 1.0;
 
 fn team(benches: usize) -> Team {
-    Team { benches, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 }
+    Team { benches, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275, ends: Ends::NONE }
 }
 
 /// Returns the chains of consecutive frames, with the metres the head has travelled: two, and those of a run.

@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 use bench_dragon::messages::FrameHeader;
 use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::path::Path;
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::paper::{Paper, PaperRules};
 use bench_dragon::motion::solve::selection;
@@ -34,7 +34,7 @@ fn main() {
 }
 
 fn team(benches: usize) -> Team {
-    Team { benches, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
+    Team { benches, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE }
 }
 
 fn spiral() -> Path {

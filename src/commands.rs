@@ -13,6 +13,7 @@ mod certificate_file;
 pub mod chase;
 pub mod check;
 pub mod control;
+pub mod design;
 pub mod draw;
 mod duration;
 pub mod events;
@@ -33,6 +34,7 @@ pub mod ros_args;
 pub mod run;
 pub mod scene_argument;
 mod scene_facts;
+mod scene_frames;
 pub mod send;
 mod service_manager;
 pub mod sheets;
@@ -56,9 +58,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use anstyle::AnsiColor;
-use bench_dragon::messages::sentence::{self, number, rounded};
+use bench_dragon::messages::sentence::{self, number};
 use bench_dragon::messages::state::Severity;
 use bench_dragon::motion::timeline::Timeline;
+use bench_dragon::show::results::figure;
 use bench_dragon::show::scene::{Scene, SceneError, SceneText};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -259,16 +262,6 @@ pub fn severity_colour(severity: Severity) -> AnsiColor {
         Severity::Ok => AnsiColor::Green,
         Severity::Warning => AnsiColor::Yellow,
         Severity::Error => AnsiColor::Red,
-    }
-}
-
-/// Formats a number for people: to a billionth, rounding errors as zero, very large and very small numbers with an
-/// exponent.
-pub fn figure(value: f64) -> String {
-    match value.abs() {
-        size if size < 1e-12 => "0".to_owned(),
-        size if (1e-6..1e9).contains(&size) => rounded(value, 9),
-        _ => format!("{value:.3e}"),
     }
 }
 

@@ -17,7 +17,9 @@
 //! - `recording`: MCAP recordings, their replay, and the verification of logs.
 //! - `chase`: a show follows timecode, or a performer with a tracker.
 //! - `outputs`: the stage page, PosiStageNet, OSC, metrics.
+//! - `design`: a scene edited as text and as a picture.
 //! - `soak`, `trade`, `drawing`: the soak test, the measurements of accuracy against cost, the pictures.
+//! - `fit`: numbers of a scene changed until the show keeps what it must.
 //! - `sheets`: hand-outs for the people who carry the benches.
 
 #![deny(missing_docs)]
@@ -31,7 +33,11 @@ pub use bench_dragon_certify as certify;
 pub use bench_dragon_chase as chase;
 pub use bench_dragon_client as client;
 #[cfg(feature = "library")]
+pub use bench_dragon_design as design;
+#[cfg(feature = "library")]
 pub use bench_dragon_drawing as drawing;
+#[cfg(feature = "library")]
+pub use bench_dragon_fit as fit;
 pub use bench_dragon_messages as messages;
 #[cfg(feature = "library")]
 pub use bench_dragon_motion as motion;

@@ -45,6 +45,9 @@ pub enum Command {
     Watch(commands::watch::WatchArguments),
     /// Serve the live stage picture to a browser
     View(commands::view::ViewArguments),
+    /// Serve the page on which a scene is made: text and picture side by side
+    #[command(arg = scene_argument())]
+    Design(commands::design::DesignArguments),
     /// Send a running publisher's dragon to lighting desks and other hosts
     Send(commands::send::SendArguments),
     /// Make a running publisher follow timecode, or a performer with a tracker
@@ -66,7 +69,7 @@ pub enum Command {
     /// Measure accuracy against cost for every solver on this scene and machine
     #[command(arg = scene_argument())]
     Trade(commands::trade::TradeArguments),
-    /// Plan a choreography: the least pitch, the least turn radius, the greatest speed
+    /// Plan a choreography: the least pitch, the least turn radius, the greatest speed, numbers that fit
     Plan(commands::plan::PlanArguments),
     /// Soak-test: publish for hours to real subscriber processes and give a verdict
     #[command(arg = scene_argument())]
@@ -136,6 +139,7 @@ fn main() -> ExitCode {
         Command::Verify(arguments) => commands::verify::verify(&common, arguments),
         Command::Watch(arguments) => commands::watch::watch(&common, arguments),
         Command::View(arguments) => commands::view::view(&common, arguments),
+        Command::Design(arguments) => commands::design::design(&common, arguments),
         Command::Send(arguments) => commands::send::send(&common, arguments),
         Command::Chase(arguments) => commands::chase::chase(&common, arguments),
         Command::Metrics(arguments) => commands::metrics::metrics(&common, arguments),

@@ -7,6 +7,7 @@ use bench_dragon::certify::CertificateLine;
 
 use super::CommandError;
 use super::new_file::NewFile;
+use super::signals::are_searches_stopped;
 
 /// A certificate that is being written.
 pub struct CertificateFile(BufWriter<NewFile>);
@@ -28,11 +29,15 @@ impl CertificateFile {
         line.write(&mut self.0)
     }
 
-    /// Completes the file under its name.
+    /// Completes the file under its name. Of a search that a signal has stopped no file is made.
     ///
     /// # Errors
     /// Failed: the disk is full, or the folder has changed.
     pub fn finish(self) -> Result<(), CommandError> {
+        if are_searches_stopped() {
+            log::warn!("the search was stopped: no certificate is written");
+            return Ok(());
+        }
         self.0.into_inner().map_err(io::Error::from)?.finish()
     }
 }

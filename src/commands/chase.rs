@@ -65,6 +65,9 @@ enum Kind {
     Ltc {
         /// A WAV file, or - for standard input
         file: PathBuf,
+        /// The channel with timecode, counted from 1; without it, the channel that has it is found
+        #[arg(long, value_name = "N")]
+        channel: Option<usize>,
         #[command(flatten)]
         timecode: TimecodeArguments,
     },
@@ -172,9 +175,9 @@ pub fn chase(common: &Common, arguments: &ChaseArguments) -> Result<(), CommandE
             let inputs = sources::mtc(device)?;
             follow(common, &stop, ChaseSource::Mtc, leader, inputs, &format!("MIDI timecode of {}", device.display()))
         }
-        Kind::Ltc { file, timecode } => {
+        Kind::Ltc { file, channel, timecode } => {
             let leader = Leader::Timecode(timecode.leader(ChaseSource::Ltc)?);
-            let inputs = sources::ltc(file)?;
+            let inputs = sources::ltc(file, *channel)?;
             follow(common, &stop, ChaseSource::Ltc, leader, inputs, &format!("LTC of {}", file.display()))
         }
         Kind::Psn(arguments) => psn(common, arguments, &stop),

@@ -10,18 +10,17 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::state::EventKind;
-use bench_dragon::motion::ensemble::LeastClearances;
 use bench_dragon::motion::ground::Obstacle;
-use bench_dragon::motion::timeline::{TimedClearance, TimedObstacleClearance, Timeline};
+use bench_dragon::motion::timeline::{TimedObstacleClearance, Timeline};
+use bench_dragon::show::requirements::{Bounds, Searched, verdicts};
+use bench_dragon::show::results::{clearance_lines, event_sentence};
 use bench_dragon::show::scene::{Scene, printable};
 use bench_dragon::show::timed_cues;
-use serde::Serialize;
 
 use description::describe;
 use parts::{Found, Parts};
-use required::{Searched, Verdicts};
 
-use super::events::{bench_name, find_least_clearance, known, least_clearance, least_clearance_between, sentence};
+use super::events::{bench_name, find_least_clearance, known, least_clearance, least_clearance_between};
 use super::signals::{gave_up, report, stop_searches_on_signals, unstopped};
 use super::swept::{Benches, Stretch, Swept, benches, swept};
 use super::verify::certificate::proved_of;
@@ -38,7 +37,8 @@ pub struct CheckArguments {
     /// included. With [require] the proof decides. It takes seconds to minutes; with --json, print the proof (and the line of --swept) alone
     #[arg(long)]
     prove: bool,
-    /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage
+    /// Write the ground that boards cover, true to 1 mm, as GeoJSON in metres of the stage; a real tail that whips covers
+    /// more
     #[arg(long, value_name = "FILE")]
     swept: Option<PathBuf>,
     /// The first time of --swept: seconds, or an event; by default 0
@@ -65,6 +65,12 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     let mut output = Output::standard();
+    if timeline.is_stopped() {
+        if !common.json {
+            ahead(&scene, &timeline, &mut output)?;
+        }
+        return output.finish().and(unstopped());
+    }
     let covered = arguments.covered(&scene, &timeline, common)?;
     let certified = arguments.certificate.as_ref().map(|file| proved(&text.text, file, common)).transpose()?;
     if let (Some(covered), true) = (&covered, common.json) {
@@ -82,15 +88,19 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     let least: Found<'_> = (found.of_show, &beside);
     let prove = || Parts::enclosed((&scene, &text.text), timeline.end(), least, arguments.certify.as_deref(), common);
     let parts = arguments.prove.then(prove).transpose()?;
-    let searched = Searched { timeline: &timeline, boards: found.of_show, obstacles: &beside };
-    let verdicts = Verdicts::of(&scene, &searched, parts.as_ref());
+    let searched = Searched { timeline: &timeline, boards: found.of_show, obstacles: &beside, gave_up: gave_up() };
+    let bounds = parts.as_ref().map(|parts| |obstacle: Option<&str>| parts.bounds(obstacle));
+    let verdicts = verdicts(&scene, &searched, bounds.as_ref().map(|bounds| bounds as Bounds<'_>));
     if common.json {
         match &parts {
             Some(parts) => parts.print_lines(&mut output)?,
-            None => print_lines(&scene, &timeline, &found, &beside, &mut output)?,
+            None => {
+                let lines = clearance_lines(&scene, &timeline, &found, &beside);
+                lines.iter().try_for_each(|line| output.json(line))?;
+            }
         }
-        verdicts.print_lines(&mut output)?;
-        return output.finish().and(unstopped()).and(verdicts.result());
+        required::print_lines(&verdicts, &mut output)?;
+        return output.finish().and(unstopped()).and(required::result(&verdicts));
     }
     output.line(&format!("  {}", least_clearance(&scene, found.of_show)))?;
     if let Some(between) = found.between.filter(|between| Some(*between) != found.of_show) {
@@ -103,7 +113,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         parts.iter().try_for_each(|parts| parts.print_unnamed(Some(name), &mut output))?;
     }
     parts.iter().try_for_each(|parts| parts.print_named(&mut output))?;
-    verdicts.print(&mut output)?;
+    required::print(&verdicts, &mut output)?;
     if let Some(covered) = covered {
         output.line(&format!("  {}", covered.sentence()))?;
     }
@@ -113,14 +123,14 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
             output.line(&format!("    {sentence}."))?;
         }
     }
-    output.finish().and(unstopped()).and(verdicts.result())
+    output.finish().and(unstopped()).and(required::result(&verdicts))
 }
 
 /// Prints the events and the cues.
 fn ahead(scene: &Scene, timeline: &Timeline, output: &mut Output) -> Result<(), CommandError> {
     output.line("  Ahead, in simulated time:")?;
     for timed in &known(timeline) {
-        output.line(&format!("  {}", sentence(scene, timed)))?;
+        output.line(&format!("  {}", event_sentence(scene, timed)))?;
     }
     if timeline.is_stopped() {
         return Ok(());
@@ -144,58 +154,6 @@ fn warnings(scene: &Scene, timeline: &Timeline) -> Vec<String> {
     let starts = [(EventKind::Contact, overlap), (EventKind::Obstacle, obstacle)];
     let starts = starts.into_iter().filter(|(kind, _)| begins_with(*kind)).map(|(_, warning)| warning.to_owned());
     scene.doubts.iter().cloned().chain(starts).collect()
-}
-
-/// A line of `check --json`: the least clearance of two boards.
-#[derive(Serialize)]
-struct LeastClearanceLine {
-    check: &'static str,
-    clearance: Option<f64>,
-    time: Option<f64>,
-    bench_a: Option<u32>,
-    bench_b: Option<u32>,
-    /// Simulated seconds up to which the clearance is the least: the end of the motion, or where the search gave up.
-    until: f64,
-}
-
-/// A line of `check --json`: the least clearance of an obstacle.
-#[derive(Serialize)]
-struct ObstacleLine<'a> {
-    check: &'static str,
-    obstacle: &'a str,
-    clearance: f64,
-    time: f64,
-    bench: u32,
-    until: f64,
-}
-
-/// Prints the least clearances of the whole route as JSON lines.
-fn print_lines(
-    scene: &Scene,
-    timeline: &Timeline,
-    found: &LeastClearances,
-    beside: &[TimedObstacleClearance],
-    output: &mut Output,
-) -> Result<(), CommandError> {
-    let until = |searched: Option<f64>| searched.unwrap_or(timeline.end().time);
-    let line = |check, found: Option<TimedClearance>| LeastClearanceLine {
-        check,
-        clearance: found.map(|found| found.least.value),
-        time: found.map(|found| found.time),
-        bench_a: found.map(|found| found.least.bench_a),
-        bench_b: found.map(|found| found.least.bench_b),
-        until: until(found.and_then(|found| found.searched_until)),
-    };
-    output.json(&line("clearance", found.of_show))?;
-    if scene.ensemble.only().is_none() {
-        output.json(&line("clearance_between_dragons", found.between))?;
-    }
-    for TimedObstacleClearance { obstacle, least, time, searched_until } in beside.iter().copied() {
-        let obstacle = &scene.ensemble.ground().obstacles()[obstacle].name;
-        let (check, clearance, bench) = ("obstacle", least.value, least.bench);
-        output.json(&ObstacleLine { check, obstacle, clearance, time, bench, until: until(searched_until) })?;
-    }
-    Ok(())
 }
 
 /// Searches for the least clearance of each obstacle over the whole route.

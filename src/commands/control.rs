@@ -1,5 +1,7 @@
 //! `control`: conducts a running publisher.
 
+mod osc;
+
 use std::time::Duration;
 
 use bench_dragon::client::control::command_client::Action as StateAction;
@@ -15,10 +17,18 @@ use super::{CommandError, Common, Output, number, seconds};
 #[derive(Debug, clap::Args)]
 pub struct ControlArguments {
     #[command(subcommand)]
-    action: Action,
+    kind: Kind,
     /// Longest wait for the answer; by default 30 s, and for a step as long as it makes progress
     #[arg(long, value_name = "TIME", value_parser = seconds, global = true, allow_negative_numbers = true)]
     timeout: Option<f64>,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Kind {
+    #[command(flatten)]
+    Once(Action),
+    /// Stay running, and let OSC messages conduct the show: /go, /hold, /release, /pause, /resume, /seek, /rate
+    Osc(osc::OscArguments),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::Subcommand)]
@@ -74,8 +84,21 @@ struct ResponseLine {
     cue: u32,
 }
 
-/// Sends one command and prints its result.
+impl From<&ControlResponse> for ResponseLine {
+    fn from(response: &ControlResponse) -> Self {
+        let code = response.result().map_or("unknown", Code::name);
+        let playback = response.playback_state().map_or("unknown", PlaybackState::name);
+        let ControlResponse { id: _, tick, sim_time, time_scale, code: _, playback: _, cue, reserved: _ } = *response;
+        Self { code, tick, sim_time, time_scale, playback, cue }
+    }
+}
+
+/// Sends one command and prints its result, or stays running for OSC.
 pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), CommandError> {
+    let action = match &arguments.kind {
+        Kind::Once(action) => *action,
+        Kind::Osc(arguments) => return osc::osc(common, arguments),
+    };
     let timeout = arguments.timeout.map(|seconds| {
         let sentence =
             || CommandError::BadInput(format!("--timeout is {}, expected a number of seconds", number(seconds)));
@@ -87,7 +110,7 @@ pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), Comm
         None => controller.send_patiently(command),
     };
     let mut controller = Controller::new(common.name())?;
-    let command = match arguments.action {
+    let command = match action {
         Action::State => Command::State,
         Action::Pause => Command::Pause,
         Action::Resume => Command::Resume,
@@ -112,12 +135,9 @@ pub fn control(common: &Common, arguments: &ControlArguments) -> Result<(), Comm
 }
 
 fn print(common: &Common, response: &ControlResponse) -> Result<(), CommandError> {
-    let code = response.result().map_or("unknown", Code::name);
-    let playback = response.playback_state().map_or("unknown", PlaybackState::name);
-    let ControlResponse { id: _, tick, sim_time, time_scale, code: _, playback: _, cue, reserved: _ } = *response;
     let mut output = Output::standard();
     if common.json {
-        output.json(&ResponseLine { code, tick, sim_time, time_scale, playback, cue })?;
+        output.json(&ResponseLine::from(response))?;
     } else if !common.quiet {
         output.line(&standing(response))?;
     }

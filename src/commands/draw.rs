@@ -41,7 +41,8 @@ struct Many {
     /// Simulated time between two pictures, which share one camera and one colour scale; with --until
     #[arg(long, value_name = "TIME", value_parser = seconds, requires = "until", allow_negative_numbers = true, group = "stretch")]
     every: Option<f64>,
-    /// Draw the ground that the boards cover, with its area, under the boards of --at
+    /// Draw the ground that the boards cover, with its area, under the boards of --at; a real tail that whips covers
+    /// more
     #[arg(long, group = "stretch")]
     swept: bool,
     /// The first time: seconds, or an event

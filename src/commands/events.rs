@@ -6,8 +6,9 @@ use bench_dragon::certify::{self, CertifiedEvent, CertifyError, MOST_STEPS, Stat
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::ensemble::LeastClearances;
 use bench_dragon::motion::event::Event;
-use bench_dragon::motion::ground::Obstacle;
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent, Timeline};
+pub use bench_dragon::show::results::bench_name;
+use bench_dragon::show::results::{EventLine, event_sentence, obstacle_label};
 use bench_dragon::show::scene::{Scene, printable};
 use serde::Serialize;
 
@@ -32,15 +33,9 @@ struct Enclosure {
 
 /// One line of `events --json`.
 #[derive(Serialize)]
-struct EventLine {
-    event: &'static str,
-    time: f64,
-    bench_a: Option<u32>,
-    bench_b: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    obstacle: Option<String>,
-    x: Option<f64>,
-    y: Option<f64>,
+struct Line {
+    #[serde(flatten)]
+    event: EventLine,
     #[serde(flatten)]
     enclosure: Option<Enclosure>,
 }
@@ -73,19 +68,10 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     let mut output = Output::standard();
     for timed in &known(&timeline) {
         if common.json {
-            let TimedEvent { event, time } = *timed;
-            output.json(&EventLine {
-                event: event.kind.name(),
-                time,
-                bench_a: event.bench_a,
-                bench_b: event.bench_b,
-                obstacle: scene.ensemble.obstacle_of(&event).map(|obstacle| obstacle.name.clone()),
-                x: event.place.map(|place| place.x),
-                y: event.place.map(|place| place.y),
-                enclosure: status(&event).map(enclosure),
-            })?;
+            let enclosure = status(&timed.event).map(enclosure);
+            output.json(&Line { event: EventLine::new(&scene, timed), enclosure })?;
         } else {
-            output.line(&sentence(&scene, timed))?;
+            output.line(&event_sentence(&scene, timed))?;
             if let Some(status) = status(&timed.event) {
                 output.line(&proof_sentence(timed.event.kind, status))?;
             }
@@ -204,37 +190,6 @@ fn proof_sentence(kind: EventKind, status: &Status) -> String {
     }
 }
 
-/// Returns a sentence for people on an event; benches count from 1, as the sentence states.
-pub fn sentence(scene: &Scene, timed: &TimedEvent) -> String {
-    let TimedEvent { event, time } = *timed;
-    let bench = |bench: Option<u32>| bench.map_or("no bench".to_owned(), |bench| bench_name(scene, bench));
-    let place = event.place.map_or(String::new(), |place| format!(" at ({:.6}, {:.6}) m", place.x, place.y));
-    let (first, second) = (bench(event.bench_a), bench(event.bench_b));
-    let what = match event.kind {
-        EventKind::Contact if time == 0.0 => format!("{first} and {second} overlap from the start, most deeply{place}"),
-        EventKind::Contact => format!("{first} and {second} touch{place}"),
-        EventKind::Obstacle => {
-            let obstacle = scene.ensemble.obstacle_of(&event).map_or(second, obstacle_label);
-            let how = if time == 0.0 { "is at" } else { "meets" };
-            format!("{first} {how} {obstacle}{}{place}", if time == 0.0 { " from the start," } else { "" })
-        }
-        EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
-        EventKind::Lock => format!("{first} locks: its rear handle{place} would need unbounded speed"),
-        EventKind::PathEnd => {
-            let dragon = event.bench_a.and_then(|head| scene.ensemble.owner(head as usize));
-            let head = dragon.map(|(dragon, _)| scene.ensemble.dragons()[dragon].titled("the head"));
-            format!("{} reaches the end of the path", head.unwrap_or_else(|| "the head".to_owned()))
-        }
-    };
-    format!("{:>9}  t = {} s: {what} (counting from 1).", event.kind.name(), figure(time))
-        .replace("path (counting from 1)", "path")
-}
-
-/// Returns the name of an obstacle in a sentence.
-fn obstacle_label(obstacle: &Obstacle) -> String {
-    format!("the {}", printable(&obstacle.name))
-}
-
 /// Returns the least clearances of the whole route: up to the lock or the path end with which the motion ends, even if
 /// the show stops earlier.
 pub fn find_least_clearance(scene: &Scene, timeline: &Timeline, common: &Common) -> LeastClearances {
@@ -266,9 +221,4 @@ pub fn least_clearance_between(scene: &Scene, found: &TimedClearance) -> String 
         "The least clearance between dragons",
         1,
     )
-}
-
-/// Returns a bench's name for people, counted from 1.
-pub fn bench_name(scene: &Scene, bench: u32) -> String {
-    scene.ensemble.roster().bench(bench)
 }

@@ -1,5 +1,6 @@
 //! `plan`: answers for a choreographer, with the place that decides them.
 
+mod fit;
 mod turn;
 
 use std::path::{Path, PathBuf};
@@ -55,6 +56,9 @@ enum Question {
         #[arg(long, value_name = "K", allow_negative_numbers = true)]
         arc_ratio: Option<f64>,
     },
+    /// Numbers of the scene with which the show keeps what it must, with the greatest margin found
+    #[command(arg = scene_argument())]
+    Fit(fit::FitArguments),
 }
 
 /// The line of `plan pitch --json`.
@@ -99,13 +103,14 @@ fn given_up() -> &'static str {
     if are_searches_stopped() { "was stopped" } else { "was given up" }
 }
 
-/// Plans the pitch, the speed or the turn.
+/// Plans the pitch, the speed, the turn or numbers of the scene.
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     stop_searches_on_signals()?;
     match &arguments.question {
         Question::Pitch { reach_radius, certify } => plan_pitch(common, *reach_radius, certify.as_deref()),
         Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
         Question::Turn { arc_ratio } => turn::plan_turn(common, *arc_ratio),
+        Question::Fit(arguments) => fit::plan_fit(common, arguments),
     }
 }
 

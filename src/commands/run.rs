@@ -15,11 +15,11 @@ use bench_dragon::publisher::log::{self as recording_log, LogOutcome};
 use bench_dragon::publisher::run::{Hooks, Publishing};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
 use bench_dragon::show::convert;
+use bench_dragon::show::results::event_sentence;
 use bench_dragon::show::scene::{Accepted, AtEnd, Scene, SceneText};
 use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::soak::histograms::HistogramLog;
 
-use super::events::sentence;
 use super::parent::Parent;
 use super::publishing::{new_run_id, open_transports, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
@@ -226,7 +226,7 @@ impl RunSession<'_> {
             None => eprintln!("No alerts: contact and stall are not computed. Ahead, in simulated time:"),
         }
         for timed in &self.timeline.all() {
-            eprintln!("{}", sentence(scene, timed));
+            eprintln!("{}", event_sentence(scene, timed));
         }
         for cue in &self.cues {
             let waits = if cue.pauses { ", waits there" } else { "" };

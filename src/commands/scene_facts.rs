@@ -1,28 +1,22 @@
 //! The facts about a scene that the page of `view` shows and that no publisher sends: whether the scene loops, and its
 //! clearance over the whole show. In: the text of a scene. Out: facts for `outputs`, computed once for each scene.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::{TimedEvent, Timeline};
 use bench_dragon::outputs::view::{ClearanceCurve, LeastOfShow, SceneFacts};
-use bench_dragon::show::scene::{AlertRules, AtEnd, Scene};
-use bench_dragon::show::{Playback, Show};
+use bench_dragon::show::curve::clearance_curve;
+use bench_dragon::show::scene::{AtEnd, Scene};
 
-/// Points of the curve at equal distances, and further ones on each side of the least clearance between two of these.
-const POINTS: u32 = 600;
-/// See [`POINTS`].
-const POINTS_AT_LEAST: u32 = 24;
 /// The time after which no curve is shown: a page does not wait for a team of a million benches.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Returns the facts about the scene with this text; `None` for a text that is no scene.
 pub fn scene_facts(text: &str) -> Option<SceneFacts> {
-    let mut scene = Scene::parse(text, "the scene of the show", "show").ok()?;
+    let scene = Scene::parse(text, "the scene of the show", "show").ok()?;
     let loop_stand = (scene.at_end == AtEnd::Loop).then_some(scene.end_hold);
-    // Frames have a clearance only with alerts, and a cue may let a show wait.
-    scene.alerts.get_or_insert(AlertRules { approach_time: 0.0, approach_clearance: 0.0 });
-    scene.cues.clear();
     Some(SceneFacts { loop_stand, clearance: clearance(&scene) })
 }
 
@@ -33,12 +27,8 @@ fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
     let show_end = *timeline.show_end(scene.stops_at_contact());
     let least = least(scene, &timeline, &show_end)?;
     let patience = Instant::now() + PATIENCE;
-    let step = show_end.time / f64::from(POINTS);
-    let mut points = frames(scene, &timeline, 0.0, step, POINTS, patience)?;
-    let fine = step / f64::from(POINTS_AT_LEAST);
-    points.extend(frames(scene, &timeline, (least.time - step).max(0.0), fine, 2 * POINTS_AT_LEAST, patience)?);
-    points.push([least.time, least.clearance]);
-    points.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    let mut progress = |_| if Instant::now() > patience { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+    let points = clearance_curve(scene, &timeline, show_end.time, [least.time, least.clearance], &mut progress)?;
     Some(ClearanceCurve { points, least })
 }
 
@@ -64,28 +54,6 @@ fn least(scene: &Scene, timeline: &Timeline, show_end: &TimedEvent) -> Option<Le
     });
     let all = of_boards.into_iter().chain(of_obstacles).filter(|_| is_whole);
     all.min_by(|one, other| one.clearance.total_cmp(&other.clearance))
-}
-
-/// Returns the times and the clearances of `count` + 1 frames of the show, `step` simulated seconds apart.
-fn frames(
-    scene: &Scene,
-    timeline: &Timeline,
-    start: f64,
-    step: f64,
-    count: u32,
-    patience: Instant,
-) -> Option<Vec<[f64; 2]>> {
-    let playback = Playback { start, rate: 1.0 / step, at_end: AtEnd::Hold, ..Playback::of(scene) };
-    let mut show = Show::new(scene, timeline.clone(), playback).ok()?;
-    let mut points = Vec::with_capacity(count as usize + 1);
-    for tick in 0..=u64::from(count) {
-        let frame = show.frame(tick);
-        points.push([frame.sim_time, frame.min_clearance]);
-        if Instant::now() > patience {
-            return None;
-        }
-    }
-    Some(points)
 }
 
 #[cfg(test)]

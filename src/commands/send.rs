@@ -5,14 +5,16 @@ mod ros2;
 mod timecode;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use bench_dragon::client::feed::Delivery;
 use bench_dragon::client::polling::poll_until;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::outputs::send::network::{NetworkError, Outlet, Route, destination};
-use bench_dragon::outputs::send::osc::Addresses;
-use bench_dragon::outputs::send::osc_sender::{MOST_RATE, OscSender, OscSenders};
+use bench_dragon::outputs::send::osc::{Addresses, Packing};
+use bench_dragon::outputs::send::osc_map::OscMap;
+use bench_dragon::outputs::send::osc_sender::{MOST_RATE, OscOptions, OscSender, OscSenders};
 use bench_dragon::outputs::send::psn_sender::{Notice, PsnOptions, PsnSender, USUAL_ADDRESS, USUAL_PORT, USUAL_RATE};
 use bench_dragon::outputs::send::trackers::{Numbers, Selection};
 
@@ -86,6 +88,12 @@ struct OscArguments {
     /// The greatest rate in bundles of frames per second, up to 60; a slower publisher is sent at its own rate
     #[arg(long, value_name = "HZ", default_value_t = f64::from(MOST_RATE), value_parser = rate::<MOST_RATE>)]
     rate: f64,
+    /// Send each message by itself, for receivers that read no bundles
+    #[arg(long)]
+    messages: bool,
+    /// A file (TOML) with addresses and arguments of cues, levels and events, which are sent in place of all others
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
 }
 
 /// Arguments of `send ros2`.
@@ -203,7 +211,9 @@ fn numbers(names: &[String], arguments: &PsnArguments) -> Result<Vec<Numbers>, C
 
 fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
-    let OscArguments { to, interface, rate } = arguments;
+    let OscArguments { to, interface, rate, messages, map } = arguments;
+    let packing = if *messages { Packing::Messages } else { Packing::Bundles };
+    let map = map.as_deref().map(osc_map).transpose()?;
     let addresses: Vec<_> = common.names.iter().map(|name| Addresses::new(name)).collect();
     let prefixes: Vec<_> = addresses.iter().map(|addresses| addresses.prefix().to_owned()).collect();
     if let Some(twice) = prefixes.iter().enumerate().find(|(at, prefix)| prefixes[..*at].contains(prefix)) {
@@ -213,17 +223,20 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
     }
     let sender = |addresses| {
         let outlet = Outlet::open(to, Route { interface: *interface, multicast_ttl: 1 })?;
-        Ok(OscSender::new(addresses, *rate, outlet))
+        Ok(OscSender::new(addresses, OscOptions { rate: *rate, packing, map: map.clone() }, outlet))
     };
     let senders = addresses.into_iter().map(sender).collect::<Result<_, NetworkError>>()?;
     let mut senders = OscSenders::new(senders);
     print(common, || {
         let to = to.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let by = interface.map_or(String::new(), |interface| format!(" by {interface}"));
+        let names = common.quoted_names();
+        if map.is_some() {
+            return format!("Sending {names} as OSC to {to}{by}: the messages of --map alone. Ctrl-C ends.");
+        }
         format!(
-            "Sending {} as OSC to {to}{by}: {}/alert, countdown, state, cue, head, sim_time; at most {} frames per \
+            "Sending {names} as OSC to {to}{by}: {}/alert, countdown, state, cue, head, sim_time; at most {} frames per \
              second. Ctrl-C ends.",
-            common.quoted_names(),
             prefixes.join(", "),
             number(*rate)
         )
@@ -240,6 +253,14 @@ fn osc(common: &Common, arguments: &OscArguments) -> Result<(), CommandError> {
         ))?;
     }
     output.finish()
+}
+
+/// Reads the user's messages.
+fn osc_map(file: &Path) -> Result<OscMap, CommandError> {
+    let refused = |sentence: String| CommandError::BadInput(sentence);
+    let text = std::fs::read_to_string(file)
+        .map_err(|error| refused(format!("{}: {error}, expected a TOML file with [[messages]]", file.display())))?;
+    OscMap::parse(&text, &file.display().to_string()).map_err(|error| refused(error.to_string()))
 }
 
 fn notice_line(name: &str, notice: &Notice) -> String {

@@ -43,6 +43,7 @@ const DIGITS: usize = 8;
 
 /// Writes the sheets.
 pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), CommandError> {
+    stop_searches_on_signals()?;
     let text = common.scene_text()?;
     let scene = text.parse()?;
     expect_exact_motion(&scene)?;
@@ -54,17 +55,15 @@ pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), Comman
     let chosen = ranges(&scene, arguments.benches.as_ref())?;
     let clock = arguments.clock()?;
     warn_of_doubts(&scene);
-    stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     let bar = progress_bar(1000, common).with_message("following every bench");
-    let mut progress = |share| bar.set_position((1000.0 * share) as u64);
-    let obstacles = scene.ensemble.obstacle_clearances(timeline.end(), &mut |_| report(&bar, 0.0));
+    let obstacles = scene.ensemble.obstacle_clearances(timeline.end(), &mut |share| report(&bar, 0.1 * share));
     let searched = Searched { boards: find_least_clearance(&scene, &timeline, common).of_show, obstacles: &obstacles };
     let is_drawn = |bench| {
         let Some((dragon, bench)) = scene.ensemble.owner(bench) else { return false };
         bench == 0 || pages(&chosen[dragon]).any(|(middle, _)| middle == bench)
     };
-    let walk = Walk::new(&scene, &timeline, &searched, is_drawn, &mut progress);
+    let walk = Walk::new(&scene, &timeline, &searched, is_drawn, &mut |share| report(&bar, share));
     bar.finish_and_clear();
     unstopped()?;
     if let Some(file) = &arguments.csv {

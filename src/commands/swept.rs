@@ -209,7 +209,8 @@ impl Swept {
         let Self { area, from, until, words, .. } = self;
         let rings = area.polygons().len();
         format!(
-            "Ground covered from {} s to {} s by {words}: {:.3} m2, in {rings} polygon{}.",
+            "Ground covered from {} s to {} s by {words}: {:.3} m2, in {rings} polygon{}. Left out: rings narrower than \
+             1 mm, and the ground of a real tail that whips by its momentum.",
             figure(*from),
             figure(*until),
             area.area(),

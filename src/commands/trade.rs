@@ -72,6 +72,9 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
     if !scene.ensemble.ground().is_empty() {
         log::warn!("`trade` leaves out the obstacles of the scene: it measures handles and the boards' first contact");
     }
+    if parts.len() > 1 {
+        log::warn!("`trade` leaves out the clearance and the contacts between dragons: it measures each dragon alone");
+    }
     stop_searches_on_signals()?;
     let bar = progress_bar(1000, common);
     let mut output = Output::standard();

@@ -13,6 +13,7 @@ use serde_json::json;
 
 use super::qr_code::qr_code;
 use super::scene_facts::scene_facts;
+use super::scene_frames::scene_frames;
 use super::verify::certificate::reason;
 use super::{CommandError, Common, Output, stop_on_signals};
 
@@ -40,15 +41,15 @@ pub struct ViewArguments {
     certificate: Vec<PathBuf>,
 }
 
-/// The line of `view --json` once browsers can connect.
+/// The line of `view --json`, and of `design --json`, once browsers can connect.
 #[derive(Serialize)]
-struct ReadyLine {
-    r#type: &'static str,
-    url: String,
+pub struct ReadyLine {
+    pub r#type: &'static str,
+    pub url: String,
     /// The addresses for other machines, if the server listens on all of this machine's.
-    others: Vec<String>,
+    pub others: Vec<String>,
     /// The token for commands; null if none is needed.
-    token: Option<String>,
+    pub token: Option<String>,
 }
 
 /// Serves the picture until a signal comes.
@@ -59,7 +60,8 @@ pub fn view(common: &Common, arguments: &ViewArguments) -> Result<(), CommandErr
     let proofs = Arc::new(Proofs::expected(&certificates));
     let address = SocketAddr::new(listen, port);
     let facts = Arc::new(Facts::new(scene_facts));
-    let options = ViewOptions { address, control, origins: allow_origin, pages, proofs: Arc::clone(&proofs), facts };
+    let (origins, open_scene) = (allow_origin, scene_frames);
+    let options = ViewOptions { address, control, origins, pages, proofs: Arc::clone(&proofs), facts, open_scene };
     serve(&common.names, options, &stop, |ready| {
         announce(common, arguments, ready)?;
         check_in_background(certificates, proofs, common.json)
@@ -160,7 +162,7 @@ fn announce(common: &Common, arguments: &ViewArguments, ready: &Ready) -> Result
 }
 
 /// Returns the addresses of this machine for other machines, of the kinds that are listened on.
-fn own_addresses(listen: IpAddr) -> Vec<IpAddr> {
+pub fn own_addresses(listen: IpAddr) -> Vec<IpAddr> {
     let interfaces = nix::ifaddrs::getifaddrs().into_iter().flatten();
     let mut addresses: Vec<_> = interfaces
         .filter_map(|interface| {

@@ -1,10 +1,12 @@
 //! The stage page in a real browser.
 
 mod conduct;
+mod design;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod looks;
 mod proved;
+mod scrub;
 mod several;
 mod sheets;
 mod view;

@@ -42,6 +42,46 @@ fn certificates_are_proofs() {
     }
 }
 
+/// Heads and tails of their own size: an inward spiral, and a route past an obstacle on which the tail's link stalls.
+/// The certificate of one size is none of another, where it claims an event of that board.
+#[test]
+fn heads_and_tails_of_their_own_size_are_proved_and_forged_sizes_refused() {
+    let spiral = "[team]\nbenches = 24\nhead_width = 0.8\ntail_width = 0.2\ntail_length = 3.0\n[path]\nkind = \"spiral\"\n\
+                  pitch = 0.74\nstart_turn = 5\n[motion]\nhead_speed = 1.0\non_contact = \"continue\"\n";
+    let route = "[team]\nbenches = 5\ntail_width = 1.2\ntail_length = 4.0\n[path]\nkind = \"pieces\"\n\
+                 [[path.pieces]]\nkind = \"line\"\nlength = 3.0\n[[path.pieces]]\nkind = \"arc\"\nradius = 1.75\nside = \
+                 \"left\"\nturns = 0.5\n[[path.pieces]]\nkind = \"line\"\nlength = 25.0\n[motion]\nhead_speed = 1.0\n\
+                 on_contact = \"continue\"\n[stage]\n[[stage.obstacles]]\nname = \"post\"\ncircle = { center = [-2.0, -0.9], \
+                 radius = 0.4 }\n";
+    let forgeries: [&[[&str; 2]]; 2] = [
+        &[
+            ["head_width = 0.8", "head_width = 0.81"],
+            ["head_width = 0.8", "head_width = 0.7"],
+            ["head_width = 0.8\n", ""],
+            ["tail_length = 3.0", "tail_length = 3.1"],
+            ["tail_length = 3.0\n", ""],
+        ],
+        &[
+            ["tail_width = 1.2", "tail_width = 1.3"],
+            ["tail_width = 1.2", "tail_width = 1.1"],
+            ["tail_width = 1.2\n", ""],
+            ["tail_length = 4.0", "tail_length = 3.9"],
+        ],
+    ];
+    for (text, forgeries) in [spiral, route].into_iter().zip(forgeries) {
+        let lines = certificate(text);
+        let proved = check(&lines).unwrap_or_else(|refused| panic!("{text}: {refused}"));
+        println!("{:?}", proved.results);
+        assert_eq!(Found::new(text).unwrap().contradiction(&proved), None, "{text}");
+        assert!(proved.results.iter().all(|outcome| outcome.status != Status::Undecided), "{:?}", proved.results);
+        for [own, forged] in forgeries {
+            let mut forgery = lines.clone();
+            forgery[0]["scene"] = text.replace(own, forged).into();
+            assert!(check(&forgery).is_err(), "{forged} in place of {own}");
+        }
+    }
+}
+
 /// Returns the output, the error output and the exit code of the program.
 fn program(arguments: &[&str]) -> (String, String, Option<i32>) {
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments).output().unwrap();

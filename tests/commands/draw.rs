@@ -182,6 +182,29 @@ fn every_board_in_the_frame_is_drawn_where_solve_has_it_and_clipped_at_the_rim()
     assert!(at_the_rim > 40, "{at_the_rim} boards at the rim");
 }
 
+/// Head and tail of their own sizes, in a picture and in the sentence of `check`.
+#[test]
+fn a_wide_head_and_a_long_tail_are_drawn_in_their_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ends.toml");
+    let ends = "[team]\nhead_width = 1.0\ntail_width = 0.6\ntail_length = 4.0\n";
+    let turnaround = std::fs::read_to_string(scene_file("turnaround")).unwrap();
+    std::fs::write(&file, turnaround.replace("[team]\n", ends)).unwrap();
+    let scene = file.to_str().unwrap();
+    let svg = answer(&["--scene", scene, "draw", "--at", "20"]);
+    let document = Document::parse(&svg).unwrap();
+    let drawn = drawn(&document);
+    let last = *drawn.keys().next_back().unwrap();
+    for (bench, length, width) in [(0, 3.41, 1.0), (1, 2.2, 0.3), (last - 1, 2.2, 0.3), (last, 4.0, 0.6)] {
+        let [front_left, rear_left, rear_right, _] = drawn[&bench][..] else { panic!("four corners") };
+        let side = |one: [f64; 2], other: [f64; 2]| (one[0] - other[0]).hypot(one[1] - other[1]);
+        assert!((side(front_left, rear_left) - length).abs() < 1e-4, "bench {bench}");
+        assert!((side(rear_left, rear_right) - width).abs() < 1e-4, "bench {bench}");
+    }
+    let said = answer(&["--scene", scene, "check"]);
+    assert!(said.contains("Ends: the head is 1 m wide; the tail's board is 4 m long and 0.6 m wide."), "{said}");
+}
+
 #[test]
 fn the_view_is_what_was_asked_for() {
     let close = |found: [f64; 4], expected: [f64; 4]| {

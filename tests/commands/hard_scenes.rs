@@ -12,7 +12,7 @@ use bench_dragon::motion::ensemble::Ensemble;
 use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::reference::Reference;
 use bench_dragon::motion::solve::{Chain, Velocities};
@@ -208,7 +208,14 @@ fn bends_as_wide_as_a_link_are_searched() {
                 RouteStep::Line { length: 6.0 * link },
             ],
         };
-        let team = Team { benches: 4, head_length: link, body_length: link, width: 0.1 * link, hole_inset: 0.0 };
+        let team = Team {
+            benches: 4,
+            head_length: link,
+            body_length: link,
+            width: 0.1 * link,
+            hole_inset: 0.0,
+            ends: Ends::NONE,
+        };
         let motion = Motion::new(description, team, 1.0, Method::Newton).unwrap();
         let timeline = Ensemble::alone(motion).timeline(&mut unreported);
         assert_eq!(timeline.searched_until(), None, "link {link}, offset {offset}");

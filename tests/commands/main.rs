@@ -4,13 +4,16 @@ mod bad_input;
 mod certify;
 mod check_cues;
 mod contest;
+mod design;
 mod draw;
 mod files;
 mod first_scene;
+
 mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod interrupted;
 mod packages;
 mod placement;
 mod require;

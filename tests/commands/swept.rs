@@ -25,6 +25,25 @@ fn the_ground_is_that_of_sampled_boards() {
     }
 }
 
+/// Also of a tail that is longer and wider than the benches before it, and of a wider head.
+#[test]
+fn the_ground_of_a_wide_head_and_tail_is_that_of_sampled_boards() {
+    if !can_run(python_modules(&["numpy", "shapely"])) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ends.toml");
+    let scene = "[team]\nbenches = 6\nhead_width = 1.0\ntail_width = 0.6\ntail_length = 4.0\n[path]\nkind = \"spiral\"\n\
+                 pitch = 1.5\nstart_turn = 4\n[motion]\nhead_speed = 1.0\n";
+    std::fs::write(&file, scene).unwrap();
+    let mut peer = python();
+    peer.args(["tests/python/swept.py", env!("CARGO_BIN_EXE_bench-dragon")]).arg(&file);
+    peer.args(["1", "5", "1", "6", "3.41", "2.20", "0.30", "0.275", "", "1.0", "0.6"]);
+    let output = peer.output().unwrap();
+    println!("{}", text(&output.stdout));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
 /// The ground of one of two dragons, of both, and of one that stands in part of the time.
 #[test]
 fn the_ground_of_two_dragons_is_that_of_sampled_boards() {
@@ -65,6 +84,11 @@ fn benches_of_several_dragons_have_their_dragons_name() {
     }
     let svg = printed(&["--scene", "config/crossing.toml", "draw", "--swept", "--at", "52", "--until", "52"]);
     assert!(svg.contains("ground covered: "), "{svg}");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ground.json");
+    let said =
+        printed(&["--scene", "config/crossing.toml", "check", "--swept", file.to_str().unwrap(), "--until", "1"]);
+    assert!(said.contains("Left out: rings narrower than 1 mm, and the ground of a real tail that whips"), "{said}");
 }
 
 fn printed(arguments: &[&str]) -> String {

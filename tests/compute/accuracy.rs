@@ -13,7 +13,7 @@ use bench_dragon::motion::ensemble::Ensemble;
 use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::reference::Reference;
 use bench_dragon::motion::solve::selection::{self, EXACT_LINKS, Selection};
@@ -284,7 +284,14 @@ fn motions() -> impl Strategy<Value = Motion> {
     });
     let size = (2usize..60, 0.3..2.0f64, 0.3..1.0f64, magnitude(1e-3, 1e3));
     (prop_oneof![spiral, route, turnaround], size).prop_map(|(description, (benches, head, body, speed))| {
-        let team = Team { benches, head_length: head + 0.1, body_length: body + 0.1, width: 0.1, hole_inset: 0.05 };
+        let team = Team {
+            benches,
+            head_length: head + 0.1,
+            body_length: body + 0.1,
+            width: 0.1,
+            hole_inset: 0.05,
+            ends: Ends::NONE,
+        };
         Motion::new(description, team, speed, Method::Accuracy(1e-9)).unwrap()
     })
 }

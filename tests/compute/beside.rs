@@ -72,7 +72,7 @@ fn clearance(scene: &Scene, team: &chain::Team, pose: &chain::Pose, bench: usize
     let (front, rear) = (placed(bench), placed(bench + 1));
     let middle = [0.5 * (front[0] + rear[0]), 0.5 * (front[1] + rear[1])];
     let at = At::new(middle.into(), (front[1] - rear[1]).atan2(front[0] - rear[0]));
-    let board = Cuboid::new([0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width].into());
+    let board = Cuboid::new([0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width(bench)].into());
     let shape = &obstacle.shape;
     let distance = if shape.kind() == ShapeKind::Circle {
         let centre = shape.points()[0];

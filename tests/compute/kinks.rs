@@ -8,7 +8,7 @@ use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::linkage;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::selection;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
@@ -141,6 +141,7 @@ fn motions() -> impl Strategy<Value = Motion> {
         body_length: body + 0.1,
         width: 0.1,
         hole_inset: 0.05,
+        ends: Ends::NONE,
     });
     team.prop_flat_map(|team| {
         let turnaround = (0.5..3.0f64, 1.2..5.0f64, 0.2..5.0f64, 5.0..80.0f64, 20.0..200.0f64).prop_map(

@@ -7,6 +7,7 @@ use bench_dragon::motion::event::unreported;
 use bench_dragon::show::scene::Scene;
 
 use crate::oracle::{chain, scenes};
+use bench_dragon::motion::model::team::{Ends, Team};
 use parry2d_f64::math::Pose as At;
 use parry2d_f64::query;
 use parry2d_f64::shape::Cuboid;
@@ -22,7 +23,7 @@ fn distance(team: &chain::Team, pose: &chain::Pose, [a, b]: [usize; 2]) -> f64 {
     let placed = |bench: usize| {
         let [front, rear] = [bench, bench + 1].map(|handle| pose.handles[handle].point);
         let (middle, along) = (0.5 * (front + rear), front - rear);
-        let shape = Cuboid::new([0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width].into());
+        let shape = Cuboid::new([0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width(bench)].into());
         (At::new([middle.x, middle.y].into(), along.y.atan2(along.x)), shape)
     };
     let ((at_a, shape_a), (at_b, shape_b)) = (placed(a), placed(b));
@@ -33,7 +34,7 @@ fn distance(team: &chain::Team, pose: &chain::Pose, [a, b]: [usize; 2]) -> f64 {
 /// `limit` are not tested.
 fn least_distance(team: &chain::Team, pose: &chain::Pose, limit: f64) -> f64 {
     let middle = |bench: usize| 0.5 * (pose.handles[bench].point + pose.handles[bench + 1].point);
-    let reach = |bench: usize| (0.5 * team.link(bench) + team.hole_inset).hypot(0.5 * team.width);
+    let reach = |bench: usize| (0.5 * team.link(bench) + team.hole_inset).hypot(0.5 * team.width(bench));
     let pairs = (0..team.benches).flat_map(|a| (a + 2..team.benches).map(move |b| [a, b]));
     let near = pairs.filter(|[a, b]| (middle(*a) - middle(*b)).norm() < reach(*a) + reach(*b) + limit);
     near.map(|pair| distance(team, pose, pair)).fold(f64::INFINITY, f64::min)
@@ -189,13 +190,8 @@ fn least_pitches_of_other_teams_and_radii_are_those_of_the_brute_force() {
 #[test]
 fn a_link_that_locks_with_any_less_is_proved_too() {
     // The head's link is longer than twice the radius.
-    let team = bench_dragon::motion::model::team::Team {
-        benches: 8,
-        head_length: 0.542,
-        body_length: 0.33,
-        width: 0.15,
-        hole_inset: 0.015,
-    };
+    let team =
+        Team { benches: 8, head_length: 0.542, body_length: 0.33, width: 0.15, hole_inset: 0.015, ends: Ends::NONE };
     let plan = least_pitch(&team, 0.18, &mut unreported).unwrap();
     println!("{plan:?}");
     let (lo, hi) = (plan.value_lo, plan.value_hi.unwrap());

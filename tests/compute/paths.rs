@@ -8,7 +8,7 @@ use bench_dragon::motion::clearance::least_clearance_all_pairs;
 use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::linkage::follower;
 use bench_dragon::motion::model::path::Path;
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::Timeline;
@@ -74,7 +74,7 @@ proptest! {
     /// the turn whose arcs are exchanged.
     #[test]
     fn the_way_out_is_the_way_in_backwards(ratio in 0.5..2.0f64, head in 40.0..110.0f64) {
-        let team = Team { benches: 20, head_length: 2.2, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
+        let team = Team { benches: 20, head_length: 2.2, body_length: 2.2, width: 0.3, hole_inset: 0.275, ends: Ends::NONE };
         let path = |ratio: f64| Path::turnaround(1.7, 4.5, ratio, 60.0, 60.0).unwrap();
         let (there, back) = (path(ratio), path(1.0 / ratio));
         let mut front = there.param_at(head);

@@ -22,7 +22,7 @@ use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::description::{PathDescription, RouteStep};
 use bench_dragon::motion::model::spiral::Direction;
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::newton::Newton;
 use bench_dragon::motion::solve::reference::Reference;
 use bench_dragon::motion::solve::selection::{self, Selection};
@@ -169,12 +169,12 @@ fn radius(chain: &Chain, handle: usize) -> f64 {
 fn spiral(benches: usize, head_link: f64, link: f64, pitch: f64, start_turn: f64, speed: f64) -> Subject {
     let hole_inset = 0.1 * link.min(head_link);
     let (head_length, body_length) = (head_link + 2.0 * hole_inset, link + 2.0 * hole_inset);
-    let team = Team { benches, head_length, body_length, width: hole_inset, hole_inset };
+    let team = Team { benches, head_length, body_length, width: hole_inset, hole_inset, ends: Ends::NONE };
     Subject::new(PathDescription::Spiral { pitch, start_turn }, team, speed)
 }
 
 fn paper_team() -> Team {
-    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
+    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE }
 }
 
 /// Returns the paper's scene and the turnaround with their tables of 50 digits.

@@ -32,8 +32,8 @@ fn stopped<T>(mut search: impl FnMut(Progress<'_>) -> T, mut check: impl FnMut(&
             if done > most { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         check(&whole, search(&mut progress));
-        // Each search of a part ends at the first answer.
-        assert!(done <= most + 60, "{done} calls, stopped after {most}");
+        // The searches of a part end at their first answers; a golden section ends its few steps.
+        assert!(done <= most + 2_000, "{done} calls, stopped after {most}");
     }
     whole
 }
@@ -125,8 +125,15 @@ fn a_certificate_holds_and_says_what_is_not_decided() {
                 let because = |because: &str| because == "the search was stopped there";
                 let is_stopped =
                     |status: &Status| matches!(status, Status::Undecided { because: of, .. } if because(of));
-                assert!(part.iter().any(|event| is_stopped(&event.status)), "{part:?}");
-                assert!(part.iter().filter(|event| !is_stopped(&event.status)).all(|event| whole.contains(event)));
+                for (part, whole) in part.iter().zip(whole) {
+                    assert!((part.event, &part.dragons) == (whole.event, &whole.dragons));
+                    // Just before a contact, the steps to it may be left out.
+                    let is_wider = match (&part.status, &whole.status) {
+                        (Status::Proved { time_lo, .. }, Status::Proved { time_lo: lo, .. }) => time_lo <= lo,
+                        _ => false,
+                    };
+                    assert!(part == whole || is_wider || is_stopped(&part.status), "{part:?} {whole:?}");
+                }
             },
         );
     }
@@ -134,7 +141,9 @@ fn a_certificate_holds_and_says_what_is_not_decided() {
 
 #[test]
 fn plans_enclose_no_more_than_they_have_proved() {
-    let team = Team { benches: 12, ..*SceneText::paper().parse().unwrap().ensemble.only().unwrap().team() };
+    let scene = SceneText::paper().parse().unwrap();
+    let team = *scene.ensemble.only().unwrap().team();
+    let few = Team { benches: 12, ..team };
     stopped(
         |progress| least_pitch(&team, 4.5, progress).unwrap(),
         |whole, part| {
@@ -144,7 +153,7 @@ fn plans_enclose_no_more_than_they_have_proved() {
     );
     for arc_ratio in [Some(2.0), None] {
         stopped(
-            |progress| least_turn(&team, 1.7, arc_ratio, progress).unwrap(),
+            |progress| least_turn(&few, 1.7, arc_ratio, progress).unwrap(),
             |whole, part| {
                 assert!(whole.proved && !part.proved);
                 // With another ratio of the arcs the least radius is another.
@@ -156,7 +165,6 @@ fn plans_enclose_no_more_than_they_have_proved() {
             },
         );
     }
-    let scene = SceneText::paper().parse().unwrap();
     let timeline = scene.ensemble.timeline(&mut unreported);
     stopped(
         |progress| greatest_speed(&scene, &timeline, 2.0, progress).unwrap(),

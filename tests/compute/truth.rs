@@ -3,13 +3,13 @@
 use crate::tables;
 
 use bench_dragon::motion::model::path::Path;
-use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::solve::paper::{Paper, PaperRules};
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use tables::{Row, table};
 
 fn paper_team() -> Team {
-    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
+    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE }
 }
 
 /// Returns the largest position error in metres and relative speed error of a solver at each time of a table.

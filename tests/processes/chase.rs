@@ -247,6 +247,14 @@ fn the_log_of_a_chased_show_replays_bit_for_bit() {
 #[test]
 fn bad_options_are_refused_with_one_sentence() {
     let name = "chase_options";
+    let folder = tempfile::tempdir().unwrap();
+    let stereo = folder.path().join("stereo.wav");
+    std::fs::write(
+        &stereo,
+        b"RIFF\0\0\0\0WAVEfmt \x10\0\0\0\x01\0\x02\0\x40\x1f\0\0\x80\x3e\0\0\x02\0\x08\0data\0\0\0\0",
+    )
+    .unwrap();
+    let stereo = stereo.to_str().unwrap();
     for (arguments, expected) in [
         (&["artnet", "--fps", "23"][..], "29.97df"),
         (&["artnet", "--offset", "1:2:3"], "01:00:00:00"),
@@ -255,6 +263,7 @@ fn bad_options_are_refused_with_one_sentence() {
         (&["artnet", "--freewheel", "never"], "a time above 0"),
         (&["mtc", "/nowhere/midi"], "a raw MIDI device"),
         (&["ltc", "Cargo.toml"], "RIFF WAVE"),
+        (&["ltc", stereo, "--channel", "3"], "expected --channel from 1 to 2"),
         (&["psn", "--tracker", "0"], "1..=65535"),
         (&["psn", "--axes", "x,y"], "once each"),
         (&["psn", "--group", "desk.local"], "an IPv4 address"),

@@ -14,6 +14,7 @@ mod live;
 mod log;
 mod lost_files;
 mod metrics;
+mod osc;
 mod outputs_of_dragons;
 mod placed;
 mod python_module;

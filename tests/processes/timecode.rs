@@ -14,7 +14,7 @@ use nix::sys::signal::Signal;
 /// Labels of a running show that are compared.
 const RUNNING: usize = 120;
 /// The labels before a comparison: a pipe may have waited for its reader.
-const WARM_UP: usize = 30;
+const WARM_UP: usize = 60;
 
 /// A publisher, the sender of its timecode, and the decoder of others.
 struct Heard {
@@ -51,24 +51,26 @@ impl Heard {
         serde_json::from_str(lines.last().unwrap()).unwrap()
     }
 
-    /// Asserts that labels come within 1 ms of their moments, and run within 100 ppm of the show. Medians, because a
-    /// busy machine delays single messages.
+    /// Asserts that labels have their moments within 1 ms, and run within 100 ppm of the show. A busy machine delays
+    /// messages and makes none early, so the least delays show the moments. The median excludes labels that wait for the
+    /// next frame of the show: that would be 8 ms.
     fn runs_on_time(&self) {
         let is_running = |label: &Value| label["kind"] == "running" && label["late"].is_f64();
         let next = || self.label(is_running, "a running label");
         (0..WARM_UP).for_each(|_| drop(next()));
-        let labels = Vec::from_iter((0..RUNNING).map(|_| next()));
         let number = |label: &Value, field: &str| label[field].as_f64().unwrap();
-        let median = |labels: &[Value], field: &str| {
-            let mut all = Vec::from_iter(labels.iter().map(|label| number(label, field)));
-            all.sort_by(f64::total_cmp);
-            all[all.len() / 2]
-        };
-        let late = median(&labels, "late");
-        let (early, end) = labels.split_at(RUNNING / 2);
-        let drift = (median(end, "late") - median(early, "late")) / (median(end, "moment") - median(early, "moment"));
-        println!("{}: {:.3} ms late, {:.1} ppm", self.name, 1e3 * late, 1e6 * drift);
-        assert!(late.abs() < 1e-3, "{late} s late");
+        let labels = Vec::from_iter(
+            (0..RUNNING).map(|_| next()).map(|label| (number(&label, "late"), number(&label, "moment"))),
+        );
+        let least = |labels: &[(f64, f64)]| labels.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        let (early, end) = labels.split_at(RUNNING / 3);
+        let (first, last) = (least(early), least(&end[RUNNING / 3..]));
+        let drift = (last.0 - first.0) / (last.1 - first.1);
+        let mut late = Vec::from_iter(labels.iter().map(|label| label.0));
+        late.sort_by(f64::total_cmp);
+        let median = late[RUNNING / 2];
+        println!("{}: {:.3} ms, median {:.3} ms, {:.1} ppm", self.name, 1e3 * late[0], 1e3 * median, 1e6 * drift);
+        assert!(late[0].abs() < 1e-3 && median < 5e-3, "{late:?}");
         assert!(drift.abs() < 1e-4, "{drift}");
     }
 

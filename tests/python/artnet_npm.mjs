@@ -1,6 +1,6 @@
-// Sends or receives ArtTimeCode by npm's @arcanewizards/artnet: the package's folder, the port, then the seconds for
-// which it sends from 00:00:10:00 at 25 frames a second, or `receive`, which prints `listening` and the parts of each
-// label as a JSON line.
+// Sends or receives ArtTimeCode by npm's @arcanewizards/artnet: the package's folder, the port, then the seconds or
+// `receive`. It sends from 00:00:10:00 at 25 frames a second for these seconds. Or it prints `listening`, and the parts
+// of each label as a JSON line.
 
 import { pathToFileURL } from 'node:url';
 

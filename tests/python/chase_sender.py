@@ -3,7 +3,8 @@
     chase_sender.py --name NAME --result FILE --seconds S [--port PORT | --mtc | --ltc] [--fps 25] [--jump S] [--seed N]
 
 `--port`: ArtTimeCode over UDP, this file's own bytes by the table of Art-Net 4, with jitter, skew, loss and a stall.
-`--mtc`: quarter frames by the library mido, to standard output. `--ltc`: sound by Debian's libltc, to standard output.
+`--mtc`: quarter frames by the library mido, to standard output. `--ltc`: sound by Debian's libltc, to standard output,
+on the second of two channels.
 It begins when frames come and a chase reports its state. Writes a JSON object with the errors of the published
 simulated time, from 3 s after the beginning.
 """
@@ -147,7 +148,8 @@ def send_ltc(arguments, started, jump_at):
         sent += len(piece)
         # A piece of 20 ms is there when its last sample has been recorded.
         time.sleep(max(0, started + sent / rate / (1 + arguments.skew) - now))
-        out.write(piece)
+        # The first channel is silent.
+        out.write(bytes(byte for sample in piece for byte in (128, sample)))
         out.flush()
 
 
@@ -171,7 +173,7 @@ def main():
         time.sleep(0.01)
     if arguments.ltc:
         # As arecord writes it into a pipe: the length is not known. The chase begins with it.
-        sound = struct.pack("<IHHIIHH", 16, 1, 1, SOUND_RATE, SOUND_RATE, 1, 8)
+        sound = struct.pack("<IHHIIHH", 16, 1, 2, SOUND_RATE, 2 * SOUND_RATE, 2, 8)
         sys.stdout.buffer.write(b"RIFF\xff\xff\xff\xffWAVEfmt " + sound + b"data\xff\xff\xff\xff")
         sys.stdout.buffer.flush()
     wait_for_chase(arguments.name)

@@ -218,9 +218,14 @@ class Show:
         self.origin = np.array(placement.get("origin", [0.0, 0.0]), np.longdouble) + turn.astype(np.longdouble) @ start
         self.speed = scene["motion"]["head_speed"]
         self.links = [
-            (self.team["head_length"] if bench == 0 else self.team["body_length"]) - 2 * self.team["hole_inset"]
+            self.size(bench, "length", self.team["body_length"]) - 2 * self.team["hole_inset"]
             for bench in range(self.team["benches"])
         ]
+
+    def size(self, bench, what, of_body):
+        """Returns the length or the width of the board of a bench."""
+        end = "head" if bench == 0 else "tail" if bench + 1 == self.team["benches"] else None
+        return self.team.get(f"{end}_{what}", of_body)
 
     def local(self, corners):
         return (np.array(corners, np.longdouble) - self.origin).astype(float)
@@ -234,7 +239,8 @@ class Show:
         front, rear = (self.path.points(np.array(places)[numbers + end]) for end in (0, 1))
         along = (front - rear) / np.hypot(*np.moveaxis(front - rear, -1, 0))[..., None]
         across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
-        inset, half = self.team["hole_inset"] * along, 0.5 * self.team["width"] * across
+        widths = np.array([self.size(bench, "width", self.team["width"]) for bench in numbers])
+        inset, half = self.team["hole_inset"] * along, 0.5 * widths[:, None, None] * across
         return np.stack([front + inset + half, front + inset - half, rear - inset - half, rear - inset + half], axis=2)
 
 

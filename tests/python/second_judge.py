@@ -294,9 +294,12 @@ class Scene:
         team, path, motion = SIZES | file["team"], file["path"], file["motion"]
         number = lambda table, key: arb(float(table[key]))
         self.benches = team["benches"]
-        self.width, self.inset = number(team, "width"), number(team, "hole_inset")
-        head, body = number(team, "head_length") - 2 * self.inset, number(team, "body_length") - 2 * self.inset
-        self.links = [head] + [body] * (self.benches - 1)
+        team = {"head_width": team["width"], "tail_width": team["width"], "tail_length": team["body_length"]} | team
+        self.inset = number(team, "hole_inset")
+        by_bench = lambda key: [number(team, key.format(part)) for part in ("head_", "", "tail_")]
+        of_each = lambda head, body, tail: ([head] + [body] * (self.benches - 2) + [tail])[: self.benches]
+        lengths = [number(team, key) - 2 * self.inset for key in ("head_length", "body_length", "tail_length")]
+        self.links, self.widths = of_each(*lengths), of_each(*by_bench("{}width"))
         self.walks = {}
         self.speed = number(motion, "head_speed")
         self.delay, self.placement = arb(float(file.get("delay", 0.0))), Placement(file.get("placement", {}))
@@ -533,17 +536,17 @@ class Scene:
             places.append(self.follower(places[-1], link))
         return places
 
-    def corners(self, front, rear, link):
+    def corners(self, front, rear, bench):
         """Returns the corners of a board, counter-clockwise."""
-        along = tuple(part / link for part in sub(front, rear))
+        along = tuple(part / self.links[bench] for part in sub(front, rear))
         across = (-along[1], along[0])
-        half = self.width / 2
+        half = self.widths[bench] / 2
         corner = lambda p, i, j: tuple(p[k] + i * self.inset * along[k] + j * half * across[k] for k in (0, 1))
         return [corner(front, 1, -1), corner(front, 1, 1), corner(rear, -1, 1), corner(rear, -1, -1)]
 
     def boards(self, places):
         points = [self.point(place) for place in places]
-        return [self.corners(points[i], points[i + 1], self.links[i]) for i in range(len(points) - 1)]
+        return [self.corners(points[i], points[i + 1], i) for i in range(len(points) - 1)]
 
     def boards_on_stage(self, places):
         """Returns the boards on the stage, their corners counter-clockwise there."""

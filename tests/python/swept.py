@@ -20,7 +20,9 @@ import shapely
 program, scene = sys.argv[1:3]
 begin, end, first, last = sys.argv[3:7]
 head_length, body_length, width, inset = map(float, sys.argv[7:11])
-dragon, number = sys.argv[11].split(":") if len(sys.argv) > 11 else (None, 0)
+# The widths of head and tail, if they differ.
+own_widths = [float(own) for own in sys.argv[12:14]]
+dragon, number = sys.argv[11].split(":") if len(sys.argv) > 11 and sys.argv[11] else (None, 0)
 number = int(number)
 TOLERANCE, STEP = 1e-3, 2e-3
 # The head goes at most this far in a second.
@@ -54,7 +56,10 @@ if dragon == "all":
 front, rear = places[:, chosen], places[:, chosen + 1]
 along = front - rear
 along /= np.linalg.norm(along, axis=2, keepdims=True)
-across = 0.5 * width * np.stack([-along[..., 1], along[..., 0]], axis=2)
+widths = np.full(len(chosen), width)
+if own_widths:
+    widths[[0, -1]] = own_widths
+across = 0.5 * widths[:, None] * np.stack([-along[..., 1], along[..., 0]], axis=2)
 front, rear = front + inset * along, rear - inset * along
 corners = np.stack([front + across, rear + across, rear - across, front - across], axis=2)
 found = shapely.union_all(shapely.polygons(corners.reshape(-1, 4, 2)))

@@ -2,14 +2,15 @@
 
     timecode_peer.py --name NAME (--port PORT [--npm FOLDER] | --mtc | --ltc) [--fps 25] [--drop] [--offset S]
 
-`--port`: ArtTimeCode over UDP, decoded by the table of Art-Net 4, or with `--npm` by npm's @arcanewizards/artnet. `--mtc`:
-MIDI from standard input, decoded by the library mido. `--ltc`: a WAV stream from standard input, decoded by Debian's
-libltc. Prints a JSON line for each label: `label`, `kind` (`running` or `located`), and `late`, the seconds by which it
-came after the moment at which the show was there (null while the show stands). A label of sound has the moment of its
-last sample, by a clock of samples that begins with the earliest of the moments at which pieces came; of a file with 0.
+`--port`: ArtTimeCode over UDP, decoded by the table of Art-Net 4, or with `--npm` by npm's @arcanewizards/artnet.
+`--mtc`: MIDI from standard input, decoded by the library mido. `--ltc`: a WAV stream from standard input, decoded by
+Debian's libltc. Prints a JSON line for each label: `label`, `kind` (`running` or `located`), and `late`, the seconds by
+which it came after the moment at which the show was there (null while the show stands). A label of sound has the moment
+of its last sample. The clock of samples is that of the earliest piece of the last second, and begins with 0 in a file.
 """
 
 import argparse
+import collections
 import ctypes
 import json
 import os
@@ -136,14 +137,18 @@ def receive_ltc(arguments, output):
     decoder = libltc.ltc_decoder_create(int(rate / output.per_second), 64)
     samples, frame, parts = 0, LtcFrame(), Timecode()
     is_file = stat.S_ISREG(os.fstat(0).st_mode)
-    began = 0.0 if is_file else float("inf")
+    began, pieces = 0.0, collections.deque()
     while piece := sys.stdin.buffer.read1(4096):
         moment = time.monotonic()
         assert len(piece) % 2 == 0
         libltc.ltc_decoder_write_s16(decoder, piece, len(piece) // 2, samples)
         samples += len(piece) // 2
         if not is_file:
-            began = min(began, moment - samples / rate)
+            # Pieces that waited in the pipe until this process began to read came late.
+            pieces.append((moment, moment - samples / rate))
+            while pieces[0][0] < moment - 1.0:
+                pieces.popleft()
+            began = min(began for _, began in pieces)
         while libltc.ltc_decoder_read(decoder, ctypes.byref(frame)):
             assert frame.reverse == 0
             assert frame.bits[1] >> 2 & 1 == int(arguments.drop), "the flag of drop frame"

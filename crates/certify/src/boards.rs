@@ -32,8 +32,10 @@ pub(super) struct MovingBoard {
 }
 
 impl Shape {
-    pub fn new(team: &Team) -> Self {
-        Self { inset: Interval::point(team.hole_inset), half_width: Interval::point(team.width) * 0.5 }
+    /// Returns the shape of the board of a bench.
+    pub fn new(team: &Team, bench: usize) -> Self {
+        let half_width = Interval::point(team.board_width(bench)) * 0.5;
+        Self { inset: Interval::point(team.hole_inset), half_width }
     }
 
     pub fn board(&self, front: Capsule, rear: Capsule, link: Interval) -> MovingBoard {
@@ -58,7 +60,7 @@ impl Shape {
     pub fn outermost(&self, board: &MovingBoard) -> f64 {
         let furthest =
             |capsule: &Capsule| norm(capsule.point) + Interval::point(capsule.half) + Interval::point(capsule.radius);
-        let corner = (self.inset.square() + self.half_width.square()).sqrt();
+        let corner = (self.inset.square() + board.half_width.square()).sqrt();
         (furthest(&board.front).max(furthest(&board.rear)) + corner).hi
     }
 
@@ -123,8 +125,12 @@ impl MovingBoard {
     }
 
     /// Returns the board on the stage.
-    pub fn placed(&self, shape: &Shape, frame: &Frame) -> Self {
-        shape.board(frame.capsule(&self.front), frame.capsule(&self.rear), self.link)
+    pub fn placed(&self, inset: Interval, frame: &Frame) -> Self {
+        Shape { inset, half_width: self.half_width }.board(
+            frame.capsule(&self.front),
+            frame.capsule(&self.rear),
+            self.link,
+        )
     }
 
     /// Returns the middle of the front handle's capsule.

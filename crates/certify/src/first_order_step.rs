@@ -3,6 +3,7 @@
 
 use super::first_order::{FirstOrderBoard, FirstOrderHandle, Pace, When};
 use super::grid::{GridPoint, fine_place, place};
+use super::interval::Interval;
 use super::lines::Links;
 use super::place::{Place, Span};
 use super::step::{Chain, Claim, Listed, Obstacle};
@@ -83,7 +84,7 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
     /// Returns the board of a bench.
     pub fn board(&self, bench: usize) -> FirstOrderBoard {
         let (front, rear, link) = (self.handles[bench], self.handles[bench + 1], self.chain.link(bench));
-        FirstOrderBoard::new(&self.chain.shape, front, rear, link, self.half_step)
+        FirstOrderBoard::new(&self.chain.shape(bench), front, rear, link, self.half_step)
     }
 
     /// Returns true if two boards stay further apart than `threshold`.
@@ -102,13 +103,14 @@ impl<'c, 'a> FirstOrderStep<'c, 'a> {
         same && self.chain.exact.segments[segment].curve.arc_origin().is_some()
     }
 
-    /// Returns the boards from `first` to the last as one, on the line of the last listed handle.
+    /// Returns the run of equal boards from `first` on as one board, on the line of the last listed handle.
     pub fn straight_run(&self, first: usize) -> FirstOrderBoard {
         let last = self.handles.len() - 1;
-        let link = self.chain.links[1];
-        let back = |handles: usize| self.handles[last].moved_back(link * handles as f64);
-        let benches = self.chain.team.benches;
-        let length = link * (benches - first) as f64;
-        FirstOrderBoard::new(&self.chain.shape, back(first - last), back(benches - last), length, self.half_step)
+        let back = |metres: Interval| self.handles[last].moved_back(metres);
+        let (links, length) = self.chain.run(first);
+        let front = self.chain.links[1] * (first - last) as f64;
+        let is_own_tail = self.chain.team.own_tail() == Some(first);
+        let rear = if is_own_tail { front + length } else { self.chain.links[1] * (first + links - last) as f64 };
+        FirstOrderBoard::new(&self.chain.shape(first), back(front), back(rear), length, self.half_step)
     }
 }

@@ -13,7 +13,7 @@ use super::interval::Interval;
 use super::lines::{CertificateLine, Links, Step};
 use super::path::ExactPath;
 use super::place::{Place, Span};
-use super::step::{Chain, Claim, Listed, links_of};
+use super::step::{Chain, Claim, Listed, link_of};
 use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;
@@ -62,8 +62,9 @@ impl Pitches<'_> {
         last.extend_to(handle, &narrow, team).ok()?;
         let mut chain = Chain::new(&wide, ExactPath::inward(Interval::ONE, Interval::ZERO), team);
         chain.links = chain.links.map(|link| link.over(a));
-        let Shape { inset, half_width } = chain.shape;
-        chain.shape = Shape { inset: inset.over(a), half_width: half_width.over(a) };
+        chain.shapes = chain
+            .shapes
+            .map(|Shape { inset, half_width }| Shape { inset: inset.over(a), half_width: half_width.over(a) });
         let claim = Claim { links: Links::All, moving: false, clear: false };
         let mut listed = Listed::new(&chain, Span(Place(0, theta, 0.0), Place(0, theta, 0.0)), f64::INFINITY);
         while listed.handles.len() <= handle {
@@ -82,7 +83,7 @@ const MOST_PIECES: u32 = 10_000;
 pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bool {
     let radians = |metres: Interval, pitch: f64| metres.over(Interval::point(pitch).over(pi() * 2.0));
     let theta = Interval::point(radians(Interval::point(radius), from).hi);
-    let square = radians(links_of(team)[0], to).square();
+    let square = radians(link_of(team, 0), to).square();
     // D = theta^2 + (theta + delta)^2 - 2 theta (theta + delta) cos delta is bounded over pieces by Taylor's formula.
     let mut pieces = vec![(0.0, 1.5 * pi().hi)];
     let mut looked_at = 0;

@@ -142,6 +142,13 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         }
     }
 
+    /// Takes another enclosure of the same path, which may be turned about the path's origin.
+    pub fn on_path(mut self, exact: ExactPath) -> Self {
+        self.at = GridPoint::new(self.given.path, &exact, self.at.travelled);
+        self.chain.exact = exact;
+        self
+    }
+
     /// Leaves boards out: nothing is claimed of a contact.
     pub fn without_boards(mut self) -> Self {
         self.clear = false;

@@ -67,8 +67,9 @@ pub(super) struct Chain<'a> {
     pub path: &'a Path,
     pub exact: ExactPath,
     pub team: &'a Team,
-    pub links: [Interval; 2],
-    pub shape: Shape,
+    /// By [kind of bench](Team::kinds): the metres between its handles, and the shape of its board.
+    pub links: [Interval; 3],
+    pub shapes: [Shape; 3],
     /// A bound of S of Lemma 4: a place no earlier than the start of handle 1.
     pub start: Option<Place>,
     /// The obstacles of the stage.
@@ -87,21 +88,61 @@ const FINE: [f64; 11] = [0.015625, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 
 /// The length of a step next to an event, in links.
 const NEXT_TO_EVENT: f64 = 1e-9;
 
-/// Returns the metres between the handles of the head's bench, and of every other bench.
-pub(super) fn links_of(team: &Team) -> [Interval; 2] {
-    [team.head_length, team.body_length].map(|length| Interval::point(length) - Interval::point(team.hole_inset) * 2.0)
+/// Returns the metres between the handles of a bench.
+pub(super) fn link_of(team: &Team, bench: usize) -> Interval {
+    Interval::point(team.board_length(bench)) - Interval::point(team.hole_inset) * 2.0
 }
 
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
         let branches = branches(path, &exact, team);
-        let (links, shape) = (links_of(team), Shape::new(team));
-        Self { path, exact, team, links, shape, start: None, barriers: Vec::new(), branches }
+        let kinds = team.kinds();
+        let (links, shapes) = (kinds.map(|bench| link_of(team, bench)), kinds.map(|bench| Shape::new(team, bench)));
+        Self { path, exact, team, links, shapes, start: None, barriers: Vec::new(), branches }
     }
 
     /// Returns the metres between the handles of a bench.
     pub fn link(&self, bench: usize) -> Interval {
-        self.links[bench.min(1)]
+        self.links[self.kind(bench)]
+    }
+
+    /// Returns the shape of the board of a bench.
+    pub fn shape(&self, bench: usize) -> Shape {
+        self.shapes[self.kind(bench)]
+    }
+
+    fn kind(&self, bench: usize) -> usize {
+        if bench > 0 && bench + 1 == self.team.benches { 2 } else { bench.min(1) }
+    }
+
+    /// Returns the first benches of the runs of equal boards from a bench on, which is not the head: a tail with a size
+    /// of its own is a run by itself.
+    pub fn runs(&self, first: usize) -> impl Iterator<Item = usize> + use<> {
+        let tail = self.team.own_tail().filter(|tail| first < *tail);
+        std::iter::once(first).chain(tail)
+    }
+
+    /// Returns the number of links, and their length, of the run of equal boards that begins with a bench.
+    pub fn run(&self, first: usize) -> (usize, Interval) {
+        let (benches, tail) = (self.team.benches, self.team.own_tail());
+        if tail == Some(first) {
+            return (1, self.links[2]);
+        }
+        let links = benches - first - usize::from(tail.is_some());
+        (links, self.links[1] * links as f64)
+    }
+
+    /// Returns the shape of a board that holds every board behind the head's.
+    pub fn rear_shape(&self) -> Shape {
+        let [_, body, tail] = self.shapes;
+        Shape { half_width: body.half_width.max(tail.half_width), ..body }
+    }
+
+    /// Returns the first bench behind a bench from which on a step must test the pairs of both. The others have been in
+    /// their position before: Lemma 4. A tail with a size of its own has not, and is the last bench.
+    pub fn first_partner(&self, links: Links, bench: usize) -> Option<usize> {
+        let first = if links == Links::All || bench < 2 { Some(bench + 2) } else { self.team.own_tail() };
+        first.filter(|first| bench + 2 <= *first && *first < self.team.benches)
     }
 
     /// Shows a claim over the step between two grid points, and that boards stay clear of the obstacles `free`.
@@ -153,13 +194,13 @@ impl<'a> Chain<'a> {
 
     /// Returns a point that is proved to be in both boards.
     pub fn common_point(&self, handles: &[Spanned], benches: [usize; 2]) -> Option<[f64; 2]> {
-        let (inset, width) = (self.shape.inset.middle(), 2.0 * self.shape.half_width.middle());
         let boards = benches.map(|bench| {
+            let Shape { inset, half_width } = self.shape(bench);
             let [front, rear] = [bench, bench + 1].map(|handle| {
                 let [x, y] = handles[handle].capsule.point.map(Interval::middle);
                 Point::new(x, y)
             });
-            Board::from_handles(front, rear, inset, width)
+            Board::from_handles(front, rear, inset.middle(), 2.0 * half_width.middle())
         });
         let point: [f64; 2] = overlap_centre(&boards[0], &boards[1]).into();
         let holds = |bench: &usize| self.board(handles, *bench).holds(point.map(Interval::point));
@@ -168,7 +209,7 @@ impl<'a> Chain<'a> {
 
     /// Returns the board of a bench from listed handles.
     pub fn board(&self, handles: &[Spanned], bench: usize) -> MovingBoard {
-        self.shape.board(handles[bench].capsule, handles[bench + 1].capsule, self.link(bench))
+        self.shape(bench).board(handles[bench].capsule, handles[bench + 1].capsule, self.link(bench))
     }
 }
 
@@ -247,14 +288,15 @@ impl<'c, 'a> Listed<'c, 'a> {
     /// Returns a lower bound of the distance from the centre of all boards from a handle on. The handle is not the
     /// head's. Returns minus infinity if the bound is unknown.
     pub fn innermost(&self, from_handle: usize) -> f64 {
-        self.chain.shape.innermost(self.ring(from_handle), self.chain.links[1])
+        let [_, body, tail] = self.chain.links;
+        self.chain.rear_shape().innermost(self.ring(from_handle), body.max(tail))
     }
 
     /// Returns true if boards 0 and 1, whose handles are listed, are further than `metres` from all boards from a
     /// handle on.
     pub fn is_beyond_front(&self, metres: f64, from_handle: usize) -> bool {
         let reach = self.front_reach.get_or_init(|| {
-            let of_bench = |bench| self.chain.shape.outermost(&self.chain.board(&self.handles, bench));
+            let of_bench = |bench| self.chain.shape(bench).outermost(&self.chain.board(&self.handles, bench));
             f64::max(of_bench(0), of_bench(1))
         });
         self.innermost(from_handle) > sum_above(*reach, metres)
@@ -267,6 +309,8 @@ impl<'c, 'a> Listed<'c, 'a> {
             return false;
         }
         match claim.links {
+            // No other board has been where a tail with a size of its own is.
+            Links::Front if self.chain.team.own_tail().is_some() => self.is_on_line(last),
             Links::Front if !claim.clear => true,
             Links::Front if self.chain.exact.begins_inward() => self.is_beyond_front(0.0, last),
             _ => self.is_on_line(last),
@@ -322,12 +366,12 @@ impl<'c, 'a> Listed<'c, 'a> {
         let listed = self.handles.len() - 1;
         let boards: Vec<_> = (0..listed).map(|bench| chain.board(&self.handles, bench)).collect();
         let is_spiral = chain.exact.begins_inward();
-        let firsts = if links == Links::All { listed } else { listed.min(2) };
         let innermost: Vec<f64> = (0..=listed).map(|handle| self.innermost(handle)).collect();
-        for (a, board) in boards[..firsts].iter().enumerate() {
-            let outermost = chain.shape.outermost(board);
+        for (a, board) in boards.iter().enumerate() {
+            let outermost = chain.shape(a).outermost(board);
             let mut beyond = false;
-            for (b, other) in boards.iter().enumerate().skip(a + 2) {
+            let Some(first) = chain.first_partner(links, a) else { break };
+            for (b, other) in boards.iter().enumerate().skip(first) {
                 beyond = innermost[b] > outermost;
                 if beyond {
                     break;
@@ -337,12 +381,12 @@ impl<'c, 'a> Listed<'c, 'a> {
                 }
             }
             // The boards that are not listed.
-            let next = listed.max(a + 2);
+            let next = listed.max(first);
             if next < benches && !beyond {
                 let apart = if is_spiral {
                     innermost[listed] > outermost
                 } else {
-                    board.is_apart_from(&self.straight_run(next))
+                    chain.runs(next).all(|run| board.is_apart_from(&self.straight_run(run)))
                 };
                 if !apart {
                     return Err(Obstacle::Pair(a, next));
@@ -358,16 +402,22 @@ impl<'c, 'a> Listed<'c, 'a> {
         Ok(())
     }
 
-    /// Returns the boards that obstacles concern: all, with the boards that are not listed as one board, or boards 0
-    /// and 1.
-    pub fn boards_on_ground(&self, links: Links) -> Vec<MovingBoard> {
+    /// Returns the boards that obstacles concern, with their benches: all, with the boards that are not listed as one
+    /// board, or boards 0 and 1 and a tail with a size of its own.
+    pub fn boards_on_ground(&self, links: Links) -> Vec<(usize, MovingBoard)> {
         let (chain, benches) = (self.chain, self.chain.team.benches);
         let listed = self.handles.len() - 1;
-        let firsts = if links == Links::All { listed } else { listed.min(2) };
-        let mut boards: Vec<_> = (0..firsts).map(|bench| chain.board(&self.handles, bench)).collect();
-        if links == Links::All && listed < benches {
-            boards.push(self.straight_run(listed));
-        }
+        let own_tail = chain.team.own_tail();
+        let concerns = |bench: &usize| links == Links::All || *bench < 2 || own_tail == Some(*bench);
+        let of_listed = (0..listed).filter(concerns).map(|bench| (bench, chain.board(&self.handles, bench)));
+        let mut boards: Vec<_> = of_listed.collect();
+        let rest = if links == Links::All { Some(listed) } else { own_tail };
+        boards.extend(
+            rest.filter(|first| (listed..benches).contains(first))
+                .into_iter()
+                .flat_map(|first| chain.runs(first))
+                .map(|first| (first, self.straight_run(first))),
+        );
         boards
     }
 
@@ -377,16 +427,19 @@ impl<'c, 'a> Listed<'c, 'a> {
             return Ok(());
         }
         let (chain, boards) = (self.chain, self.boards_on_ground(links));
-        let is_near = |obstacle: &&usize| !boards.iter().all(|board| chain.barriers[**obstacle].is_avoided_by(board));
+        let is_near =
+            |obstacle: &&usize| !boards.iter().all(|(_, board)| chain.barriers[**obstacle].is_avoided_by(board));
         free.iter().find(is_near).map_or(Ok(()), |obstacle| Err(Obstacle::Stage(*obstacle)))
     }
 
-    /// Returns the boards from `first` to the last as one, on the line of the last listed handle.
+    /// Returns the run of equal boards from `first` on as one board, on the line of the last listed handle.
     pub fn straight_run(&self, first: usize) -> MovingBoard {
         let (chain, listed) = (self.chain, self.handles.len() - 1);
-        let link = chain.links[1];
-        let back = |handles: usize| moved_back(&self.handles[listed].capsule, link * handles as f64);
-        let benches = chain.team.benches;
-        chain.shape.board(back(first - listed), back(benches - listed), link * (benches - first) as f64)
+        let back = |metres: Interval| moved_back(&self.handles[listed].capsule, metres);
+        let (links, length) = chain.run(first);
+        let front = chain.links[1] * (first - listed) as f64;
+        let is_own_tail = chain.team.own_tail() == Some(first);
+        let rear = if is_own_tail { front + length } else { chain.links[1] * (first + links - listed) as f64 };
+        chain.shape(first).board(back(front), back(rear), length)
     }
 }

@@ -16,7 +16,7 @@ use super::path::ExactPath;
 use super::pitch::clear_beyond;
 use super::place::{Place, Span};
 use super::search::{CertificateSearch, MOST_SPANS, path_end};
-use super::step::{Chain, Claim, Listed, links_of};
+use super::step::{Chain, Claim, Listed, link_of};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::{Event, Progress};
 use bench_dragon_motion::linkage::follower;
@@ -53,7 +53,7 @@ impl<'a> Turns<'a> {
         let radius = Interval { lo: radii[0], hi: radii[1] };
         let a = Interval::point(pitch).over(pi() * 2.0);
         let middle = Interval::point(radius.middle());
-        let turned = middle.over(a).middle();
+        let turned = polar_angle((pitch, radius.middle()));
         let turnarounds = |radius: Interval| ExactPath::turnaround(pitch, radius, arc_ratio, Some(turned), 0.0);
         Self { team, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
     }
@@ -71,11 +71,21 @@ impl<'a> Turns<'a> {
             exact,
             point,
             tangent: if ahead { tangent } else { tangent.map(std::ops::Neg::neg) },
-            square: links_of(self.team)[link.min(1)].square(),
+            square: link_of(self.team, link).square(),
             left: Cell::new(MOST_STRETCHES),
         };
         let stretch = if ahead { Span(pivot, end) } else { Span(end, pivot) };
         fold.square.is_below(norm_squared(minus(exact.point(end), point))) && fold.holds(stretch, MOST_HALVINGS)
+    }
+
+    /// Returns the greatest radius to which a fold that [`Self::fold`] shows extends because all its places are on the
+    /// inward spiral: that part of the path is the same for all radii up to there.
+    pub fn fold_on_spiral(&self, link: usize, pivot: Place, end: Place) -> Option<f64> {
+        if pivot.0 > 0 || end.0 > 0 || !self.fold(link, pivot, end) {
+            return None;
+        }
+        let innermost = if self.exact.in_order(pivot, end) { end } else { pivot };
+        Some(self.exact.curve(innermost).distance_from_centre(innermost.1))
     }
 
     /// Returns true if, with every radius, two boards are proved to have a point in common while the head is at a
@@ -103,9 +113,8 @@ impl<'a> Turns<'a> {
         let (Some(still), Some(all)) = (still, all) else { return false };
         let Some(velocities) = self.velocities(&all, rate) else { return false };
         let handle = |number: usize| FirstOrderHandle::moving(&still[number].capsule, velocities[number], half);
-        let shape = Shape::new(self.team);
         let board = |bench: usize| {
-            let link = links_of(self.team)[bench.min(1)];
+            let (link, shape) = (link_of(self.team, bench), Shape::new(self.team, bench));
             FirstOrderBoard::new(&shape, handle(bench), handle(bench + 1), link, half)
         };
         board(a).at_most(&board(b), When::Always) < 0.0
@@ -218,11 +227,19 @@ impl Fold<'_> {
     }
 }
 
+/// Returns the polar angle of A, the beginning of the S, rounded. The pitch and the turn radius are in metres.
+fn polar_angle((pitch, turn_radius): (f64, f64)) -> f64 {
+    Interval::point(turn_radius).over(Interval::point(pitch).over(pi() * 2.0)).middle()
+}
+
 /// A turnaround of a team that comes in from far outside and goes out until the last handle is behind the turn.
 #[derive(Debug, Clone)]
 pub(crate) struct Passage {
     /// The path.
     pub path: Path,
+    /// The path in intervals. It is turned about the centre so that the polar angle of A is a double, because the
+    /// sines and cosines of a large angle that is uncertain would make all points uncertain.
+    exact: ExactPath,
     /// The length of path before the turn, in metres. Lemma 8 holds further out.
     pub lead_in: f64,
     /// The length of path after it, in metres.
@@ -244,6 +261,8 @@ impl Passage {
         let length = |radius: f64| Path::spiral(pitch, radius / pitch).length();
         let lead_in = 1.0 + length(far) - length(turn_radius);
         let mut lead_out = team.length();
+        let (radius, turned) = (Interval::point(turn_radius), polar_angle((pitch, turn_radius)));
+        let exact = ExactPath::turnaround(pitch, radius, arc_ratio, Some(turned), lead_in);
         loop {
             let description = PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out };
             let path = description.path().ok()?;
@@ -254,7 +273,7 @@ impl Passage {
                 handle = rear;
             }
             if handle.segment() + 1 == path.segments() || lead_out > 4.0 * team.length() {
-                return Some(Self { path, lead_in, lead_out, description });
+                return Some(Self { path, exact, lead_in, lead_out, description });
             }
             lead_out *= LONGER;
         }
@@ -288,17 +307,16 @@ impl Passage {
             }
             Ok(())
         };
-        let search = CertificateSearch::new(given, Vec::new(), &mut keep);
+        let search = CertificateSearch::new(given, Vec::new(), &mut keep).on_path(self.exact.clone());
         let search = if closely { search.without_boards() } else { search };
         let found = search.run(progress);
         if !found.is_ok_and(|events| events.iter().all(is_none)) {
             return false;
         }
         let Some(mut at) = last.map(|head| GridPoint::at(head, travelled)) else { return false };
-        let exact = ExactPath::new(&self.description);
-        let chain = || Chain::new(&self.path, exact.clone(), team);
+        let chain = || Chain::new(&self.path, self.exact.clone(), team);
         let descent = || Descent::new(chain(), travelled, MOST_STEPS, None);
-        if closely && !descent().stays_clear_to(&path_end(&exact, &self.path), progress) {
+        if closely && !descent().stays_clear_to(&path_end(&self.exact, &self.path), progress) {
             return false;
         }
         let chain = chain();

@@ -1,5 +1,5 @@
-//! ArtTimeCode of Art-Net 4 (Artistic Licence, "Art-Net 4 Protocol Release", ArtTimeCode): from datagrams to labels, and back.
-//! Pure.
+//! ArtTimeCode of Art-Net 4 (Artistic Licence, "Art-Net 4 Protocol Release", ArtTimeCode): from datagrams to labels, and
+//! back. Pure.
 
 use crate::timecode::{FrameRate, Label};
 

@@ -28,6 +28,7 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(200);
 const LAST_COMMAND: Duration = Duration::from_millis(500);
 
 /// The source of a chase.
+#[expect(clippy::large_enum_variant, reason = "there is one for each process")]
 pub enum Leader {
     /// Timecode.
     Timecode(TimecodeLeader),

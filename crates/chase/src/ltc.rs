@@ -4,6 +4,7 @@
 //! A frame is 80 bits, least significant first, in biphase mark code: the signal changes at the beginning of each bit,
 //! and once more in the middle of a 1. The last 16 bits are a pattern that also shows the direction.
 
+pub mod channels;
 pub mod generator;
 pub mod wave;
 

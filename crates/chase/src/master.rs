@@ -1,5 +1,5 @@
-//! A show as the master of timecode. In: the events of a feed. Out: Art-Net timecode, MIDI timecode or the sound of LTC,
-//! whose labels are current at the moments that the frames of the show state.
+//! A show as the master of timecode. In: the events of a feed. Out: Art-Net timecode, MIDI timecode or the sound of
+//! LTC, whose labels are current at the moments that the frames of the show state.
 //!
 //! A [`course`] extrapolates the latest frame, and a [`signal`] turns it into bytes with their moments. Both are pure.
 //! The bytes are written at their moments, not when a frame comes: [`MasterClock`] sleeps until then.

@@ -145,7 +145,7 @@ pub fn encode_quarter(label: Label, rate: FrameRate, piece: u8) -> [u8; 2] {
         2 => minutes,
         _ => hours | rate.type_code() << 5,
     };
-    let nibble = if piece % 2 == 0 { value & 0xf } else { value >> 4 };
+    let nibble = if piece.is_multiple_of(2) { value & 0xf } else { value >> 4 };
     [0xf1, piece << 4 | nibble]
 }
 

@@ -7,12 +7,13 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::Duration;
 
 use bench_dragon_client::clock::{monotonic_ns, sleep_until};
 use socket2::{Domain, Protocol, Socket, Type};
 
+use crate::ltc::channels::Channels;
 use crate::ltc::wave::{Format, WaveError};
 use crate::timecode::{FrameRate, Label};
 use crate::{artnet, ltc, mtc, psn};
@@ -87,6 +88,14 @@ pub enum SourceError {
         /// The kind of file.
         expected: &'static str,
     },
+    /// The sound has fewer channels.
+    #[error("the sound has no channel {channel}, expected --channel from 1 to {channels}")]
+    Channel {
+        /// The channel, counted from 1.
+        channel: usize,
+        /// The channels of the sound.
+        channels: usize,
+    },
     /// The stream has no samples.
     #[error("{file}: {source}")]
     Sound {
@@ -158,7 +167,7 @@ fn datagrams(
     stop: &Arc<AtomicBool>,
     mut decode: impl FnMut(&[u8], SocketAddr, u64, &mut Vec<Input>) + Send + 'static,
 ) -> Receiver<Input> {
-    let (sender, inputs) = channel();
+    let (sender, inputs) = mpsc::channel();
     let stop = Arc::clone(stop);
     std::thread::spawn(move || {
         let (mut bytes, mut decoded) = (vec![0; DATAGRAM_BYTES], Vec::new());
@@ -193,7 +202,7 @@ fn stream(file: &Path, expected: &'static str) -> Result<Box<dyn Read + Send>, S
 /// [`SourceError::Open`]
 pub fn mtc(device: &Path) -> Result<Receiver<Input>, SourceError> {
     let mut stream = stream(device, "a raw MIDI device such as /dev/snd/midiC1D0")?;
-    let (sender, inputs) = channel();
+    let (sender, inputs) = mpsc::channel();
     std::thread::spawn(move || {
         let (mut decoder, mut bytes) = (mtc::Decoder::default(), [0; 256]);
         while let Some(length) = read(&mut stream, &mut bytes) {
@@ -217,32 +226,36 @@ pub fn mtc(device: &Path) -> Result<Receiver<Input>, SourceError> {
     Ok(inputs)
 }
 
-/// Reads LTC from a WAV file at its own speed, or as it comes from standard input for `-`.
+/// Reads LTC from a WAV file at its own speed, or as it comes from standard input for `-`: from a channel, counted from
+/// 1, or from the one that has it.
 ///
 /// # Errors
-/// [`SourceError::Open`], or [`SourceError::Sound`] for a stream that is no sound.
-pub fn ltc(file: &Path) -> Result<Receiver<Input>, SourceError> {
+/// [`SourceError::Open`], [`SourceError::Channel`], or [`SourceError::Sound`] for a stream that is no sound.
+pub fn ltc(file: &Path, channel: Option<usize>) -> Result<Receiver<Input>, SourceError> {
     let is_live = file == Path::new("-");
     let mut stream = stream(file, "a WAV file with LTC")?;
     let format = Format::read(&mut stream).map_err(|source| SourceError::Sound {
         file: if is_live { "standard input".to_owned() } else { file.display().to_string() },
         source,
     })?;
-    let (sender, inputs) = channel();
+    let channels = format.channels();
+    let decoder = Channels::new(format, channel)
+        .ok_or(SourceError::Channel { channel: channel.unwrap_or_default(), channels })?;
+    let (sender, inputs) = mpsc::channel();
     std::thread::spawn(move || {
-        sound(&mut stream, format, is_live, &sender);
+        sound(&mut stream, (format, decoder), is_live, &sender);
         let _ = sender.send(Input::End);
     });
     Ok(inputs)
 }
 
 /// Decodes sound to its end. The last sample of a piece that is read was recorded now; a file is read at its own speed.
-fn sound(stream: &mut impl Read, format: Format, is_live: bool, inputs: &Sender<Input>) {
+fn sound(stream: &mut impl Read, (format, mut decoder): (Format, Channels), is_live: bool, inputs: &Sender<Input>) {
     let sample_ns = 1e9 / f64::from(format.sample_rate);
     // A file is read in pieces of 10 ms.
     let piece =
         format.block_bytes * if is_live { SOUND_BYTES / format.block_bytes } else { format.sample_rate as usize / 100 };
-    let mut decoder = ltc::Decoder::new(f64::from(format.sample_rate));
+    let mut followed = None;
     let (mut bytes, mut held, mut samples) = (vec![0; piece.max(format.block_bytes)], 0, 0u64);
     let began_ns = monotonic_ns();
     while let Some(length) = read(stream, &mut bytes[held..]) {
@@ -256,7 +269,15 @@ fn sound(stream: &mut impl Read, format: Format, is_live: bool, inputs: &Sender<
         sleep_until(now_ns);
         for block in bytes[..whole].chunks_exact(format.block_bytes) {
             samples += 1;
-            let input = match decoder.push(format.sample(block)) {
+            let event = decoder.push(block);
+            if decoder.followed() != followed {
+                let channel = decoder.followed().unwrap_or_default();
+                let is_usual = followed.is_none() && channel == 1;
+                let level = if is_usual { log::Level::Info } else { log::Level::Warn };
+                log::log!(level, "timecode is followed on channel {channel} of {}", format.channels());
+                followed = decoder.followed();
+            }
+            let input = match event {
                 None => continue,
                 Some(ltc::Event::Malformed) => Input::Malformed,
                 Some(ltc::Event::Backward) => Input::Backward(now_ns),

@@ -17,7 +17,7 @@ fn board_from(team: &Team, chain: &Chain, first: usize, bench: usize) -> Board {
     let handle = first + bench;
     let (sine, cosine) = chain.heading[handle].sin_cos();
     let front = Point::new(chain.x[handle], chain.y[handle]);
-    Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.width)
+    Board::from_front(front, Vector::new(cosine, sine), team.link(bench), team.hole_inset, team.board_width(bench))
 }
 
 /// Returns the box of a board.
@@ -64,7 +64,7 @@ pub fn corners(board: &Board) -> String {
 /// Returns the boards, the tail at the bottom and the head on top. [`handles`] returns the holes of the handles.
 pub fn group(boards: &[(usize, Board)], fill: impl Fn(usize) -> String, camera: &Camera, palette: &Palette) -> Group {
     let mut group = Group::new().set("id", "benches").set("stroke-linejoin", "round");
-    let width = boards.first().map_or(0.0, |(_, board)| 2.0 * board.half_width);
+    let width = boards.iter().map(|(_, board)| 2.0 * board.half_width).reduce(f64::min).unwrap_or(0.0);
     // The least width on the sheet at which an edge is visible.
     if width * camera.scale > 5.0 {
         group = group.set("stroke", palette.ground).set("stroke-width", camera.metres(0.8));

@@ -61,7 +61,7 @@ impl<'a> Dragons<'a> {
     pub fn greatest_board(&self) -> f64 {
         let length = |of: &Drawn| {
             let team = of.motion.team();
-            team.longest_link() + 2.0 * team.hole_inset + team.width
+            team.longest_link() + 2.0 * team.hole_inset + team.widest()
         };
         self.drawn.iter().map(length).fold(0.0, f64::max)
     }

@@ -102,7 +102,7 @@ impl<'a> Drawing<'a> {
                 let mut boards = extent.boards;
                 ground::include(motion.ground(), &mut boards);
                 let margin = match look.style {
-                    Style::Plan => 0.04 * boards.width().max(boards.height()) + motion.team().width,
+                    Style::Plan => 0.04 * boards.width().max(boards.height()) + motion.team().widest(),
                     Style::Lanterns | Style::Seat(_) => lanterns::MARGIN,
                 };
                 boards.padded(margin)

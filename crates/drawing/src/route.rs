@@ -147,9 +147,10 @@ mod tests {
     use bench_dragon_motion::Method;
     use bench_dragon_motion::model::curve::Side;
     use bench_dragon_motion::model::description::RouteStep;
-    use bench_dragon_motion::model::team::Team;
+    use bench_dragon_motion::model::team::{Ends, Team};
 
-    const TEAM: Team = Team { benches: 20, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
+    const TEAM: Team =
+        Team { benches: 20, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275, ends: Ends::NONE };
 
     fn camera(width: f64) -> Camera {
         let viewport = Viewport { left: 0.0, top: 0.0, width: 1000.0, height: 1000.0 };

@@ -49,6 +49,17 @@ impl Stage {
     }
 }
 
+impl StageDragon {
+    /// Returns the length and the width of the board of a bench, counted within the dragon, in metres.
+    pub fn board(&self, bench: u32) -> [f64; 2] {
+        match bench {
+            0 => [self.head_length, self.head_width],
+            _ if bench + 1 == self.benches => [self.tail_length, self.tail_width],
+            _ => [self.body_length, self.width],
+        }
+    }
+}
+
 impl StageEvent {
     /// Returns the kind of the event, or `None` for a number that this layout does not know.
     pub fn kind(&self) -> Option<EventKind> {

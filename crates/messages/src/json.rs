@@ -193,7 +193,10 @@ struct DragonObject {
     hole_inset: f64,
     head_length: f64,
     body_length: f64,
+    tail_length: f64,
+    head_width: f64,
     width: f64,
+    tail_width: f64,
     path: Vec<SegmentObject>,
 }
 
@@ -279,7 +282,10 @@ impl From<&StageMessage> for StageObject {
             let StageDragon {
                 head_length,
                 body_length,
+                tail_length,
+                head_width,
                 width,
+                tail_width,
                 hole_inset,
                 pitch,
                 start_turn,
@@ -299,7 +305,10 @@ impl From<&StageMessage> for StageObject {
                 hole_inset,
                 head_length,
                 body_length,
+                tail_length,
+                head_width,
                 width,
+                tail_width,
                 path,
             }
         };

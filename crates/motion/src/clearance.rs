@@ -42,7 +42,7 @@ pub struct PairClearance {
 pub fn board<'a>(chain: impl Into<Positions<'a>>, team: &Team, bench: usize) -> Board {
     let Positions { x, y } = chain.into();
     let handle = |k: usize| Point::new(x[k], y[k]);
-    Board::from_handles(handle(bench), handle(bench + 1), team.hole_inset, team.width)
+    Board::from_handles(handle(bench), handle(bench + 1), team.hole_inset, team.board_width(bench))
 }
 
 /// Returns the nearest two boards by testing all pairs; of equal ones the lowest (a, b). `None` for fewer than three
@@ -333,10 +333,10 @@ fn any_within(bounds: &[f32], limit: f32) -> bool {
 }
 
 fn circle_radius(team: &Team, bench: usize) -> f64 {
-    hypot(0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width)
+    hypot(0.5 * team.link(bench) + team.hole_inset, 0.5 * team.board_width(bench))
 }
 
 /// Returns the greatest displacement of a board's points per metre of displacement of its handles.
 fn corner_reach(team: &Team, bench: usize) -> f64 {
-    Board::displacement_factor(team.link(bench), team.hole_inset, team.width)
+    Board::displacement_factor(team.link(bench), team.hole_inset, team.board_width(bench))
 }

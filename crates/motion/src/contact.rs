@@ -41,13 +41,14 @@
 //! larger at the outer handle, by 2 a (r + r') sin^2(d / 2) / link.) Therefore these lengths are determined by the ends
 //! of the step.
 //!
-//! **Which pairs.** Every link behind the first has the same length, so the place of handle i >= 1 determines all
+//! **Which pairs.** Every link between the first and the last has the same length, so the place of handle i >= 1 determines all
 //! places behind it. A pair (i, i + k) is therefore where (1, 1 + k) is when handle 1 is at that place. Let S be the
 //! first place of handle 1. If handle i is at S or ahead of it, then handle 1, which is further ahead and has come from
 //! S without a jump, has been at the place of handle i before. At that time the pair (1, 1 + k) was where (i, i + k) is
 //! now. Hence pairs without boards 0 and 1 matter only in steps in which handle 2 is somewhere behind S, in either
 //! direction of motion. A pair does not matter if its front handles are both behind the quiet place, because there no
-//! two boards ever come within the limit. No pair matters while the whole team keeps its shape. Followers are solved
+//! two boards ever come within the limit. If the tail has a size of its own, its pairs are never where others have been,
+//! and all of them matter; for the tail, m_k follows from turns of its own link. No pair matters while the whole team keeps its shape. Followers are solved
 //! only as far back as they can reach the boards that matter (`reach`).
 
 pub mod between;
@@ -98,8 +99,10 @@ pub struct ConservativeAdvancement<'a> {
     team: &'a Team,
     /// The places of the head at which handle 1 turns round.
     head_turns: Vec<Param>,
-    /// The places of the front handle of a body link at which its rear handle turns round.
+    /// The places of the front handle of a body link, and of the tail's if it differs, at which its rear handle turns
+    /// round.
     body_turns: Vec<Param>,
+    tail_turns: Vec<Param>,
     /// The index, for each segment, of the first segment of the run with the same constant curvature.
     curves: Vec<usize>,
 }
@@ -116,7 +119,15 @@ impl<'a> ConservativeAdvancement<'a> {
             let same = segment > 0 && curvature(segment).is_some() && curvature(segment - 1) == curvature(segment);
             curves.push(if same { curves[segment - 1] } else { segment });
         }
-        Self { path, team, head_turns: places(head_turns), body_turns: places(body_turns), curves }
+        let tail_turns = Vec::new();
+        Self { path, team, head_turns: places(head_turns), body_turns: places(body_turns), tail_turns, curves }
+    }
+
+    /// Adds the places of the front handle of the tail's link, in metres of travel, at which its rear handle turns round,
+    /// for a tail with a link of its own. They are in order.
+    pub fn with_tail_turns(mut self, turns: &[f64]) -> Self {
+        self.tail_turns = turns.iter().map(|travelled| self.path.param_at(*travelled)).collect();
+        self
     }
 
     /// Finds the first contact while the head goes from one place to another, metres of travel. The first contact is
@@ -195,7 +206,10 @@ impl<'a> ConservativeAdvancement<'a> {
         let along = |chord: f64| segment.arc_over(chord);
         let body = (self.team.benches - 1) as f64 * along(self.team.link(1))?;
         // With a margin for the rounding of the sum.
-        let length = (1.0 + 1e-7) * (along(self.team.link(0))? + body);
+        let mut length = (1.0 + 1e-7) * (along(self.team.link(0))? + body);
+        if let Some(tail) = self.team.own_tail() {
+            length += (1.0 + 1e-7) * along(self.team.link(tail))?;
+        }
         let curve = self.curves[head.segment];
         let begin = if curve == 0 { f64::NEG_INFINITY } else { self.path.end_of(curve - 1) };
         let same = self.curves[head.segment..].iter().take_while(|other| **other == curve).count();

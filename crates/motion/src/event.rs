@@ -44,7 +44,7 @@ pub struct Event {
 /// a search returns it at each later call, too.
 pub type Progress<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
 
-/// The [`Progress`] of a search that nobody watches, and nobody stops.
+/// The [`Progress`] of a search that is neither watched nor stopped.
 pub fn unreported(_share: f64) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }

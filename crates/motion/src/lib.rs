@@ -66,9 +66,8 @@ impl Choice {
     /// Returns the greatest difference, metres, between the clearance of a frame and the clearance of exact motion. The
     /// difference is twice the displacement of a board's points for handles with the error that the solver promises.
     pub fn clearance_error(&self, team: &Team) -> f64 {
-        let factor = |link| Board::displacement_factor(link, team.hole_inset, team.width);
-        let factor = factor(team.link(0)).max(factor(team.link(1)));
-        2.0 * factor * self.accuracy
+        let factor = |bench| Board::displacement_factor(team.link(bench), team.hole_inset, team.board_width(bench));
+        2.0 * team.kinds().map(factor).into_iter().fold(0.0, f64::max) * self.accuracy
     }
 }
 
@@ -89,13 +88,13 @@ pub enum MotionError {
 ///
 /// ```
 /// use bench_dragon_motion::model::description::PathDescription;
-/// use bench_dragon_motion::model::team::Team;
+/// use bench_dragon_motion::model::team::{Ends, Team};
 /// use bench_dragon_messages::state::EventKind;
 /// use bench_dragon_motion::ensemble::Ensemble;
 /// use bench_dragon_motion::event::unreported;
 /// use bench_dragon_motion::{Method, Motion};
 ///
-/// let team = Team { benches: 20, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+/// let team = Team { benches: 20, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 /// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
 /// let motion = Motion::new(path, team, 1.0, Method::Newton)?;
 /// let timeline = Ensemble::alone(motion).timeline(&mut unreported);
@@ -466,6 +465,7 @@ impl Motion {
     /// Returns the search for contacts and clearances, from the result of [`Motion::singularities`].
     pub fn advancement<'a>(&'a self, found: &'a Singularities) -> ConservativeAdvancement<'a> {
         ConservativeAdvancement::new(self.searched_path(), &self.team, &found.head_turns, &found.body_turns)
+            .with_tail_turns(&found.tail_turns)
     }
 
     /// Returns the lock or path end; if the search gave up before either, the path's end.

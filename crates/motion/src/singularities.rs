@@ -17,9 +17,12 @@
 //! link for all places that handle 1 has come to. They are solved in lockstep. Every step is proven to hold nothing
 //! unseen (`certificate`) or halved, down to the resolution of doubles (`trace`). Between two turning points of handle
 //! 1 its place is monotone in the head's place, so the head's place is found from handle 1's place by bisection.
+//!
+//! A tail whose link has a length of its own is a third problem, for the places that its front handle comes to (`tail`).
 
 mod certificate;
 mod inward;
+mod tail;
 mod trace;
 
 use crate::model::Point;
@@ -46,6 +49,8 @@ pub struct Singularities {
     pub head_turns: Vec<f64>,
     /// The places of a body link's front handle, in metres of travel, at which its rear handle turns round, in order.
     pub body_turns: Vec<f64>,
+    /// The same of the tail's link, if it has a length of its own.
+    pub tail_turns: Vec<f64>,
     /// The stretches in which followers are not the first places at their distances, for [`Path::with_branches`].
     pub branches: Vec<Branch>,
 }
@@ -61,20 +66,22 @@ impl Singularities {
         let trace = |link: usize, start| LinkTrace::new(Link { path, length: team.link(link) }, start);
         let traces = trace(0, Some(0.0)).and_then(|head| {
             let body = if team.benches > 1 { Some(trace(1, None)?) } else { None };
-            Ok((head, body))
+            let own_tail = team.own_tail().filter(|tail| team.link(*tail) != team.link(1));
+            let tail = own_tail.map(|tail| trace(tail, None)).transpose()?;
+            Ok((head, body, tail))
         });
-        let Ok((head, body)) = traces else {
+        let Ok((head, body, tail)) = traces else {
             return Self::none(0.0);
         };
-        let mut search = SingularitySearch { path: path.clone(), team, head, body };
+        let mut search = SingularitySearch { path: path.clone(), team, head, body, tail };
         search.run(budget);
-        search.conclude()
+        search.conclude(budget)
     }
 
     /// Returns the result of a search up to a place without a singular configuration before.
     pub fn none(searched_until: f64) -> Self {
-        let (head_turns, body_turns, branches) = (Vec::new(), Vec::new(), Vec::new());
-        Self { stall: None, end: None, searched_until, head_turns, body_turns, branches }
+        let (branches, [head_turns, body_turns, tail_turns]) = (Vec::new(), [const { Vec::new() }; 3]);
+        Self { stall: None, end: None, searched_until, head_turns, body_turns, tail_turns, branches }
     }
 }
 
@@ -86,18 +93,23 @@ struct SingularitySearch<'a> {
     head: LinkTrace<'a>,
     /// In metres of travel of the body link's front handle; `None` for one bench.
     body: Option<LinkTrace<'a>>,
+    /// In metres of travel of the tail's front handle, if its link has a length of its own.
+    tail: Option<LinkTrace<'a>>,
 }
 
 impl SingularitySearch<'_> {
-    /// Traces the head's link, and the body link up to the place of handle 1, until one of them ends the motion.
+    /// Traces the head's link, and the body link up to the place of handle 1, until one of them ends the motion. The
+    /// tail's link follows.
     fn run(&mut self, budget: &mut Budget) {
         for step in 0u64.. {
             if step % 256 == 0 {
                 budget.report(self.head.at().front / self.path.length());
             }
             let body_is_behind = self.body_lags();
-            let spent = match &mut self.body {
-                Some(body) if body_is_behind && body.end().is_none() => !body.advance(budget),
+            let tail_is_behind = self.tail_lags();
+            let spent = match (&mut self.body, &mut self.tail) {
+                (Some(body), _) if body_is_behind && body.end().is_none() => !body.advance(budget),
+                (_, Some(tail)) if tail_is_behind && tail.end().is_none() => !tail.advance(budget),
                 _ if body_is_behind || self.head.end().is_some() => break,
                 _ => !self.head.advance(budget),
             };
@@ -112,16 +124,20 @@ impl SingularitySearch<'_> {
         self.body.as_ref().is_some_and(|body| body.at().front < self.head.furthest_rear())
     }
 
-    fn conclude(mut self) -> Singularities {
-        let of_body = self.body.as_ref().filter(|_| self.team.link(0) != self.team.link(1));
-        let branches = [self.head.branches(), of_body.map_or_else(Vec::new, LinkTrace::branches)].concat();
+    fn conclude(mut self, budget: &mut Budget) -> Singularities {
+        let link = |bench: usize| self.team.link(bench);
+        let of_body = self.body.as_ref().filter(|_| link(0) != link(1));
+        // Links of one length have the same branches, and the head comes furthest.
+        let of_tail = self.tail.as_ref().filter(|_| link(0) != link(self.team.benches - 1));
+        let traces = [Some(&self.head), of_body, of_tail];
+        let branches: Vec<_> = traces.into_iter().flatten().flat_map(LinkTrace::branches).collect();
         self.path = self.path.with_branches(branches.clone());
         let limit = self.head.at().front.max(0.0);
         let body_limit = self.body.as_ref().filter(|_| self.body_lags()).and_then(|body| {
             let reached = self.handle_1_reaches(body.at().front, limit)?;
             Some((body.end(), reached.next_down().max(0.0)))
         });
-        let (end, searched_until) = match (body_limit, self.head.end()) {
+        let (mut end, mut searched_until) = match (body_limit, self.head.end()) {
             (Some((Some(TraceEnd::Lock), at)), _) => (Some(self.event(EventKind::Lock, at, 1)), at),
             (Some((_, at)), _) => (None, at),
             (None, Some(TraceEnd::Lock)) => (Some(self.event(EventKind::Lock, limit, 0)), limit),
@@ -131,13 +147,20 @@ impl SingularitySearch<'_> {
             }
             (None, Some(TraceEnd::Undecided) | None) => (None, limit),
         };
-        let stall = self.stall(searched_until).filter(|stall| stall.travelled < searched_until);
+        let tail = self.of_tail(searched_until, budget);
+        if let Some(at) = tail.until.filter(|at| *at < searched_until) {
+            let link = self.team.benches - 1;
+            end = tail.locks.then(|| self.event(EventKind::Lock, at, link));
+            searched_until = at;
+        }
+        let stall = self.stall(searched_until, tail.stall).filter(|stall| stall.travelled < searched_until);
         let head_turns: Vec<_> = self.head.turns().iter().copied().filter(|at| *at <= searched_until).collect();
         let places = head_turns.iter().chain([&0.0, &searched_until]).filter_map(|at| self.handle_1(*at));
         let furthest = places.fold(f64::NEG_INFINITY, f64::max);
         let body_turns = self.body.as_ref().map_or(&[][..], LinkTrace::turns);
         let body_turns = body_turns.iter().copied().filter(|at| *at <= furthest).collect();
-        Singularities { stall, end, searched_until, head_turns, body_turns, branches }
+        let tail_turns = self.tail.as_ref().map_or_else(Vec::new, |tail| tail.turns().to_vec());
+        Singularities { stall, end, searched_until, head_turns, body_turns, tail_turns, branches }
     }
 
     /// Returns the metres of travel of handle 1.
@@ -162,14 +185,16 @@ impl SingularitySearch<'_> {
         None
     }
 
-    /// Returns the first stall up to `limit` metres of travel of the head.
-    fn stall(&self, limit: f64) -> Option<Event> {
+    /// Returns the first stall up to `limit` metres of travel of the head. `tail` is the first of the tail's link.
+    fn stall(&self, limit: f64, tail: Option<f64>) -> Option<Event> {
         let start = self.head.configuration(0.0).ok()?;
         if start.is_stalled() {
             return Some(self.event(EventKind::Stall, 0.0, 0));
         }
         let head = self.head.turns().first().copied().filter(|at| *at <= limit);
         let body = self.body_stall(&start, head.unwrap_or(limit));
+        let tail = tail.filter(|at| *at <= limit).map(|at| (at, self.team.benches - 1));
+        let body = [body, tail].into_iter().flatten().min_by(|one, other| one.0.total_cmp(&other.0));
         match (head, body) {
             (Some(at), Some((body, _))) if at <= body => Some(self.event(EventKind::Stall, at, 0)),
             (_, Some((at, link))) => Some(self.event(EventKind::Stall, at, link)),
@@ -184,7 +209,7 @@ impl SingularitySearch<'_> {
         let innermost = *body.turns().first()?;
         let mut first: Option<(f64, usize)> = None;
         let mut front = head.rear;
-        for link in 1..self.team.benches {
+        for link in 1..self.team.benches - usize::from(self.tail.is_some()) {
             let configuration = body.configuration(front).ok()?;
             if configuration.is_stalled() {
                 return Some((0.0, link));
@@ -205,14 +230,7 @@ impl SingularitySearch<'_> {
 
     /// Returns the head's first travel up to `limit` at which a handle reaches `place`, if no handle turned before.
     fn handle_reaches(&self, handle: usize, place: f64, limit: f64) -> Option<f64> {
-        let reached = |head: f64| {
-            let body = self.body.as_ref().unwrap_or(&self.head);
-            let body_links = (1..handle).try_fold(self.handle_1(head)?, |front, _| {
-                body.configuration(front).ok().map(|configuration| configuration.rear)
-            });
-            body_links.map(|at| at >= place)
-        };
-        let reached = |head: f64| reached(head).unwrap_or(true);
+        let reached = |head: f64| self.handle(handle, head).is_none_or(|at| at >= place);
         reached(limit).then(|| bisect_predicate(reached, 0.0, limit))
     }
 

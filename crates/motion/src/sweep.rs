@@ -42,8 +42,8 @@ const LEAST_SHARE: f64 = 1e-9;
 /// between its two ends. This is tested at a quarter, a half and three quarters of the step. `progress` receives the
 /// share that is done, from 0 to 1.
 ///
-/// All benches of one length lie in the same position when their front handles are at the same place of the path. So a
-/// board is left out from the place on where the board before it, of the same length, began.
+/// All benches of one size lie in the same position when their front handles are at the same place of the path. So a
+/// board is left out from the place on where the board before it, of the same size, began.
 ///
 /// # Errors
 /// A handle has no place before the end of the stretch, or `progress` has stopped the search.
@@ -117,6 +117,7 @@ impl Boards<'_> {
         let (team, bench) = (self.motion.team(), self.benches.start + index);
         index == 0
             || team.link(bench) != team.link(bench - 1)
+            || team.board_width(bench) != team.board_width(bench - 1)
             || self.begun.get(index - 1).is_none_or(|begun| front < *begun)
     }
 
@@ -136,19 +137,21 @@ impl Boards<'_> {
         let mut front = path.param_at(travelled);
         let mut positions = Vec::new();
         let mut metres = travelled;
+        let has_tail = team.own_tail().is_some_and(|tail| self.benches.contains(&tail));
         for bench in 0..self.benches.end {
             let link = team.link(bench);
             let is_swept = bench >= self.benches.start;
             let index = bench.saturating_sub(self.benches.start);
             // All boards further back are in places that others have taken, too.
-            let may_end = is_swept && !self.turn_back && index > 1 && positions.len() >= least;
+            let may_end = is_swept && !self.turn_back && !has_tail && index > 1 && positions.len() >= least;
             if may_end && !self.is_alone(index, metres) {
                 break;
             }
             let rear = follower(path, front, link)?;
             if is_swept {
                 let direction = link_pose(path, front, rear, link).direction;
-                let board = Board::from_front(path.point(front), direction, link, team.hole_inset, team.width);
+                let width = team.board_width(bench);
+                let board = Board::from_front(path.point(front), direction, link, team.hole_inset, width);
                 let corners = board.corners().map(|corner| self.motion.placement().point(corner));
                 positions.push(Position { front: metres, corners });
             }

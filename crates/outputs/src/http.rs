@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
+use axum::serve::ListenerExt;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 
@@ -36,6 +37,10 @@ impl Listening {
     /// The system's error, if no request can be answered any more.
     pub(super) fn serve(self, router: Router, stop: &AtomicBool) -> io::Result<()> {
         let Self { runtime, listener, .. } = self;
+        // A small message after another one would wait for 40 ms until the first is acknowledged (Nagle's algorithm).
+        let listener = listener.tap_io(|stream| {
+            let _ = stream.set_nodelay(true);
+        });
         let served = runtime.block_on(async {
             tokio::select! {
                 served = async { axum::serve(listener, router).await } => served,

@@ -6,6 +6,7 @@
 pub mod axes;
 pub mod network;
 pub mod osc;
+pub mod osc_map;
 pub mod osc_sender;
 pub mod psn;
 pub mod psn_sender;

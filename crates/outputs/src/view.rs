@@ -4,7 +4,8 @@
 //! `reader` reads a publisher's shared memory on a separate thread, because ports cannot leave the thread that created
 //! them, and hands over the newest picture. `browser` sends the picture to one browser at its pace, over one WebSocket
 //! for each publisher; `wire` is its layout. `origin` decides which pages may connect, `authorization` which browsers
-//! may command; `certificates` has the proofs of scenes, `facts` the facts that take time to compute.
+//! may command; `certificates` has the proofs of scenes, `facts` the facts that take time to compute, and `scrub` the
+//! frames at times that a browser requests.
 
 mod authorization;
 mod browser;
@@ -12,7 +13,8 @@ mod certificates;
 mod facts;
 pub(crate) mod origin;
 mod reader;
-mod wire;
+mod scrub;
+pub(crate) mod wire;
 
 use std::io;
 use std::net::SocketAddr;
@@ -44,7 +46,13 @@ pub use certificates::{Certificate, Proofs, SceneHash};
 pub use facts::{ClearanceCurve, Facts, LeastOfShow, SceneFacts};
 use origin::Admission;
 pub use origin::AllowedOrigin;
+pub use scrub::{OpenScene, SceneFrames};
+use scrub::{SceneInPlay, Scrubber};
 
+/// The kinds of the page's files.
+pub(crate) const HTML: &str = "text/html; charset=utf-8";
+pub(crate) const SCRIPT: &str = "text/javascript; charset=utf-8";
+pub(crate) const STYLE: &str = "text/css; charset=utf-8";
 /// Browsers send requests of a few letters.
 const MAX_REQUEST_BYTES: usize = 1024;
 /// Waking the server at each frame would cost the publisher more than the frame itself.
@@ -62,6 +70,8 @@ struct Picture {
     /// The latest cues, each with its number among all cues of this server, so that none is left out.
     cues: Arc<[(u64, Utf8Bytes)]>,
     frame: Bytes,
+    /// The scene that is played, once its text has come.
+    scene: Option<Arc<SceneInPlay>>,
     /// True if frames are stamped by the clock of this machine; `None` while there is no publisher.
     shares_clock: Option<bool>,
 }
@@ -76,6 +86,7 @@ impl Picture {
 #[derive(Clone)]
 struct Server {
     channels: Arc<[Channel]>,
+    scrubber: Arc<Scrubber>,
     admission: Arc<Admission>,
 }
 
@@ -103,6 +114,8 @@ pub struct ViewOptions {
     pub proofs: Arc<Proofs>,
     /// The facts about scenes that are computed while pages are served.
     pub facts: Arc<Facts>,
+    /// The function that opens a scene for frames at other times.
+    pub open_scene: OpenScene,
 }
 
 /// The data that browsers need to connect.
@@ -154,7 +167,7 @@ pub fn serve<Refused: From<ViewError>>(
     stop: &Arc<AtomicBool>,
     ready: impl FnOnce(&Ready) -> Result<(), Refused>,
 ) -> Result<(), Refused> {
-    let ViewOptions { address, control, origins, pages, proofs, facts } = options;
+    let ViewOptions { address, control, origins, pages, proofs, facts, open_scene } = options;
     names.iter().try_for_each(|name| service_name(name, "poses").map(drop)).map_err(ViewError::from)?;
     if let Some(folder) = &pages {
         std::fs::read_dir(folder).map_err(|source| ViewError::Pages { folder: folder.clone(), source })?;
@@ -181,7 +194,8 @@ pub fn serve<Refused: From<ViewError>>(
         }));
     }
     let admission = Arc::new(Admission { loopback, origins });
-    let router = router(Server { channels: channels.into(), admission }, pages.as_deref());
+    let scrubber = Arc::new(Scrubber::new(open_scene));
+    let router = router(Server { channels: channels.into(), scrubber, admission }, pages.as_deref());
     let served = server.serve(router, stop);
     // A panic of a reader has already been printed.
     let read = readers.into_iter().try_for_each(|reader| reader.join().unwrap_or(Ok(())));
@@ -202,7 +216,6 @@ where
 }
 
 fn router(server: Server, pages: Option<&Path>) -> Router {
-    let file = |kind, text| get(move || async move { served(kind, text) });
     let names = publishers_module(&server.channels);
     let mut router = Router::new();
     if let Some(folder) = pages {
@@ -212,51 +225,61 @@ fn router(server: Server, pages: Option<&Path>) -> Router {
         router = router.nest("/pages/", own).route("/pages", get(|| async { Redirect::permanent("pages/") }));
     }
     router
-        .route("/", file("text/html; charset=utf-8", include_str!("view/index.html")))
-        .route("/address.js", file("text/javascript; charset=utf-8", include_str!("view/address.js")))
-        .route("/boards.js", file("text/javascript; charset=utf-8", include_str!("view/boards.js")))
-        .route("/camera.js", file("text/javascript; charset=utf-8", include_str!("view/camera.js")))
-        .route("/cameras.js", file("text/javascript; charset=utf-8", include_str!("view/cameras.js")))
-        .route("/curve.js", file("text/javascript; charset=utf-8", include_str!("view/curve.js")))
-        .route("/dragon.js", file("text/javascript; charset=utf-8", include_str!("view/dragon.js")))
-        .route("/dragon_figure.js", file("text/javascript; charset=utf-8", include_str!("view/dragon_figure.js")))
-        .route("/dragon_head.js", file("text/javascript; charset=utf-8", include_str!("view/dragon_head.js")))
-        .route("/drawing.js", file("text/javascript; charset=utf-8", include_str!("view/drawing.js")))
-        .route("/hermite.js", file("text/javascript; charset=utf-8", include_str!("view/hermite.js")))
-        .route("/key_switch.js", file("text/javascript; charset=utf-8", include_str!("view/key_switch.js")))
-        .route("/label_layout.js", file("text/javascript; charset=utf-8", include_str!("view/label_layout.js")))
-        .route("/labels.js", file("text/javascript; charset=utf-8", include_str!("view/labels.js")))
-        .route("/lantern_light.js", file("text/javascript; charset=utf-8", include_str!("view/lantern_light.js")))
-        .route("/lantern_view.js", file("text/javascript; charset=utf-8", include_str!("view/lantern_view.js")))
-        .route("/lanterns.js", file("text/javascript; charset=utf-8", include_str!("view/lanterns.js")))
-        .route("/lock.js", file("text/javascript; charset=utf-8", include_str!("view/lock.js")))
-        .route("/marks.js", file("text/javascript; charset=utf-8", include_str!("view/marks.js")))
-        .route("/measure.js", file("text/javascript; charset=utf-8", include_str!("view/measure.js")))
-        .route("/pace.js", file("text/javascript; charset=utf-8", include_str!("view/pace.js")))
-        .route("/palette.js", file("text/javascript; charset=utf-8", include_str!("view/palette.js")))
-        .route("/panel.js", file("text/javascript; charset=utf-8", include_str!("view/panel.js")))
-        .route("/pointer_input.js", file("text/javascript; charset=utf-8", include_str!("view/pointer_input.js")))
-        .route("/publisher.js", file("text/javascript; charset=utf-8", include_str!("view/publisher.js")))
-        .route("/publishers.js", get(move || async move { served("text/javascript; charset=utf-8", names) }))
-        .route("/resolution.js", file("text/javascript; charset=utf-8", include_str!("view/resolution.js")))
-        .route("/roster.js", file("text/javascript; charset=utf-8", include_str!("view/roster.js")))
-        .route("/seat.js", file("text/javascript; charset=utf-8", include_str!("view/seat.js")))
-        .route("/seat_sprites.js", file("text/javascript; charset=utf-8", include_str!("view/seat_sprites.js")))
-        .route("/seat_view.js", file("text/javascript; charset=utf-8", include_str!("view/seat_view.js")))
-        .route("/show.js", file("text/javascript; charset=utf-8", include_str!("view/show.js")))
-        .route("/signs.js", file("text/javascript; charset=utf-8", include_str!("view/signs.js")))
-        .route("/sound.js", file("text/javascript; charset=utf-8", include_str!("view/sound.js")))
-        .route("/sprites.js", file("text/javascript; charset=utf-8", include_str!("view/sprites.js")))
-        .route("/stage.js", file("text/javascript; charset=utf-8", include_str!("view/stage.js")))
-        .route("/stream.js", file("text/javascript; charset=utf-8", include_str!("view/stream.js")))
-        .route("/transport.js", file("text/javascript; charset=utf-8", include_str!("view/transport.js")))
-        .route("/village.js", file("text/javascript; charset=utf-8", include_str!("view/village.js")))
-        .route("/words.js", file("text/javascript; charset=utf-8", include_str!("view/words.js")))
-        .route("/style.css", file("text/css; charset=utf-8", include_str!("view/style.css")))
-        .route("/conduct.js", file("text/javascript; charset=utf-8", include_str!("view/conduct.js")))
-        .route("/conduct.css", file("text/css; charset=utf-8", include_str!("view/conduct.css")))
+        .merge(modules())
+        .route("/", get(|| async { served(HTML, include_str!("view/index.html")) }))
+        .route("/publishers.js", get(move || async move { served(SCRIPT, names) }))
         .route("/frames", get(frames))
+        .route("/scrub", get(scrubbed))
         .with_state(server)
+}
+
+/// Returns the files of the page besides its document, which the design page loads too.
+pub(crate) fn modules<S: Clone + Send + Sync + 'static>() -> Router<S> {
+    let file = |kind, text| get(move || async move { served(kind, text) });
+    Router::new()
+        .route("/address.js", file(SCRIPT, include_str!("view/address.js")))
+        .route("/boards.js", file(SCRIPT, include_str!("view/boards.js")))
+        .route("/camera.js", file(SCRIPT, include_str!("view/camera.js")))
+        .route("/cameras.js", file(SCRIPT, include_str!("view/cameras.js")))
+        .route("/curve.js", file(SCRIPT, include_str!("view/curve.js")))
+        .route("/dragon.js", file(SCRIPT, include_str!("view/dragon.js")))
+        .route("/dragon_figure.js", file(SCRIPT, include_str!("view/dragon_figure.js")))
+        .route("/dragon_head.js", file(SCRIPT, include_str!("view/dragon_head.js")))
+        .route("/drawing.js", file(SCRIPT, include_str!("view/drawing.js")))
+        .route("/hermite.js", file(SCRIPT, include_str!("view/hermite.js")))
+        .route("/key_switch.js", file(SCRIPT, include_str!("view/key_switch.js")))
+        .route("/label_layout.js", file(SCRIPT, include_str!("view/label_layout.js")))
+        .route("/labels.js", file(SCRIPT, include_str!("view/labels.js")))
+        .route("/lantern_light.js", file(SCRIPT, include_str!("view/lantern_light.js")))
+        .route("/lantern_view.js", file(SCRIPT, include_str!("view/lantern_view.js")))
+        .route("/lanterns.js", file(SCRIPT, include_str!("view/lanterns.js")))
+        .route("/lock.js", file(SCRIPT, include_str!("view/lock.js")))
+        .route("/marks.js", file(SCRIPT, include_str!("view/marks.js")))
+        .route("/measure.js", file(SCRIPT, include_str!("view/measure.js")))
+        .route("/pace.js", file(SCRIPT, include_str!("view/pace.js")))
+        .route("/palette.js", file(SCRIPT, include_str!("view/palette.js")))
+        .route("/panel.js", file(SCRIPT, include_str!("view/panel.js")))
+        .route("/pointer_input.js", file(SCRIPT, include_str!("view/pointer_input.js")))
+        .route("/publisher.js", file(SCRIPT, include_str!("view/publisher.js")))
+        .route("/resolution.js", file(SCRIPT, include_str!("view/resolution.js")))
+        .route("/roster.js", file(SCRIPT, include_str!("view/roster.js")))
+        .route("/scrub.js", file(SCRIPT, include_str!("view/scrub.js")))
+        .route("/scrub.css", file(STYLE, include_str!("view/scrub.css")))
+        .route("/seat.js", file(SCRIPT, include_str!("view/seat.js")))
+        .route("/seat_sprites.js", file(SCRIPT, include_str!("view/seat_sprites.js")))
+        .route("/seat_view.js", file(SCRIPT, include_str!("view/seat_view.js")))
+        .route("/show.js", file(SCRIPT, include_str!("view/show.js")))
+        .route("/signs.js", file(SCRIPT, include_str!("view/signs.js")))
+        .route("/sound.js", file(SCRIPT, include_str!("view/sound.js")))
+        .route("/sprites.js", file(SCRIPT, include_str!("view/sprites.js")))
+        .route("/stage.js", file(SCRIPT, include_str!("view/stage.js")))
+        .route("/stream.js", file(SCRIPT, include_str!("view/stream.js")))
+        .route("/transport.js", file(SCRIPT, include_str!("view/transport.js")))
+        .route("/village.js", file(SCRIPT, include_str!("view/village.js")))
+        .route("/words.js", file(SCRIPT, include_str!("view/words.js")))
+        .route("/style.css", file(STYLE, include_str!("view/style.css")))
+        .route("/conduct.js", file(SCRIPT, include_str!("view/conduct.js")))
+        .route("/conduct.css", file(STYLE, include_str!("view/conduct.css")))
 }
 
 /// Returns the module with the names of the publishers that the page draws.
@@ -267,7 +290,7 @@ fn publishers_module(channels: &[Channel]) -> String {
 }
 
 /// Returns a file of the page, which loads nothing from other servers.
-fn served(kind: &'static str, text: impl IntoResponse) -> Response {
+pub(crate) fn served(kind: &'static str, text: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, kind),
         (header::CACHE_CONTROL, "no-cache"),
@@ -289,40 +312,67 @@ async fn own_page(Served(server): Served<Server>, request: Request, next: Next) 
     response
 }
 
-fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+pub(crate) fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     headers.get(name)?.to_str().ok()
+}
+
+/// The fields of a query.
+type Fields = Vec<(String, String)>;
+
+fn field<'f>(query: &'f Fields, wanted: &str) -> Option<&'f str> {
+    query.iter().find(|(field, _)| field == wanted).map(|(_, value)| value.as_str())
+}
+
+impl Server {
+    /// Returns the publisher that a page from an admitted origin may watch.
+    #[allow(clippy::result_large_err, reason = "the error is the answer")]
+    fn watched(&self, headers: &HeaderMap, query: &Fields) -> Result<Channel, Response> {
+        if !self.admission.allows(text_of(headers, header::ORIGIN), text_of(headers, header::HOST)) {
+            let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
+            return Err((StatusCode::FORBIDDEN, sentence).into_response());
+        }
+        let mut channels = self.channels.iter();
+        let channel = match field(query, "name") {
+            None => channels.next(),
+            Some(name) => channels.find(|channel| channel.name == name),
+        };
+        let unknown = "name: expected one of the publishers that this server was started for";
+        channel.cloned().ok_or_else(|| (StatusCode::NOT_FOUND, unknown).into_response())
+    }
+}
+
+type Upgrade = Result<WebSocketUpgrade, WebSocketUpgradeRejection>;
+
+/// Returns the upgrade to a WebSocket with small requests; `instead` answers another request.
+#[allow(clippy::result_large_err, reason = "the error is the answer")]
+fn upgraded(upgrade: Upgrade, instead: &'static str) -> Result<WebSocketUpgrade, Response> {
+    let upgrade = upgrade.map_err(|_| (StatusCode::UPGRADE_REQUIRED, instead).into_response())?;
+    Ok(upgrade.max_frame_size(MAX_REQUEST_BYTES).max_message_size(MAX_REQUEST_BYTES))
 }
 
 async fn frames(
     Served(server): Served<Server>,
     headers: HeaderMap,
-    Query(query): Query<Vec<(String, String)>>,
-    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
-) -> Response {
-    if !server.admission.allows(text_of(&headers, header::ORIGIN), text_of(&headers, header::HOST)) {
-        let sentence = "a page from elsewhere may not watch the stage picture; view --allow-origin lets it in";
-        return (StatusCode::FORBIDDEN, sentence).into_response();
-    }
-    let field = |wanted: &str| query.iter().find(|(field, _)| field == wanted).map(|(_, value)| value.as_str());
-    let Some(gap) = gap(field("rate")) else {
-        return (StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response();
+    Query(query): Query<Fields>,
+    upgrade: Upgrade,
+) -> Result<Response, Response> {
+    let channel = server.watched(&headers, &query)?;
+    let Some(gap) = gap(field(&query, "rate")) else {
+        return Err((StatusCode::BAD_REQUEST, "rate: expected 1 to 1000000 frames a second").into_response());
     };
-    let mut channels = server.channels.iter();
-    let channel = match field("name") {
-        None => channels.next(),
-        Some(name) => channels.find(|channel| channel.name == name),
-    };
-    let Some(channel) = channel.cloned() else {
-        return (StatusCode::NOT_FOUND, "name: expected one of the publishers that this server was started for")
-            .into_response();
-    };
-    match upgrade {
-        Ok(upgrade) => upgrade
-            .max_frame_size(MAX_REQUEST_BYTES)
-            .max_message_size(MAX_REQUEST_BYTES)
-            .on_upgrade(move |socket| browser::serve(socket, channel, gap)),
-        Err(_) => (StatusCode::UPGRADE_REQUIRED, "frames come over a WebSocket: open ws://.../frames").into_response(),
-    }
+    let upgrade = upgraded(upgrade, "frames come over a WebSocket: open ws://.../frames")?;
+    Ok(upgrade.on_upgrade(move |socket| browser::serve(socket, channel, gap)))
+}
+
+async fn scrubbed(
+    Served(server): Served<Server>,
+    headers: HeaderMap,
+    Query(query): Query<Fields>,
+    upgrade: Upgrade,
+) -> Result<Response, Response> {
+    let channel = server.watched(&headers, &query)?;
+    let upgrade = upgraded(upgrade, "frames come over a WebSocket: open ws://.../scrub")?;
+    Ok(upgrade.on_upgrade(move |socket| scrub::serve(socket, channel.pictures, server.scrubber)))
 }
 
 /// Returns the least time between two frames at a requested `rate`, zero without a rate; `None` for an invalid rate.

@@ -9,10 +9,10 @@ use super::interval::Interval;
 use super::lines::Links;
 use super::path::Span;
 use super::scene::Scene;
-use super::unlisted::{check_ring, straight_run};
+use super::unlisted::{check_ring, first_partner, straight_run};
 
 /// Checks that no two boards that share no handle are as near as `metres`. A step of the front links concerns only the
-/// pairs with boards 0 and 1. `step` has the first-order enclosures of the chain. Returns the number of pairs.
+/// pairs of Lemma 4. `step` has the first-order enclosures of the chain. Returns the number of pairs.
 ///
 /// # Errors
 /// The pair that does not follow.
@@ -20,14 +20,14 @@ pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, step: &FirstOrde
     let team = &scene.team;
     let metres = Interval::new(metres);
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
-        .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
+        .map(|(index, pair)| Board::new(&pair[0], &pair[1], team.size(index)))
         .collect();
     let first_order: Vec<FirstOrderBoard> = (0..boards.len()).map(|bench| step.board(bench, team)).collect();
-    let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
     let far = metres.max(&Interval::new(0.0));
     let mut pairs = 0;
-    for a in 0..about {
-        for b in a + 2..boards.len() {
+    for a in 0..boards.len() {
+        let Some(first) = first_partner(scene, links, a) else { break };
+        for b in first..boards.len() {
             let when = if are_on_one_circle(scene, chain, a, b) { When::Middle } else { When::Always };
             let is_apart = boards[a].is_clearly_apart_by(&metres, &boards[b])
                 || boards[a].is_apart_by(&metres, &boards[b])
@@ -46,20 +46,20 @@ pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, step: &FirstOrde
     if !chain.ends_on_line(scene) {
         // Only a step of the front links gets here.
         check_ring(scene, chain, 0..2, chain.last(), &far)?;
-        return Ok(pairs + about as u64);
+        return Ok(pairs + 2);
     }
-    for a in 0..about {
-        let first = chain.last().max(a + 2);
-        if first >= team.benches {
-            continue;
-        }
-        let (front, rear, length) = straight_run(scene, chain, first);
-        let run = Board::new(&front, &rear, length, team);
-        let is_apart = boards[a].is_clearly_apart_by(&metres, &run)
-            || boards[a].is_apart_by(&metres, &run)
-            || first_order[a].is_apart_by(&metres, &step.straight_run(first, team), When::Always)
-            || boards[a].is_apart_somehow(&metres, &run);
-        if !is_apart {
+    for a in 0..boards.len() {
+        let Some(first) = first_partner(scene, links, a) else { break };
+        let first = chain.last().max(first);
+        let is_apart = |first: usize| {
+            let (front, rear, size) = straight_run(scene, chain, first);
+            let run = Board::new(&front, &rear, size);
+            boards[a].is_clearly_apart_by(&metres, &run)
+                || boards[a].is_apart_by(&metres, &run)
+                || first_order[a].is_apart_by(&metres, &step.straight_run(first, team), When::Always)
+                || boards[a].is_apart_somehow(&metres, &run)
+        };
+        if !team.runs(first).all(is_apart) {
             return Err(format!("bench {a} may be nearer to one on the line than it says (Lemmas 3 and 6)"));
         }
         pairs += 1;

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::capsule::Capsule;
 use super::interval::{Interval, Vector};
-use super::team::Team;
+use super::team::{Size, Team};
 
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
@@ -54,10 +54,11 @@ pub(super) struct Board<'a> {
 
 impl<'a> Board<'a> {
     /// Creates a board between its handles.
-    pub fn new(front: &'a Capsule, rear: &'a Capsule, length: Interval, team: &Team) -> Self {
+    pub fn new(front: &'a Capsule, rear: &'a Capsule, size: Size) -> Self {
         let middle = front.point.minus(&rear.point);
-        let overhang = team.hole_inset / length;
-        let half_width = team.width * Interval::new(0.5);
+        let length = size.link;
+        let overhang = size.hole_inset / length;
+        let half_width = size.width * Interval::new(0.5);
         let rough = Rough::new(front, rear, length.rough(), overhang.rough(), half_width.rough());
         let (rough_compass, compass) = (COMPASS.map(|n| rough.extent(n)), Default::default());
         Self { front, rear, middle, length, overhang, half_width, rough, rough_compass, compass }
@@ -319,16 +320,21 @@ impl Rough {
 }
 
 /// Returns true if Lemma 3, *Ring*, shows some boards to be more than `metres` apart from all body boards further out.
-/// The handles of these boards are at most `reach` metres from the centre of the spiral. The handles of the boards
-/// further out are at least `ring` metres from it.
-pub(super) fn is_inside_ring(team: &Team, reach: &Interval, ring: &Interval, metres: &Interval) -> bool {
-    let half_link = team.link(1) * Interval::new(0.5);
-    let half_width = team.width * Interval::new(0.5);
+/// The handles of these boards, of `width` metres at most, are at most `reach` metres from the centre of the spiral. The
+/// handles of the boards further out are at least `ring` metres from it.
+pub(super) fn is_inside_ring(
+    team: &Team,
+    (reach, width): (&Interval, &Interval),
+    ring: &Interval,
+    metres: &Interval,
+) -> bool {
+    let [half_link, half_width] = team.behind_head().map(|size| size * Interval::new(0.5));
+    let half_own = width * Interval::new(0.5);
     if !half_link.is_below(ring) {
         return false;
     }
     let inner = (ring.square() - half_link.square()).sqrt().min(&(ring - team.hole_inset)) - half_width;
-    let outer = reach + (team.hole_inset.square() + half_width.square()).sqrt();
+    let outer = reach + (team.hole_inset.square() + half_own.square()).sqrt();
     (outer + metres).is_below(&inner)
 }
 

@@ -131,7 +131,7 @@ impl Events {
         let point = Vector::new(point[0], point[1]);
         for bench in benches {
             let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
-            let board = Board::new(front, rear, *scene.team.link(bench), &scene.team);
+            let board = Board::new(front, rear, scene.team.size(bench));
             if !covers(&board, &point) {
                 return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
             }
@@ -162,7 +162,7 @@ impl Events {
         }
         let chain = touching_chain(scene, steps, head, spans)?;
         let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
-        let board = Board::new(front, rear, *scene.team.link(bench), &scene.team);
+        let board = Board::new(front, rear, scene.team.size(bench));
         if !obstacle.is_reached_by(&board, &Vector::new(point[0], point[1])) {
             return Err(format!("bench {bench} may be clear of obstacle {number} (Lemma 9)"));
         }

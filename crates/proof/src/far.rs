@@ -9,8 +9,8 @@ pub(super) fn holds(team: &Team, pitch: f64, radius: &Interval) -> bool {
     let number = Interval::new;
     let pi = elementary::turns(0.5);
     let a = number(pitch) / (pi * number(2.0));
-    let (head, body) = (*team.link(0), *team.link(1));
-    let longest = head.max(&body);
+    let [[head, of_head], [body, of_body], [tail, of_tail]] = team.kinds();
+    let longest = head.max(&body).max(&tail);
     if !longest.is_below(radius) {
         return false;
     }
@@ -18,12 +18,12 @@ pub(super) fn holds(team: &Team, pitch: f64, radius: &Interval) -> bool {
     if team.benches < 3 {
         return true;
     }
-    let (inset, width) = (team.hole_inset, team.width);
+    let (inset, width) = (team.hole_inset, of_head.max(&of_body).max(&of_tail));
     let half_width = width * number(0.5);
     let d = |link: &Interval| pi * a * link / (number(3.0) * radius);
     let lean_of =
         |link: &Interval| (link.square() + d(link) * (number(2.0) * radius + d(link))) / (number(2.0) * link * radius);
-    let lean = lean_of(&head).max(&lean_of(&body));
+    let lean = lean_of(&head).max(&lean_of(&body)).max(&lean_of(&tail));
     let left = radius - inset * lean - half_width;
     let most_turned = (a.square() + radius.square() + radius * d(&body)).sqrt();
     // 1. Less than a turn apart.
@@ -42,10 +42,17 @@ pub(super) fn holds(team: &Team, pitch: f64, radius: &Interval) -> bool {
     }
     let slope = (a / rho).square();
     let steep = number(1.0) + slope;
-    let thick = width * steep.sqrt();
+    let thick = |width: &Interval| width * steep.sqrt();
     let beyond = |link: &Interval| inset * (link + inset);
     let between = |link: &Interval| link.square() * number(0.25);
-    let out = |link: &Interval| (thick + (steep * beyond(link)).max(&(slope * between(link))) / rho) * number(0.5);
-    let inside = (thick + (steep * between(&body)).max(&(slope * beyond(&body))) / rho) * number(0.5);
-    (out(&head).max(&out(&body)) + inside).is_below(&number(pitch))
+    let out = |link: &Interval, width: &Interval| {
+        (thick(width) + (steep * beyond(link)).max(&(slope * between(link))) / rho) * number(0.5)
+    };
+    let inside = |link: &Interval, width: &Interval| {
+        (thick(width) + (steep * between(link)).max(&(slope * beyond(link))) / rho) * number(0.5)
+    };
+    // The board nearer the head is not the tail's, the other one not the head's.
+    let nearer = out(&head, &of_head).max(&out(&body, &of_body));
+    let other = inside(&body, &of_body).max(&inside(&tail, &of_tail));
+    (nearer + other).is_below(&number(pitch))
 }

@@ -68,7 +68,7 @@ impl FirstOrder {
     /// Returns the board of a bench.
     pub fn board(&self, bench: usize, team: &Team) -> FirstOrderBoard {
         let (front, rear) = (&self.handles[bench], &self.handles[bench + 1]);
-        FirstOrderBoard::new(front.clone(), rear.clone(), *team.link(bench), self.half_step, team)
+        FirstOrderBoard::new(front.clone(), rear.clone(), self.half_step, team.size(bench))
     }
 
     /// Returns the boards from `first` to the last as one, where the last listed handle is on segment 0, a line.
@@ -79,8 +79,8 @@ impl FirstOrder {
         } else {
             self.handles[last].behind(&team.links(last, first - 1))
         };
-        let length = team.links(first, team.benches - 1);
-        FirstOrderBoard::new(front.clone(), front.behind(&length), length, self.half_step, team)
+        let size = team.run(first);
+        FirstOrderBoard::new(front.clone(), front.behind(&size.link), self.half_step, size)
     }
 }
 

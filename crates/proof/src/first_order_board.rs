@@ -5,7 +5,7 @@
 use super::handle::{Handle, When};
 use super::interval::{Interval, Vector};
 use super::sides::Sides;
-use super::team::Team;
+use super::team::Size;
 
 /// Limit of directions tried for a pair, the best first.
 const MOST_TRIES: usize = 4;
@@ -35,9 +35,10 @@ pub(super) struct FirstOrderBoard {
 }
 
 impl FirstOrderBoard {
-    pub fn new(front: Handle, rear: Handle, link: Interval, half_step: Interval, team: &Team) -> Self {
+    pub fn new(front: Handle, rear: Handle, half_step: Interval, size: Size) -> Self {
         let half = Interval::new(0.5);
-        let (half_length, half_width) = (link * half + team.hole_inset, team.width * half);
+        let link = size.link;
+        let (half_length, half_width) = (link * half + size.hole_inset, size.width * half);
         let rough = |handle: &Handle| [handle.point.x.rough(), handle.point.y.rough()];
         let sides = Sides::new(rough(&front), rough(&rear), half_length.rough(), half_width.rough());
         Self { front, rear, link, half_length, half_width, half_step, sides }

@@ -95,7 +95,7 @@ impl Pitch {
         self.links += chain.products.len() as u64;
         for bench in [a, b] {
             let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
-            let board = Board::new(front, rear, *scene.team.link(bench), &scene.team);
+            let board = Board::new(front, rear, scene.team.size(bench));
             if !covers(&board, &Vector::new(point[0], point[1])) {
                 return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
             }

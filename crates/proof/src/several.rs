@@ -12,6 +12,7 @@ use super::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
 use super::path::{Place, Span};
 use super::scene::Scene;
 use super::steps::Steps;
+use super::team::Size;
 use super::unlisted::straight_run;
 
 /// Facts that the section of a dragon has shown.
@@ -38,8 +39,7 @@ impl Alone {
     fn locks_just_after(&self, scene: &Scene, time: f64) -> bool {
         let Some(end) = self.end.filter(|_| self.locks) else { return false };
         let end = scene.time(&scene.path.travelled(end));
-        let link = scene.team.link(0).min(scene.team.link(1));
-        let before = end - link * Interval::new(BEFORE_LOCK) / scene.head_speed;
+        let before = end - scene.team.shortest_link() * Interval::new(BEFORE_LOCK) / scene.head_speed;
         let time = Interval::new(time);
         before.is_at_most(&time) && time.is_at_most(&end)
     }
@@ -81,7 +81,7 @@ struct Together {
     /// The capsules of the handles on the stage.
     capsules: [Vec<Capsule>; 2],
     /// The boards on the line without end, if they are not listed.
-    runs: [Option<(Capsule, Capsule, Interval)>; 2],
+    runs: [Vec<(usize, Capsule, Capsule, Size)>; 2],
     links: u64,
 }
 
@@ -96,7 +96,8 @@ impl Together {
     /// Checks that both heads are in their spans from one time to another, and Lemma 1 for the listed links.
     fn new(scenes: [&Scene; 2], [from, to]: [f64; 2], heads: [Span; 2], spans: [&[Span]; 2]) -> Result<Self, String> {
         let [from, to] = [from, to].map(Interval::new);
-        let mut together = Self { chains: Vec::new(), capsules: Default::default(), runs: [None, None], links: 0 };
+        let mut together =
+            Self { chains: Vec::new(), capsules: Default::default(), runs: Default::default(), links: 0 };
         for (k, scene) in scenes.into_iter().enumerate() {
             span_is_one(scene, heads[k]).map_err(|problem| format!("head {k} of the two: {problem}"))?;
             if !is_in_span(scene, heads[k], &from, &to) {
@@ -107,8 +108,11 @@ impl Together {
             together.links += chain.products.len() as u64;
             together.capsules[k] = chain.capsules.iter().map(on_stage).collect();
             if chain.last() < scene.team.benches && chain.ends_on_line(scene) {
-                let (front, rear, length) = straight_run(scene, &chain, chain.last());
-                together.runs[k] = Some((on_stage(&front), on_stage(&rear), length));
+                let run = |first: usize| {
+                    let (front, rear, size) = straight_run(scene, &chain, first);
+                    (first, on_stage(&front), on_stage(&rear), size)
+                };
+                together.runs[k] = scene.team.runs(chain.last()).map(run).collect();
             }
             together.chains.push(chain);
         }
@@ -117,18 +121,17 @@ impl Together {
 
     fn board<'c>(&'c self, scene: &Scene, k: usize, bench: usize) -> Board<'c> {
         let capsules = &self.capsules[k];
-        Board::new(&capsules[bench], &capsules[bench + 1], *scene.team.link(bench), &scene.team)
+        Board::new(&capsules[bench], &capsules[bench + 1], scene.team.size(bench))
     }
 
     /// Returns all boards of a dragon, those on the line without end as one.
     fn boards<'c>(&'c self, scene: &Scene, k: usize) -> Result<Vec<Board<'c>>, String> {
         let listed = self.capsules[k].len() - 1;
         let mut boards: Vec<Board> = (0..listed).map(|bench| self.board(scene, k, bench)).collect();
-        match &self.runs[k] {
-            Some((front, rear, length)) => boards.push(Board::new(front, rear, *length, &scene.team)),
-            None if listed == scene.team.benches => {}
-            None => return Err("not all links are listed, and the last handle is not on a line without end".to_owned()),
+        if self.runs[k].is_empty() && listed < scene.team.benches {
+            return Err("not all links are listed, and the last handle is not on a line without end".to_owned());
         }
+        boards.extend(self.runs[k].iter().map(|(_, front, rear, size)| Board::new(front, rear, *size)));
         Ok(boards)
     }
 }
@@ -154,7 +157,7 @@ impl Together {
     fn first_order_boards(&self, scene: &Scene, k: usize, step: &FirstOrder) -> Vec<FirstOrderBoard> {
         let listed = self.capsules[k].len() - 1;
         let boards = (0..listed).map(|bench| step.board(bench, &scene.team));
-        boards.chain(self.runs[k].is_some().then(|| step.straight_run(listed, &scene.team))).collect()
+        boards.chain(self.runs[k].iter().map(|(first, ..)| step.straight_run(*first, &scene.team))).collect()
     }
 }
 

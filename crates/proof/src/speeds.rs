@@ -60,7 +60,8 @@ fn check_tail(scene: &Scene, chain: &Chain) -> Result<(), String> {
         return Ok(());
     }
     let Span(_, latest) = chain.capsules[chain.last()].span;
-    let longest = if chain.last() == 0 { team.link(0).max(team.link(1)) } else { *team.link(1) };
+    let [behind, _] = team.behind_head();
+    let longest = if chain.last() == 0 { team.link(0).max(&behind) } else { behind };
     let is_slower = latest.0 == 0
         && scene.path.spiral_radius(latest).is_some_and(|radius| {
             let square = latest.coordinate().square();

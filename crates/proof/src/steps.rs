@@ -9,7 +9,8 @@ use super::interval::Interval;
 use super::lines::Links;
 use super::path::{Place, Span};
 use super::scene::Scene;
-use super::unlisted::{check_ring, straight_run};
+use super::team::Size;
+use super::unlisted::{check_ring, first_partner, straight_run};
 
 /// A step of the file.
 pub(super) struct Step {
@@ -157,6 +158,10 @@ impl Steps {
             return Ok(());
         }
         let Some(body) = chain.products.get(1) else { return Err("links 0 and 1 are not both listed".to_owned()) };
+        let lists_tail = chain.last() == scene.team.benches || chain.ends_on_line(scene);
+        if scene.team.own_tail().is_some() && !lists_tail {
+            return Err("the tail has a size of its own, but not all links are listed (Lemma 4)".to_owned());
+        }
         self.bodies_moving &= body.is_positive();
         let is_ahead = scene.path.in_order(start_of_second, chain.capsules[1].span.0);
         let problem = if !self.bodies_moving {
@@ -220,8 +225,8 @@ impl Steps {
             return Err(format!("it names the obstacle {obstacle}, which the scene has not"));
         }
         self.free.resize(scene.obstacles.len(), (None, true));
-        let run = run_on_ground(scene, links, chain);
-        let boards = boards_on_ground(scene, links, chain, run.as_ref());
+        let runs = runs_on_ground(scene, links, chain);
+        let boards = boards_on_ground(scene, links, chain, &runs);
         for (number, obstacle) in scene.obstacles.iter().enumerate() {
             let (end, all) = &mut self.free[number];
             if !free.contains(&number) {
@@ -231,7 +236,7 @@ impl Steps {
             if !*all {
                 return Err(format!("it claims to be clear of obstacle {number} after a step that does not"));
             }
-            if let Some(bench) = boards.iter().position(|board| !obstacle.is_avoided_by(board)) {
+            if let Some((bench, _)) = boards.iter().find(|(_, board)| !obstacle.is_avoided_by(board)) {
                 return Err(format!("bench {bench}, or one behind it, may be at obstacle {number} (Lemma 9)"));
             }
             *end = Some(to);
@@ -282,13 +287,13 @@ impl Steps {
             return Err(format!("it names {} obstacles, expected at most {}", claims.len(), scene.obstacles.len()));
         }
         self.beside.resize(scene.obstacles.len(), Beside { all: self.steps == 0, ..NOTHING });
-        let run = run_on_ground(scene, links, chain);
-        let boards = step.map_or_else(Vec::new, |_| boards_on_ground(scene, links, chain, run.as_ref()));
+        let runs = runs_on_ground(scene, links, chain);
+        let boards = step.map_or_else(Vec::new, |_| boards_on_ground(scene, links, chain, &runs));
         let first_order = |step: &FirstOrder, bench: usize| {
-            let is_run = run.is_some() && bench + 1 == boards.len();
-            if is_run { step.straight_run(bench, &scene.team) } else { step.board(bench, &scene.team) }
+            let is_listed = bench < chain.last();
+            if !is_listed { step.straight_run(bench, &scene.team) } else { step.board(bench, &scene.team) }
         };
-        let first_order: Vec<_> = (0..boards.len()).filter_map(|bench| Some(first_order(step?, bench))).collect();
+        let first_order: Vec<_> = boards.iter().filter_map(|(bench, _)| Some(first_order(step?, *bench))).collect();
         for (number, (obstacle, beside)) in scene.obstacles.iter().zip(&mut self.beside).enumerate() {
             let Some(metres) = claims.get(number).copied().flatten() else {
                 beside.all = false;
@@ -302,7 +307,9 @@ impl Steps {
             }
             let far = Interval::new(metres);
             let mut pairs = boards.iter().zip(&first_order);
-            if let Some(bench) = pairs.position(|(board, first)| !obstacle.is_further_than(&far, board, first)) {
+            if let Some(((bench, _), _)) =
+                pairs.find(|((_, board), first)| !obstacle.is_further_than(&far, board, first))
+            {
                 return Err(format!("bench {bench}, or one behind it, may be nearer to obstacle {number} (Lemma 11)"));
             }
             *beside = Beside { end: Some(to), all: true, least: beside.least.min(metres) };
@@ -311,42 +318,45 @@ impl Steps {
     }
 }
 
-/// Returns the boards on the line without end, if a step about all links does not list them.
-fn run_on_ground(scene: &Scene, links: Links, chain: &Chain) -> Option<(Capsule, Capsule, Interval)> {
+/// The first of some boards on the line without end, the first and the last handle, and their size.
+type Run = (usize, Capsule, Capsule, Size);
+
+/// Returns the boards on the line without end that a step does not list: all, or of a step of the front links a tail
+/// with a size of its own.
+fn runs_on_ground(scene: &Scene, links: Links, chain: &Chain) -> Vec<Run> {
     let last = chain.last();
-    (links == Links::All && last < scene.team.benches).then(|| straight_run(scene, chain, last))
+    let first = if links == Links::All { Some(last) } else { scene.team.own_tail() };
+    let first = first.filter(|first| (last..scene.team.benches).contains(first));
+    let run = |first: usize| {
+        let (front, rear, size) = straight_run(scene, chain, first);
+        (first, front, rear, size)
+    };
+    first.into_iter().flat_map(|first| scene.team.runs(first)).map(run).collect()
 }
 
-/// Returns the boards that obstacles concern: all, those on the line as one, or boards 0 and 1.
-fn boards_on_ground<'c>(
-    scene: &Scene,
-    links: Links,
-    chain: &'c Chain,
-    run: Option<&'c (Capsule, Capsule, Interval)>,
-) -> Vec<Board<'c>> {
+/// Returns the boards that obstacles concern, with their benches: all, those on the line as one, or boards 0 and 1 and
+/// a tail with a size of its own.
+fn boards_on_ground<'c>(scene: &Scene, links: Links, chain: &'c Chain, runs: &'c [Run]) -> Vec<(usize, Board<'c>)> {
     let team = &scene.team;
-    let mut boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
-        .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
+    let concerns = |bench: &usize| links == Links::All || *bench < 2 || team.own_tail() == Some(*bench);
+    let mut boards: Vec<(usize, Board)> = (chain.capsules.windows(2).enumerate())
+        .filter(|(bench, _)| concerns(bench))
+        .map(|(bench, pair)| (bench, Board::new(&pair[0], &pair[1], team.size(bench))))
         .collect();
-    match run {
-        Some((front, rear, length)) => boards.push(Board::new(front, rear, *length, team)),
-        None if links == Links::Front => boards.truncate(2),
-        None => {}
-    }
+    boards.extend(runs.iter().map(|(first, front, rear, size)| (*first, Board::new(front, rear, *size))));
     boards
 }
 
-/// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs with boards
-/// 0 and 1. Returns the number of pairs.
+/// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs of Lemma 4. Returns the number of pairs.
 fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String> {
     let team = &scene.team;
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
-        .map(|(index, pair)| Board::new(&pair[0], &pair[1], *team.link(index), team))
+        .map(|(index, pair)| Board::new(&pair[0], &pair[1], team.size(index)))
         .collect();
-    let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
     let (mut pairs, zero) = (0, Interval::new(0.0));
-    for a in 0..about {
-        for b in a + 2..boards.len() {
+    for a in 0..boards.len() {
+        let Some(first) = first_partner(scene, links, a) else { break };
+        for b in first..boards.len() {
             if !boards[a].is_apart_from(&boards[b]) && check_ring(scene, chain, a..a + 1, b, &zero).is_err() {
                 return Err(format!("it claims to be clear, but benches {a} and {b} may touch (Lemma 2)"));
             }
@@ -357,30 +367,30 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
         return Ok(pairs);
     }
     if chain.ends_on_line(scene) {
-        check_line(scene, chain, &boards[..about])?;
+        check_line(scene, links, chain, &boards)?;
+        let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
         return Ok(pairs + about as u64);
     }
     // Only a step of the front links gets here.
     check_ring(scene, chain, 0..2, chain.last(), &zero)?;
-    Ok(pairs + about as u64)
+    Ok(pairs + 2)
 }
 
-/// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The boards `about` are apart from
-/// them, and they are apart from each other.
-fn check_line(scene: &Scene, chain: &Chain, about: &[Board]) -> Result<(), String> {
+/// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The listed boards that the step
+/// concerns are apart from them, and they are apart from each other.
+fn check_line(scene: &Scene, links: Links, chain: &Chain, boards: &[Board]) -> Result<(), String> {
     let team = &scene.team;
     let last = chain.last();
     if !(team.hole_inset + team.hole_inset).is_below(team.link(1)) {
         return Err("it claims to be clear, but benches on a line touch (Lemma 3)".to_owned());
     }
-    for (a, board) in about.iter().enumerate() {
-        // The first board of the run that shares no handle with this one.
-        let first = last.max(a + 2);
-        if first >= team.benches {
-            continue;
-        }
-        let (front, rear, length) = straight_run(scene, chain, first);
-        if !board.is_apart_from(&Board::new(&front, &rear, length, team)) {
+    for (a, board) in boards.iter().enumerate() {
+        let Some(first) = first_partner(scene, links, a) else { break };
+        let is_apart = |first: usize| {
+            let (front, rear, size) = straight_run(scene, chain, first);
+            board.is_apart_from(&Board::new(&front, &rear, size))
+        };
+        if !team.runs(last.max(first)).all(is_apart) {
             return Err(format!("it claims to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"));
         }
     }

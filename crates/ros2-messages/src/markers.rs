@@ -185,9 +185,9 @@ impl MarkerArray {
         let stage = &message.stage;
         let width = greatest_width(stage);
         let bench = |of: &StageDragon, bench: u32| {
-            let length = if bench == 0 { of.head_length } else { of.body_length };
+            let [x, y] = of.board(bench);
             let number = (of.first_handle + bench) as i32;
-            Marker { scale: Xyz { x: length, y: of.width, z: BENCH_HEIGHT }, ..Marker::new("benches", number, CUBE) }
+            Marker { scale: Xyz { x, y, z: BENCH_HEIGHT }, ..Marker::new("benches", number, CUBE) }
         };
         let sign = |ns, shape, scale| Marker { scale, color: colour(Severity::Error), ..Marker::new(ns, 0, shape) };
         // Text has only a height.

@@ -50,7 +50,7 @@ pub(crate) struct Map {
     ways: Vec<Vec<Point>>,
     /// The boxes of the words of the stage.
     taken: Taken,
-    /// Those words: the names of the obstacles.
+    /// The names of the obstacles.
     names: String,
 }
 

@@ -172,7 +172,7 @@ impl Tables<'_, '_> {
         let clock = self.wishes.clock;
         let block = |bench: usize| {
             let found = &self.walk.dragons[number].benches[bench];
-            let far = self.of(["nobody within 1 m", "1 米内无人"]).to_owned();
+            let far = self.of(["no bench within 1 m", "1 米内无人"]).to_owned();
             let cells = vec![
                 (bench + 1).to_string(),
                 String::new(),
@@ -340,7 +340,7 @@ impl Writer<'_, '_> {
     }
 }
 
-/// Returns the lines that a text takes in a column, not fewer than it will: a word moves to the next line as a whole.
+/// Returns the number of lines of a text in a column, or a greater one: a word moves to the next line as a whole.
 fn lines(text: &str, width: f64) -> f64 {
     let (mut lines, mut used) = (1.0, 0.0);
     for word in text.split_inclusive(' ') {

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use bench_dragon_motion::Motion;
 
-/// What the feet do on a piece.
+/// The way in which the feet move on a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Feet {
     Straight,

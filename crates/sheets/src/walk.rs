@@ -8,6 +8,7 @@ mod near;
 
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::Ensemble;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
@@ -96,13 +97,13 @@ pub(crate) struct Stretch {
 
 impl<'a> Walk<'a> {
     /// Follows all benches of a scene until the show ends. The benches that `is_drawn`, by their number in the show,
-    /// keep their trail. `progress` is called with the share that is done, from 0 to 1.
+    /// keep their trail. A walk that `progress` stops is of no use.
     pub fn new(
         scene: &'a Scene,
         timeline: &Timeline,
         searched: &Searched<'_>,
         is_drawn: impl Fn(usize) -> bool,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Self {
         let ensemble = &scene.ensemble;
         let end = timeline.show_end(scene.stops_at_contact()).time;
@@ -127,7 +128,7 @@ impl<'a> Walk<'a> {
         walk
     }
 
-    fn follow(&mut self, searched: &Searched<'_>, is_drawn: &dyn Fn(usize) -> bool, progress: &mut dyn FnMut(f64)) {
+    fn follow(&mut self, searched: &Searched<'_>, is_drawn: &dyn Fn(usize) -> bool, progress: Progress<'_>) {
         let ensemble = &self.scene.ensemble;
         // Speeds stand on the sheets, even if the scene publishes none.
         let mut solver = ensemble.solver(Velocities::Computed);
@@ -140,7 +141,8 @@ impl<'a> Walk<'a> {
         let samples = (self.end / step).ceil() as usize;
         for sample in 0..=samples {
             let time = (sample as f64 * step).min(self.end);
-            if solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
+            let share = 0.7 * sample as f64 / (samples + 1) as f64;
+            if progress(share).is_break() || solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
                 break;
             }
             nearest.include(&chain, time);
@@ -152,7 +154,6 @@ impl<'a> Walk<'a> {
                     walk.trail.push((time, middle(&chain, first + bench)));
                 }
             }
-            progress(0.7 * sample as f64 / (samples + 1) as f64);
         }
         let found =
             nearest.refined((step, self.end), solver.as_mut(), searched, &mut |share| progress(0.7 + 0.3 * share));

@@ -151,7 +151,9 @@ impl Language {
             EventKind::Stall => {
                 self.pick(format!("{one} stalls; pushed back behind it"), format!("{one}停住，其后被推回"))
             }
-            EventKind::Lock => self.pick(format!("{one} locks: nobody can go on"), format!("{one}卡死，不能再走")),
+            EventKind::Lock => {
+                self.pick(format!("{one} locks: the dragon cannot continue"), format!("{one}卡死，不能再走"))
+            }
             EventKind::PathEnd => self.of(["the head is at the end of its way", "龙头走完全程"]).to_owned(),
         }
     }

@@ -237,22 +237,34 @@ pub fn stage(
     ensemble: &Ensemble,
     show: &Show,
 ) -> StageMessage {
+    let (end, cues, events) = (show.freeze_time(), show.cues(), show.timeline().all());
+    let message = stage_without_show(ensemble, end, cues, &events);
+    StageMessage { stage: Stage { run_id, stamp_ns, scene_hash, ..message.stage }, ..message }
+}
+
+/// Returns the stage of dragons that are not in a show, of no run, with the events and cues that are known.
+pub fn stage_without_show(
+    ensemble: &Ensemble,
+    freeze_time: f64,
+    cues: &[ReachedCue],
+    events: &[TimedEvent],
+) -> StageMessage {
     let mut segments = Vec::new();
     let of = |(k, dragon): (usize, &Dragon)| stage_dragon(dragon, ensemble.handles_of(k).start as u32, &mut segments);
     let dragons: Vec<StageDragon> = ensemble.dragons().iter().enumerate().map(of).collect();
     let ground = ensemble.ground();
     let obstacles = ground.obstacles().iter().map(|obstacle| stage_obstacle(obstacle, &mut segments));
     let stage = Stage {
-        run_id,
-        stamp_ns,
-        freeze_time: show.freeze_time(),
-        cues: show.cues().len() as u32,
+        run_id: 0,
+        stamp_ns: 0,
+        freeze_time,
+        cues: cues.len() as u32,
         reserved: 0,
-        scene_hash,
+        scene_hash: [0; SCENE_HASH_BYTES],
         dragons: List::of(dragons),
         obstacles: List::of(obstacles),
-        events: List::of(show.timeline().all().iter().map(stage_event)),
-        cue_list: List::of(show.cues().iter().map(stage_cue)),
+        events: List::of(events.iter().map(stage_event)),
+        cue_list: List::of(cues.iter().map(stage_cue)),
     };
     StageMessage { stage, segments }
 }
@@ -263,7 +275,7 @@ fn stage_dragon(
     first_handle: u32,
     segments: &mut Vec<StageSegment>,
 ) -> StageDragon {
-    let Team { benches, head_length, body_length, width, hole_inset } = *motion.team();
+    let Team { benches, head_length, body_length, width, hole_inset, ends } = *motion.team();
     let (mut pitch, mut start_turn) = (f64::NAN, f64::NAN);
     let first_segment = segments.len() as u32;
     // A route's team stands on a line.
@@ -284,7 +296,10 @@ fn stage_dragon(
     StageDragon {
         head_length,
         body_length,
+        tail_length: ends.tail_length.unwrap_or(body_length),
+        head_width: ends.head_width.unwrap_or(width),
         width,
+        tail_width: ends.tail_width.unwrap_or(width),
         hole_inset,
         pitch,
         start_turn,

@@ -6,9 +6,13 @@
 pub mod alerts;
 pub mod clock;
 pub mod convert;
+pub mod curve;
 mod dancer;
 mod dancers;
+pub mod moments;
 mod playback;
+pub mod requirements;
+pub mod results;
 pub mod scene;
 pub mod table;
 #[cfg(test)]

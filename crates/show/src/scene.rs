@@ -33,6 +33,7 @@ pub use self::precision::SinglePrecision;
 use self::require::RawRequire;
 pub use self::require::Requirements;
 use self::ros2::RawRos2;
+pub use self::source::CheckedNumber;
 use self::source::Source;
 use self::stage::RawStage;
 use self::team::RawTeam;
@@ -54,8 +55,18 @@ const DEFAULT_END_HOLD: f64 = 5.0;
 
 /// Invalid input, in one sentence that names the place and the expected value.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}", printable(.0))]
-pub struct SceneError(String);
+#[error("{}", printable(sentence))]
+pub struct SceneError {
+    sentence: String,
+    at: Option<usize>,
+}
+
+impl SceneError {
+    /// Returns the byte of the text at which the fault stands; `None` for a file that cannot be read.
+    pub fn at(&self) -> Option<usize> {
+        self.at
+    }
+}
 
 /// The solvers that a scene can name.
 #[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -174,16 +185,30 @@ impl Scene {
     /// # Errors
     /// One sentence that names the file, the line, the field and the expected value.
     pub fn parse(text: &str, file: &str, stem: &str) -> Result<Self, SceneError> {
+        parse(&Source::new(text, file), stem)
+    }
+
+    /// Reads a scene from TOML text, and the numbers of the text with their accepted ranges, in the order in which they
+    /// are checked.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn parse_with_numbers(text: &str, file: &str, stem: &str) -> Result<(Self, Vec<CheckedNumber>), SceneError> {
         let source = Source::new(text, file);
-        match dragons_in(text) {
-            Some(_) => source.scene::<RawEnsemble>(|raw| raw.validated(&source, stem)),
-            None => source.scene::<RawScene>(|raw| raw.validated(&source, stem)),
-        }
+        let scene = parse(&source, stem)?;
+        Ok((scene, source.numbers.take()))
     }
 
     /// Returns true if a show of this scene stops at a contact. Without alerts no contact is computed.
     pub fn stops_at_contact(&self) -> bool {
         self.alerts.is_some() && self.on_contact == OnContact::Stop
+    }
+}
+
+fn parse(source: &Source, stem: &str) -> Result<Scene, SceneError> {
+    match dragons_in(source.text) {
+        Some(_) => source.scene::<RawEnsemble>(|raw| raw.validated(source, stem)),
+        None => source.scene::<RawScene>(|raw| raw.validated(source, stem)),
     }
 }
 

@@ -45,14 +45,15 @@ impl Histograms {
 /// The links of one dragon.
 struct Links {
     handles: Range<usize>,
-    /// Lengths of the head's link and of the other links, in metres.
-    lengths: [f64; 2],
+    /// By kind of bench (head, body, tail): the length of its link, in metres.
+    lengths: [f64; 3],
 }
 
 impl Links {
     fn of(dragon: &StageDragon) -> Self {
         let first = dragon.first_handle as usize;
-        let lengths = [dragon.head_length, dragon.body_length].map(|length| length - 2.0 * dragon.hole_inset);
+        let lengths = [dragon.head_length, dragon.body_length, dragon.tail_length];
+        let lengths = lengths.map(|length| length - 2.0 * dragon.hole_inset);
         Self { handles: first..first + dragon.benches as usize + 1, lengths }
     }
 }
@@ -194,14 +195,18 @@ impl Observer {
             return;
         }
         let mut right = true;
-        for Links { handles: own, lengths: [head, body] } in &self.links {
+        for Links { handles: own, lengths: [head, body, tail] } in &self.links {
             let Some(own) = handles.get(own.clone()) else {
                 right = false;
                 continue;
             };
             for (link, pair) in own.windows(2).enumerate() {
                 let length = (pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y);
-                let expected = if link == 0 { head } else { body };
+                let expected = match link {
+                    0 => head,
+                    _ if link + 2 == own.len() => tail,
+                    _ => body,
+                };
                 let radius = pair[1].x.hypot(pair[1].y);
                 let promised = self.link_tolerance + 1e-12 * expected + 4.0 * (radius.next_up() - radius);
                 let error = (length - expected).abs();
@@ -262,7 +267,7 @@ mod tests {
             let dragon = StageDragon {
                 benches: 2,
                 head_length: 3.5,
-                body_length: 1.5,
+                tail_length: 1.5,
                 hole_inset: 0.25,
                 ..StageDragon::default()
             };

@@ -222,7 +222,12 @@ fn contact_errors(subject: &Subject, timeline: &Timeline) -> Result<Option<Conta
         let board = |bench: u32| {
             let point = |handle: usize| Point::new(handles[handle].x.high, handles[handle].y.high);
             let (front, rear) = (point(bench as usize), point(bench as usize + 1));
-            Board::from_handles(front, rear, subject.motion.team().hole_inset, subject.motion.team().width)
+            Board::from_handles(
+                front,
+                rear,
+                subject.motion.team().hole_inset,
+                subject.motion.team().board_width(bench as usize),
+            )
         };
         Ok::<f64, String>(separation_board_board(&board(a), &board(b)))
     };

@@ -672,17 +672,24 @@ class SceneHeader(Message):
 class StageDragon(Message):
     """A dragon of the show in a `Stage`.
 
-    The head's board and the other boards can differ in length. The team may stand further back than the first segment
-    begins, on the same spiral or line.
+    The boards of the head, of the tail and of all benches between can differ in size. The tail is the last of two or
+    more benches. The team may stand further back than the first segment begins, on the same spiral or line. Layout 7
+    added the sizes of head and tail.
     """
 
-    LAYOUT = 6
+    LAYOUT = 7
     # Metres along the head's board.
     head_length: float
-    # Metres along every other board.
+    # Metres along every board between head and tail.
     body_length: float
-    # Metres across every board.
+    # Metres along the tail's board.
+    tail_length: float
+    # Metres across the head's board.
+    head_width: float
+    # Metres across every board between head and tail.
     width: float
+    # Metres across the tail's board.
+    tail_width: float
     # Metres from the centre of a handle's hole to the nearest end of the board.
     hole_inset: float
     # Metres per turn of the spiral on which the head starts, or else of the first one; NaN if the path has none.
@@ -702,7 +709,10 @@ class StageDragon(Message):
     _fields_ = [
         ("head_length", ctypes.c_double),
         ("body_length", ctypes.c_double),
+        ("tail_length", ctypes.c_double),
+        ("head_width", ctypes.c_double),
         ("width", ctypes.c_double),
+        ("tail_width", ctypes.c_double),
         ("hole_inset", ctypes.c_double),
         ("pitch", ctypes.c_double),
         ("start_turn", ctypes.c_double),
@@ -798,7 +808,7 @@ class Stage(Message):
     length.
     """
 
-    LAYOUT = 6
+    LAYOUT = 7
     # The run, as `FrameHeader.run_id`.
     run_id: int
     # CLOCK_REALTIME in nanoseconds when this was written.

@@ -2,6 +2,7 @@
 
 use bench_dragon::motion::ensemble::Dragon;
 use bench_dragon::motion::model::segment::SegmentOutline;
+use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::placement::Placement;
 use bench_dragon::motion::solve::Velocities;
 use bench_dragon::motion::{Choice, Motion};
@@ -114,11 +115,26 @@ fn dragon(motion: &Motion, placement: &Placement, output: &mut Output) -> Result
         team.width,
         team.hole_inset
     ))?;
+    if let Some(ends) = own_ends(team) {
+        output.line(&format!("  {ends}"))?;
+    }
     output.line(&format!("  Path: {}; the head moves at {} m/s.", path(motion), motion.head_speed()))?;
     match placed(placement) {
         Some(sentence) => output.line(&format!("  {sentence}")),
         None => Ok(()),
     }
+}
+
+/// Returns a sentence for people on the sizes of head and tail that are not the body's; `None` if there are none.
+fn own_ends(team: &Team) -> Option<String> {
+    let Ends { head_width, tail_width, tail_length } = team.ends;
+    let head = head_width.map(|width| format!("the head is {width} m wide"));
+    let is_last_of_several = team.benches > 1;
+    let tail = [(tail_length, "long"), (tail_width, "wide")].map(|(size, what)| Some(format!("{} m {what}", size?)));
+    let tail: Vec<String> = tail.into_iter().flatten().filter(|_| is_last_of_several).collect();
+    let tail = (!tail.is_empty()).then(|| format!("the tail's board is {}", tail.join(" and ")));
+    let ends: Vec<String> = head.into_iter().chain(tail).collect();
+    (!ends.is_empty()).then(|| format!("Ends: {}.", ends.join("; ")))
 }
 
 /// Returns a sentence for people on a placement, without the parts that change nothing; `None` if none does.

@@ -66,10 +66,20 @@ fn scene(number: u64) -> String {
         }
     };
     let stage = if number % 6 == 1 { stage(link, &mut between) } else { String::new() };
+    let speed = between(0.2, 3.0);
+    let ends = match number % 4 {
+        1 => format!("head_width = {}\n", width * between(0.5, 3.0)),
+        2 => format!(
+            "tail_width = {}\ntail_length = {}\n",
+            width * between(0.5, 3.0),
+            2.0 * inset + link * between(0.5, 2.0)
+        ),
+        _ => String::new(),
+    };
     format!(
-        "name = \"scene {number}\"\n[team]\nbenches = {benches}\nhead_length = {head}\nbody_length = {body}\nwidth = \
+        "name = \"scene {number}\"\n[team]\n{ends}benches = {benches}\nhead_length = {head}\nbody_length = {body}\nwidth = \
          {width}\nhole_inset = {inset}\n[path]\n{path}\n[motion]\nhead_speed = {}\non_contact = \"continue\"\n{stage}",
-        between(0.2, 3.0)
+        speed
     )
 }
 

@@ -13,13 +13,33 @@ pub struct Team {
     pub benches: usize,
     pub head_length: f64,
     pub body_length: f64,
+    pub tail_length: f64,
+    pub head_width: f64,
     pub width: f64,
+    pub tail_width: f64,
     pub hole_inset: f64,
 }
 
 impl Team {
+    fn is_tail(&self, bench: usize) -> bool {
+        bench > 0 && bench + 1 == self.benches
+    }
+
     pub fn link(&self, bench: usize) -> f64 {
-        (if bench == 0 { self.head_length } else { self.body_length }) - 2.0 * self.hole_inset
+        let board = match bench {
+            0 => self.head_length,
+            _ if self.is_tail(bench) => self.tail_length,
+            _ => self.body_length,
+        };
+        board - 2.0 * self.hole_inset
+    }
+
+    pub fn width(&self, bench: usize) -> f64 {
+        match bench {
+            0 => self.head_width,
+            _ if self.is_tail(bench) => self.tail_width,
+            _ => self.width,
+        }
     }
 }
 
@@ -71,20 +91,24 @@ pub struct Chain<'a> {
     pub path: &'a Path,
     pub team: &'a Team,
     links: [Link<'a>; 2],
+    /// The link of a tail that differs from the body's.
+    tail: Option<Link<'a>>,
 }
 
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, team: &'a Team) -> Self {
-        Self { path, team, links: [0, 1].map(|bench| Link::new(path, team.link(bench))) }
+        let tail = (team.benches > 2 && team.tail_length != team.body_length)
+            .then(|| Link::new(path, team.link(team.benches - 1)));
+        Self { path, team, links: [0, 1].map(|bench| Link::new(path, team.link(bench))), tail }
     }
 
     fn link(&self, bench: usize) -> &Link<'a> {
-        &self.links[bench.min(1)]
+        self.tail.as_ref().filter(|_| self.team.is_tail(bench)).unwrap_or(&self.links[bench.min(1)])
     }
 
-    /// Returns true if both searches for stalls and jumps were complete.
+    /// Returns true if the searches for stalls and jumps were complete.
     pub fn is_complete(&self) -> bool {
-        self.links.iter().all(|link| link.complete)
+        self.links.iter().chain(&self.tail).all(|link| link.complete)
     }
 
     pub fn pose(&self, head: f64) -> Pose {

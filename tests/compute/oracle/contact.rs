@@ -57,7 +57,7 @@ impl Boards<'_> {
         let team = self.chain.team;
         let of = |bench: usize| {
             let (front, rear) = (pose.handles[bench].point, pose.handles[bench + 1].point);
-            let half = [0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width];
+            let half = [0.5 * team.link(bench) + team.hole_inset, 0.5 * team.width(bench)];
             Board { centre: 0.5 * (front + rear), along: (front - rear) / team.link(bench), half }
         };
         (0..team.benches).map(of).collect()
@@ -91,7 +91,7 @@ impl Boards<'_> {
     /// + m (across), with l up to inset / link beyond both ends and m = width / 2 link.
     fn overhang(&self, bench: usize) -> f64 {
         let team = self.chain.team;
-        1.0 + (2.0 * team.hole_inset + team.width) / team.link(bench)
+        1.0 + (2.0 * team.hole_inset + team.width(bench)) / team.link(bench)
     }
 
     /// Returns the first contact up to `end`, with no lock before `end`; an error if the work is too much.

@@ -19,13 +19,23 @@ pub fn read(text: &str) -> (Team, Path) {
     };
     let team = |field: &str| float(&scene["team"], field).unwrap();
     let (benches, head_length, body_length) = (team("benches") as usize, team("head_length"), team("body_length"));
-    let team = Team { benches, head_length, body_length, width: team("width"), hole_inset: team("hole_inset") };
+    let or = |field: &str, other: f64| float(&scene["team"], field).unwrap_or(other);
+    let team = Team {
+        benches,
+        head_length,
+        body_length,
+        tail_length: or("tail_length", body_length),
+        head_width: or("head_width", team("width")),
+        width: team("width"),
+        tail_width: or("tail_width", team("width")),
+        hole_inset: team("hole_inset"),
+    };
     let table = &scene["path"];
     let number = |field: &str| float(table, field);
     let path = match table["kind"].as_str().unwrap() {
         "spiral" => Path::spiral(number("pitch").unwrap(), number("start_turn").unwrap()),
         "turnaround" => {
-            let stretched = team.link(0) + team.link(1) * (team.benches - 1) as f64;
+            let stretched: f64 = (0..team.benches).map(|bench| team.link(bench)).sum();
             let [pitch, radius, ratio, lead_in] =
                 ["pitch", "turn_radius", "arc_ratio", "lead_in"].map(|field| number(field).unwrap());
             Path::turnaround(pitch, radius, ratio, lead_in, number("lead_out").unwrap_or(stretched))
@@ -123,6 +133,23 @@ fn spiral(random: &mut Random, link: f64) -> String {
         "[[path.pieces]]\nkind = \"spiral\"\npitch = {pitch:?}\nradius = {radius:?}\ndirection = \"{direction}\"\n\
          side = \"{side}\"\nturns = {turns:?}\n"
     )
+}
+
+/// Returns the scene with a head and a tail of their own sizes, or some of these.
+pub fn with_ends(text: &str, random: &mut Random) -> String {
+    let (team, _) = read(text);
+    let mut ends = String::from("[team]\n");
+    let mut add = |field: &str, size: f64| writeln!(ends, "{field} = {size:?}").unwrap();
+    if random.chance(0.7) {
+        add("head_width", team.width * random.magnitude(0.3, 5.0));
+    }
+    if random.chance(0.7) {
+        add("tail_width", team.width * random.magnitude(0.3, 5.0));
+    }
+    if random.chance(0.7) {
+        add("tail_length", 2.0 * team.hole_inset + team.link(1) * random.magnitude(0.3, 3.0));
+    }
+    text.replace("[team]\n", &ends)
 }
 
 /// Returns a scene of a family.

@@ -57,7 +57,14 @@ fn routes() -> impl Strategy<Value = Subject> {
     });
     (prop_oneof![3 => route, 1 => turnaround], 2usize..60, 0.2..3.0f64, 0.2..3.0f64).prop_map(
         |(description, benches, head, body)| {
-            let team = Team { benches, head_length: head + 0.1, body_length: body + 0.1, width: 0.1, hole_inset: 0.05 };
+            let team = Team {
+                benches,
+                head_length: head + 0.1,
+                body_length: body + 0.1,
+                width: 0.1,
+                hole_inset: 0.05,
+                ends: Ends::NONE,
+            };
             Subject::new(description, team, 1.0)
         },
     )
@@ -76,8 +83,14 @@ fn far_routes() -> impl Strategy<Value = (Subject, f64)> {
             let length = if bend < 0.4 { far } else { PI * 0.5 * far };
             let last = RouteStep::Arc { side: Side::Right, radius: size.into(), turns: (0.1 + bend / 2.0).into() };
             let description = PathDescription::Route { heading_turns, steps: vec![first, last] };
-            let team =
-                Team { benches, head_length: 1.5 * link + 0.1, body_length: link + 0.1, width: 0.1, hole_inset: 0.05 };
+            let team = Team {
+                benches,
+                head_length: 1.5 * link + 0.1,
+                body_length: link + 0.1,
+                width: 0.1,
+                hole_inset: 0.05,
+                ends: Ends::NONE,
+            };
             let subject = Subject::new(description, team, 1.0);
             let time = (length + (2.0 * share - 1.0) * (benches + 2) as f64 * link).min(subject.end);
             (subject, time)

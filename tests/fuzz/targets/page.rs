@@ -39,6 +39,7 @@ fn address() -> SocketAddr {
         let name = format!("fuzz_page_{}", std::process::id());
         std::thread::spawn(move || {
             let options = ViewOptions {
+                open_scene: |_| None,
                 address: (Ipv4Addr::LOCALHOST, 0).into(),
                 control: true,
                 origins: vec!["https://show.example".parse().expect("an origin")],

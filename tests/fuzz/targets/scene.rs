@@ -135,7 +135,9 @@ fn play(scene: &Scene) {
     let stage = stage(1, 0, [0; 32], &scene.ensemble, &show);
     let stage = stage.stage;
     let dragon = stage.first_dragon();
-    let sizes = [dragon.hole_inset, dragon.head_length, dragon.body_length, dragon.width, stage.freeze_time];
+    let lengths = [dragon.head_length, dragon.body_length, dragon.tail_length, dragon.hole_inset];
+    let widths = [dragon.head_width, dragon.width, dragon.tail_width, stage.freeze_time];
+    let sizes = [lengths, widths].concat();
     assert!(sizes.iter().all(|number| number.is_finite()), "{stage:?}");
     let mut last = 0.0;
     for tick in 0..FRAMES {

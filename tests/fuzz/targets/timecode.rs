@@ -1,8 +1,10 @@
-//! Bytes from outside that a chase decodes: datagrams of Art-Net and PosiStageNet, bytes of a MIDI device, sound. The
-//! first byte selects the decoder.
+//! Bytes from outside that a chase decodes: datagrams of Art-Net and PosiStageNet, bytes of a MIDI device, sound. Also
+//! OSC: datagrams that conduct, and the file of a user's own messages. The first byte selects the decoder.
 
 use bench_dragon::chase::timecode::{FrameRate, Label};
 use bench_dragon::chase::{artnet, ltc, mtc, psn};
+use bench_dragon::outputs::osc_control::{MOST_BYTES, received};
+use bench_dragon::outputs::send::osc_map::OscMap;
 use fastrand::Rng;
 
 use super::Target;
@@ -12,7 +14,31 @@ pub const TARGET: Target = Target { name: "timecode", run, seeds, mutate, cases:
 
 fn run(data: &[u8]) -> bool {
     let Some((kind, bytes)) = data.split_first() else { return false };
-    match kind % 4 {
+    match kind {
+        4 => conducts(bytes),
+        5 => std::str::from_utf8(bytes).is_ok_and(|text| match OscMap::parse(text, "map.toml") {
+            Ok(_) => true,
+            Err(error) => {
+                let sentence = error.to_string();
+                assert!(sentence.starts_with("map.toml") && !sentence.contains('\n'), "{sentence}");
+                false
+            }
+        }),
+        _ => decodes(kind % 4, bytes),
+    }
+}
+
+/// Reads a datagram of OSC.
+fn conducts(bytes: &[u8]) -> bool {
+    // A longer one is not read.
+    let Some(Ok(messages)) = bytes.get(..bytes.len().min(MOST_BYTES)).map(received) else { return false };
+    assert!(messages.len() <= bytes.len(), "{} messages in {} bytes", messages.len(), bytes.len());
+    assert!(messages.iter().all(|message| !message.address.contains(char::is_control)));
+    true
+}
+
+fn decodes(kind: u8, bytes: &[u8]) -> bool {
+    match kind {
         0 => artnet::decode(bytes).is_ok_and(|timecode| {
             assert_eq!(artnet::decode(&artnet::encode(&timecode)), Ok(timecode));
             names_a_frame(timecode.label, timecode.rate);
@@ -47,7 +73,7 @@ fn sound(mut bytes: &[u8]) -> bool {
     let mut decoder = ltc::Decoder::new(f64::from(format.sample_rate));
     let samples = bytes.len() / format.block_bytes;
     for block in bytes.chunks_exact(format.block_bytes) {
-        let sample = format.sample(block);
+        let sample = format.sample(block, format.channels() - 1);
         assert!(sample.abs() <= 4.0, "{sample}");
         if let Some(ltc::Event::Frame { label, rate, end }) = decoder.push(sample) {
             names_a_frame(label, rate);
@@ -81,7 +107,9 @@ fn seeds() -> Vec<Vec<u8>> {
         wave.extend([high, high, second, second].map(|high| if high { 200 } else { 56 }));
         high = second;
     }
-    vec![packet, trackers, quarters, full, wave]
+    let seek = b"\x04#bundle\0\0\0\0\0\0\0\0\x01\0\0\0\x10/seek\0\0\0,f\0\0\x43\xc8\0\0".to_vec();
+    let map = b"\x05[[messages]]\ncue = \"go\"\naddress = \"/cue/1/start\"\narguments = [1, 0.5]\n".to_vec();
+    vec![packet, trackers, quarters, full, wave, seek, map]
 }
 
 fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {

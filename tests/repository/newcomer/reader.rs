@@ -142,7 +142,7 @@ fn resident_kind(command: &str) -> Option<String> {
     let ends = ["--duration", "--recover", "--help", "--version"].iter().any(|option| words.contains(option));
     let subcommand = words
         .iter()
-        .find(|word| ["run", "replay", "watch", "view", "record", "send", "chase", "metrics"].contains(word));
+        .find(|word| ["run", "replay", "watch", "view", "design", "record", "send", "chase", "metrics"].contains(word));
     let name = words.iter().skip_while(|word| **word != "--name").nth(1).unwrap_or(&"bench_dragon");
     match *subcommand? {
         _ if ends => None,

@@ -131,7 +131,9 @@ impl<'a> Side<'a> {
         let stretch = self.stretch_of(&step.listed, extent);
         let listed = step.listed.handles.len() - 1;
         let board = |bench: usize| if bench < listed { step.board(bench) } else { step.straight_run(bench) };
-        let first_order = (0..stretch.boards.len()).map(|bench| board(bench).placed(&self.frame)).collect();
+        let all = self.chain.runs(listed).filter(|first| *first < self.chain.team.benches);
+        let benches = (0..listed).chain(all).take(stretch.boards.len());
+        let first_order = benches.map(|bench| board(bench).placed(&self.frame)).collect();
         Ok(Stretch { at: step.places, first_order, ..stretch })
     }
 
@@ -147,9 +149,9 @@ impl<'a> Side<'a> {
     fn stretch_of(&self, listed: &Listed, extent: Extent) -> Stretch {
         let boards: Vec<MovingBoard> = match extent {
             Extent::UpTo(bench) => (0..=bench).map(|bench| self.chain.board(&listed.handles, bench)).collect(),
-            Extent::Whole => listed.boards_on_ground(Links::All),
+            Extent::Whole => listed.boards_on_ground(Links::All).into_iter().map(|(_, board)| board).collect(),
         };
-        let boards = boards.iter().map(|board| board.placed(&self.chain.shape, &self.frame)).collect();
+        let boards = boards.iter().map(|board| board.placed(self.chain.shape(0).inset, &self.frame)).collect();
         let spans = listed.handles[1..].iter().map(|handle: &Spanned| handle.span).collect();
         Stretch { head: listed.handles[0].span, spans, boards, at: Vec::new(), first_order: Vec::new() }
     }

@@ -59,6 +59,7 @@ impl Descent<'_, '_> {
         }
         let chain = &self.chain;
         match links {
+            Links::Front if chain.team.own_tail().is_some() => listed.is_on_line(last),
             Links::Front if !self.looks_at_boards() => true,
             Links::Front if chain.exact.begins_inward() => listed.is_beyond_front(self.threshold().max(0.0), last),
             _ => listed.is_on_line(last),
@@ -79,17 +80,17 @@ impl Descent<'_, '_> {
         let count = listed.handles.len() - 1;
         let boards: Vec<_> = (0..count).map(|bench| chain.board(&listed.handles, bench)).collect();
         let is_spiral = chain.exact.begins_inward();
-        let firsts = if links == Links::All { count } else { count.min(2) };
         let far = threshold.max(0.0);
         let are_apart = |[a, b]: [usize; 2]| match first_order {
             Some(first_order) => first_order.are_apart([a, b], threshold),
             None => boards[a].is_apart_by(threshold, &boards[b]),
         };
         let innermost: Vec<f64> = (0..count).map(|handle| listed.innermost(handle)).collect();
-        for (a, board) in boards[..firsts].iter().enumerate() {
-            let outermost = sum_above(chain.shape.outermost(board), far);
+        for (a, board) in boards.iter().enumerate() {
+            let outermost = sum_above(chain.shape(a).outermost(board), far);
             let mut beyond = false;
-            for (b, other) in boards.iter().enumerate().skip(a + 2) {
+            let Some(first) = chain.first_partner(links, a) else { break };
+            for (b, other) in boards.iter().enumerate().skip(first) {
                 beyond = innermost[b] > outermost;
                 if beyond {
                     break;
@@ -98,12 +99,12 @@ impl Descent<'_, '_> {
                     return Err([a, b]);
                 }
             }
-            let next = count.max(a + 2);
+            let next = count.max(first);
             if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, first_order, next) {
                 return Err([a, next]);
             }
         }
-        let spare = (chain.links[1] - chain.shape.inset * 2.0).lo;
+        let spare = (chain.links[1] - chain.shape(1).inset * 2.0).lo;
         if links == Links::All && !is_spiral && count < benches && spare <= threshold {
             return Err([count, count + 2]);
         }
@@ -120,15 +121,17 @@ impl Descent<'_, '_> {
     ) -> bool {
         let threshold = self.threshold();
         if self.chain.exact.begins_inward() {
-            let outermost = sum_above(self.chain.shape.outermost(board), threshold.max(0.0));
+            let outermost = sum_above(self.chain.shape(a).outermost(board), threshold.max(0.0));
             return listed.innermost(listed.handles.len() - 1) > outermost;
         }
-        board.is_further_than(threshold.max(0.0), &listed.straight_run(next))
-            || match first_order {
-                Some(first_order) => {
-                    first_order.board(a).is_further_than(threshold, &first_order.straight_run(next), When::Always)
+        self.chain.runs(next).all(|run| {
+            board.is_further_than(threshold.max(0.0), &listed.straight_run(run))
+                || match first_order {
+                    Some(first_order) => {
+                        first_order.board(a).is_further_than(threshold, &first_order.straight_run(run), When::Always)
+                    }
+                    None => board.is_apart_by(threshold, &listed.straight_run(run)),
                 }
-                None => board.is_apart_by(threshold, &listed.straight_run(next)),
-            }
+        })
     }
 }

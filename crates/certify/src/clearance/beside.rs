@@ -85,7 +85,7 @@ impl Descent<'_, '_> {
             return Ok(Vec::new());
         }
         let listed = first_order.listed.handles.len() - 1;
-        for (bench, moving) in first_order.listed.boards_on_ground(self.links).into_iter().enumerate() {
+        for (bench, moving) in first_order.listed.boards_on_ground(self.links) {
             let first = if bench < listed { first_order.board(bench) } else { first_order.straight_run(bench) };
             let board = BoardOverStep { moving, first_order: Some((&first, When::Always)) };
             for (number, (barrier, threshold)) in self.chain.barriers.iter().zip(&thresholds).enumerate() {
@@ -111,7 +111,7 @@ impl Descent<'_, '_> {
     /// Returns true if no board is as near to an obstacle as its threshold, by capsules alone.
     pub(super) fn stays_beside(&self, listed: &Listed, links: Links) -> bool {
         let boards = listed.boards_on_ground(links);
-        boards.into_iter().all(|moving| {
+        boards.into_iter().all(|(_, moving)| {
             let board = BoardOverStep { moving, first_order: None };
             let mut of_each = self.chain.barriers.iter().zip(&self.beside);
             of_each.all(|(barrier, beside)| beside.threshold().is_none_or(|of| barrier.is_further_than(of, &board)))

@@ -3,8 +3,8 @@
 use crate::boards::Shape;
 use crate::elementary::pi;
 use crate::interval::Interval;
-use crate::step::links_of;
-use bench_dragon_motion::model::team::Team;
+use crate::step::link_of;
+use bench_dragon_motion::model::team::{Ends, Team};
 
 /// Limit of doublings of the longest link or the radius, the greater of the two, to find a radius for which
 /// the lemma holds.
@@ -40,22 +40,25 @@ pub(super) fn least_radius(team: &Team, pitch: f64, radius: f64) -> Option<f64> 
 fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
     let a = Interval::point(pitch).over(pi() * 2.0);
     let r = Interval::point(radius);
-    let [head, body] = links_of(team);
-    let longest = head.max(body);
+    let [head, body, tail] = team.kinds().map(|bench| link_of(team, bench));
+    let longest = head.max(body).max(tail);
     if !longest.is_below(r) {
         return false;
     }
     if team.benches < 3 {
         return true;
     }
-    let Shape { inset, half_width } = Shape::new(team);
+    let shapes = team.kinds().map(|bench| Shape::new(team, bench));
+    let inset = shapes[1].inset;
+    let [of_head, of_body, of_tail] = shapes.map(|shape| shape.half_width);
+    let half_width = of_head.max(of_body).max(of_tail);
     // 1. Boards less than a turn apart.
     let growth = |link: Interval| a * pi() * link.over(r * 3.0);
     let lean = |link: Interval| {
         let growth = growth(link);
         (link.square() + growth * (r * 2.0 + growth)).over(link * r * 2.0)
     };
-    let lean = lean(head).max(lean(body));
+    let lean = lean(head).max(lean(body)).max(lean(tail));
     let (aside, left) = (inset + half_width * lean, r - inset * lean - half_width);
     let most_turned = (a.square() + r.square() + r * growth(body)).sqrt();
     if !left.is_positive() || !(aside * 2.0 * most_turned).is_below(body * left) {
@@ -63,7 +66,10 @@ fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
     }
     // 2. No boards a turn apart: the team is too short.
     // A number of benches below 2^53 is exact in a double.
-    let length = head + body * (team.benches - 1) as f64;
+    let length = match team.own_tail() {
+        Some(_) => head + body * (team.benches - 2) as f64 + tail,
+        None => head + body * (team.benches - 1) as f64,
+    };
     if (pi() * length + body * 3.0).is_below(pi() * r * 6.0) {
         return true;
     }
@@ -74,11 +80,19 @@ fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
     }
     let slope = a.over(nearest).square();
     let (bent_out, bent_in) = ((Interval::ONE + slope).over(nearest), slope.over(nearest));
-    let thick = half_width * (Interval::ONE + slope).sqrt() * 2.0;
+    let steep = (Interval::ONE + slope).sqrt();
     let (between, beyond) = (|link: Interval| link.square() * 0.25, |link: Interval| inset * (link + inset));
     let outside = |link: Interval| (bent_out * beyond(link)).max(bent_in * between(link)) * 0.5;
-    let inside = (bent_out * between(body)).max(bent_in * beyond(body)) * 0.5;
-    (thick + outside(head).max(outside(body)) + inside).is_below(Interval::point(pitch))
+    let inside = |link: Interval| (bent_out * between(link)).max(bent_in * beyond(link)) * 0.5;
+    let pitch = Interval::point(pitch);
+    if team.ends == Ends::NONE {
+        let thick = half_width * steep * 2.0;
+        return (thick + outside(head).max(outside(body)) + inside(body)).is_below(pitch);
+    }
+    // The board nearer the head is not the tail's, the other one not the head's.
+    let nearer = (of_head * steep + outside(head)).max(of_body * steep + outside(body));
+    let other = (of_body * steep + inside(body)).max(of_tail * steep + inside(tail));
+    (nearer + other).is_below(pitch)
 }
 
 #[cfg(test)]

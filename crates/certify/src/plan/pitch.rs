@@ -160,6 +160,10 @@ fn decided(
     for _ in 0..MOST_PROPOSALS {
         // The more turns fit into the radius, the longer the way.
         let proposal = propose(next, greatest, &mut |pitch| progress(0.3 * (1.0 - (-0.3 * pitch / from).exp())));
+        // The searches of a search that is to stop propose anything.
+        if progress(0.3).is_break() {
+            break;
+        }
         let proposed = proposal.pitch;
         if proposed == Some(from) && reaches(from, progress).is_some() {
             return Err(PlanError(format!(
@@ -170,6 +174,9 @@ fn decided(
         let target = proposed.map_or(greatest, |pitch| pitch - BESIDE);
         blocked.proposal = proposal;
         blocked.extend_to(target, &mut |share| progress(0.3 + 0.5 * share));
+        if progress(0.8).is_break() {
+            break;
+        }
         let done = blocked.pitch >= target;
         if done && proposed.is_none() {
             return Err(PlanError(format!(

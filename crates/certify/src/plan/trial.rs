@@ -38,6 +38,9 @@ pub(super) enum Obstacle {
 pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Obstacle> {
     let near = Trial::near(team, pitch, radius, progress);
     near.obstacle(progress).or_else(|| {
+        if progress(pitch).is_break() {
+            return None;
+        }
         // Boards with almost no room between them and the next but one touch in a bend that may be anywhere.
         let outer = clear_beyond(team, pitch, radius)?;
         let far = Trial::new(team, (pitch, radius), outer, progress);
@@ -70,6 +73,9 @@ pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progre
             if pitch > to {
                 return Proposal { last: None, ..proposal };
             }
+        }
+        if progress(pitch).is_break() {
+            break;
         }
         proposal.last = Some(found);
         let free_at = match found {
@@ -196,7 +202,8 @@ impl Trial {
         let limit = path.length() - length(radius / pitch);
         // A board that touches one of the first two from more than two turns away also touches a board before it.
         let benches = ((length(start + 2.0) - path.length()) / team.link(1)).ceil() as usize + 3;
-        let team = Team { benches: benches.min(team.benches), ..*team };
+        // No other board touches where only a tail with a size of its own does.
+        let team = if team.own_tail().is_some() { *team } else { team.foremost(benches) };
         // A link turns round or locks only where the spiral is narrower than the link is long.
         let singularities = if radius > team.longest_link() {
             Singularities::none(limit)
@@ -207,8 +214,8 @@ impl Trial {
     }
 
     fn advancement(&self) -> ConservativeAdvancement<'_> {
-        let Singularities { head_turns, body_turns, .. } = &self.singularities;
-        ConservativeAdvancement::new(&self.path, &self.team, head_turns, body_turns)
+        let Singularities { head_turns, body_turns, tail_turns, .. } = &self.singularities;
+        ConservativeAdvancement::new(&self.path, &self.team, head_turns, body_turns).with_tail_turns(tail_turns)
     }
 
     fn locks(&self) -> bool {

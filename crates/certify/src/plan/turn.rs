@@ -144,7 +144,7 @@ pub fn least_turn(
         let upper = value_lo + further * WIDTH;
         let passage = |team: &Team| Passage::new(team, (pitch, family.arc_ratio), upper);
         // The first benches fail as soon as the whole team does, at less cost.
-        let few = Team { benches: team.benches.min(FEW), ..*team };
+        let few = team.foremost(FEW);
         if !passage(&few).is_some_and(|passage| passage.is_free(&few, closely, &mut |_| ask())) {
             continue;
         }
@@ -222,6 +222,11 @@ impl Blocked<'_> {
         let mut width = FIRST_INTERVAL;
         let mut others_below = OTHERS_BELOW;
         while self.intervals < MOST_INTERVALS && self.radius < Accepted::LENGTH.greatest {
+            if let Some(next) = self.on_spiral() {
+                (self.radius, self.shown) = (next, Some(self.witness));
+                self.intervals += 1;
+                continue;
+            }
             if !self.holds(width) {
                 let (family, witness) = (self.family, self.witness);
                 let same = family.follow(self.radius, &witness);
@@ -267,13 +272,26 @@ impl Blocked<'_> {
         best.map(|_| widest)
     }
 
-    /// Returns true if the event is proved for all radii up to `width` further on.
-    fn holds(&self, width: f64) -> bool {
+    /// Returns the radius to which the interval extends because the event is a fold on the inward spiral alone.
+    fn on_spiral(&self) -> Option<f64> {
+        let Witness::Fold { link, pivot, end, .. } = self.witness else { return None };
+        let (turns, middle) = self.turns(0.0).filter(|_| pivot.0 == 0 && end.0 == 0)?;
+        let [pivot, end] = [pivot, end].map(|place| self.family.on_path(middle, place));
+        turns.fold_on_spiral(link, pivot, end).filter(|radius| *radius > self.radius)
+    }
+
+    /// Returns the turnarounds with all radii up to `width` further on, and the middle radius.
+    fn turns(&self, width: f64) -> Option<(Turns<'_>, f64)> {
         let Family { team, pitch, arc_ratio, .. } = self.family;
         let radii = [self.radius, self.radius + width];
         let middle = 0.5 * radii[0] + 0.5 * radii[1];
-        let Some(path) = self.family.path(middle) else { return false };
-        let turns = Turns::new(team, (pitch, arc_ratio), radii, path);
+        let path = self.family.path(middle)?;
+        Some((Turns::new(team, (pitch, arc_ratio), radii, path), middle))
+    }
+
+    /// Returns true if the event is proved for all radii up to `width` further on.
+    fn holds(&self, width: f64) -> bool {
+        let Some((turns, middle)) = self.turns(width) else { return false };
         let at = |place| self.family.on_path(middle, place);
         match &self.witness {
             Witness::Fold { link, pivot, end, .. } => turns.fold(*link, at(*pivot), at(*end)),

@@ -160,13 +160,26 @@ impl Family<'_> {
 
     /// Returns the first stall and the lock with this radius, with several pivots each.
     pub fn folds(&self, radius: f64) -> Vec<Witness> {
-        let team = Team { benches: self.team.benches.min(2), ..*self.team };
+        let mut folds = self.folds_of(radius, &self.team.foremost(2), 0);
+        // The link of a tail that differs passes over the same path.
+        if let Some(tail) = self.team.own_tail() {
+            let alone = Team { benches: 1, head_length: self.team.board_length(tail), ..*self.team };
+            folds.extend(self.folds_of(radius, &alone, tail));
+        }
+        folds
+    }
+
+    /// Returns the folds of a team, whose first bench has the number `first` in this family's team.
+    fn folds_of(&self, radius: f64, team: &Team, first: usize) -> Vec<Witness> {
+        if self.is_stopped() {
+            return Vec::new();
+        }
         let longest = team.longest_link();
         let lead_in = self.spiral_between(radius, radius.max(longest) + TURNS_BEFORE * self.pitch);
         let Some(path) = self.path_between(radius, lead_in, team.length() + LINKS_AFTER * longest) else {
             return Vec::new();
         };
-        let found = Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, &mut |_| (self.ask)()));
+        let found = Singularities::search(&path, team, &mut Budget::new(TRIAL_BUDGET, &mut |_| (self.ask)()));
         let path = path.with_branches(found.branches.clone());
         let lock = found.end.filter(|end| end.kind == EventKind::Lock);
         let witness = |event: Event| {
@@ -181,7 +194,8 @@ impl Family<'_> {
                 Some(handle)
             })?;
             let near = path.travelled(pivot) - lead_in;
-            Some(REACHES.map(|reach| self.pivoted(radius, (event.kind, link), near, reach * team.link(link))))
+            let of_family = (event.kind, first + link);
+            Some(REACHES.map(|reach| self.pivoted(radius, of_family, near, reach * team.link(link))))
         };
         let witnesses = found.stall.into_iter().chain(lock).filter_map(witness);
         witnesses.flatten().flatten().collect()
@@ -190,6 +204,9 @@ impl Family<'_> {
     /// Returns the fold with the deepest pivot within the distance `reach` of the place `near`. Both are metres along
     /// the path, and the place is counted from the beginning of the S.
     fn pivoted(&self, radius: f64, (kind, link): (EventKind, usize), near: f64, reach: f64) -> Option<Witness> {
+        if self.is_stopped() {
+            return None;
+        }
         let path = self.path(radius)?;
         let length = self.team.link(link);
         let folded = |pivot: Param| Folded::new(&path, kind, length, pivot);
@@ -229,6 +246,9 @@ impl Family<'_> {
 
     /// Returns two boards that overlap with this radius, at their deepest.
     fn touch(&self, radius: f64) -> Option<Witness> {
+        if self.is_stopped() {
+            return None;
+        }
         let team = self.team;
         let outer = radius.max(team.longest_link()) + BOARDS_BEFORE * self.pitch;
         let lead_in = self.spiral_between(radius, outer);
@@ -268,6 +288,9 @@ impl Family<'_> {
     /// Returns the pair of boards that overlap most deeply with the head near a place, and the head's place then.
     /// `past` is the near place in metres past the beginning of the S.
     fn deepest(&self, radius: f64, pairs: &[(u32, u32)], past: f64) -> Option<((u32, u32), Place)> {
+        if self.is_stopped() {
+            return None;
+        }
         let window = WINDOW * self.team.shortest_link();
         let lead_in = self.spiral_between(radius, radius.max(self.team.longest_link()) + BOARDS_BEFORE * self.pitch);
         let path = self.path_between(radius, lead_in, self.team.length())?;

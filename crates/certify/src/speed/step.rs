@@ -82,7 +82,9 @@ impl Speeds<'_> {
         if segment > 0 {
             return false;
         }
-        let longest = if last == 0 { self.chain.link(0).max(self.chain.link(1)) } else { self.chain.link(1) };
+        let [head, body, tail] = self.chain.links;
+        let behind = body.max(tail);
+        let longest = if last == 0 { head.max(behind) } else { behind };
         self.chain.exact.segments[0].curve.slows_followers(at, longest)
     }
 

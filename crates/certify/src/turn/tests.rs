@@ -8,9 +8,10 @@ use crate::place::{Place, Span};
 use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::path::Path;
-use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::model::team::{Ends, Team};
 
-const TEAM: Team = Team { benches: 16, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+const TEAM: Team =
+    Team { benches: 16, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 const PITCH: f64 = 1.7;
 const RADIUS: f64 = 4.5;
 const RATIO: f64 = 2.0;

@@ -61,7 +61,7 @@ fn word(label: Label, rate: FrameRate) -> u128 {
 fn halves(word: u128) -> [bool; HALVES] {
     let mut is_high = false;
     std::array::from_fn(|half| {
-        is_high ^= half % 2 == 0 || word >> (half / 2) & 1 == 1;
+        is_high ^= half.is_multiple_of(2) || word >> (half / 2) & 1 == 1;
         is_high
     })
 }

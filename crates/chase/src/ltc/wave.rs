@@ -1,4 +1,4 @@
-//! Sound as `arecord`, `ffmpeg` and files have it: RIFF WAVE. In: a stream of bytes. Out: samples of the first channel.
+//! Sound as `arecord`, `ffmpeg` and files have it: RIFF WAVE. In: a stream of bytes. Out: samples of each channel.
 //!
 //! A program that records into a pipe does not know the length of its sound, and writes 0 or the greatest number
 //! instead. So the samples continue to the end of the stream, whatever length is stated.
@@ -84,9 +84,15 @@ impl Format {
         is_valid.then_some(Self { sample_rate, block_bytes, sample_bytes, is_float: kind == FLOAT })
     }
 
-    /// Returns the first channel's sample of a block: -1 to 1, or -4 to 4 for floats.
-    pub fn sample(&self, block: &[u8]) -> f32 {
-        let sample = block.get(..self.sample_bytes).unwrap_or_default();
+    /// Returns the number of channels.
+    pub fn channels(&self) -> usize {
+        self.block_bytes / self.sample_bytes
+    }
+
+    /// Returns the sample of a channel, counted from 0, in a block: -1 to 1, or -4 to 4 for floats.
+    pub fn sample(&self, block: &[u8], channel: usize) -> f32 {
+        let begin = channel * self.sample_bytes;
+        let sample = block.get(begin..begin + self.sample_bytes).unwrap_or_default();
         match *sample {
             [byte] => (f32::from(byte) - 128.0) / 128.0,
             [a, b] => f32::from(i16::from_le_bytes([a, b])) / 32_768.0,
@@ -162,7 +168,9 @@ mod tests {
         ] {
             let format = Format::read(&mut &header(kind, 2, 48_000, bits)[..]).unwrap();
             assert_eq!((format.sample_rate, format.block_bytes), (48_000, usize::from(bits / 4)));
-            assert_eq!(format.sample(&sample), value, "{bits} bits");
+            assert_eq!(format.sample(&sample, 0), value, "{bits} bits");
+            let second = [vec![0; sample.len()], sample].concat();
+            assert_eq!((format.channels(), format.sample(&second, 1)), (2, value), "{bits} bits");
         }
     }
 

@@ -1,8 +1,8 @@
-//! The bytes of timecode and their moments. In: a course of places, moments. Out: messages of Art-Net or MIDI, or sound.
-//! Pure.
+//! The bytes of timecode and their moments. In: a course of places, moments. Out: messages of Art-Net or MIDI, or
+//! sound. Pure.
 //!
-//! While a show stands, Art-Net and LTC repeat the label, so that receivers stop at once and at the place; MIDI has a full
-//! frame for that.
+//! While a show stands, Art-Net and LTC repeat the label, so that receivers stop at once and at the place; MIDI has a
+//! full frame for that.
 
 use super::course::Course;
 use crate::ltc::generator::Generator;

@@ -173,18 +173,25 @@ pub const OBSTACLE_BOUNDARY: u32 = 3;
 
 /// A dragon of the show in a [`Stage`].
 ///
-/// The head's board and the other boards can differ in length. The team may stand further back than the first segment
-/// begins, on the same spiral or line.
+/// The boards of the head, of the tail and of all benches between can differ in size. The tail is the last of two or
+/// more benches. The team may stand further back than the first segment begins, on the same spiral or line. Layout 7
+/// added the sizes of head and tail.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/StageDragon/6")]
+#[type_name("bench_dragon/StageDragon/7")]
 #[repr(C)]
 pub struct StageDragon {
     /// Metres along the head's board.
     pub head_length: f64,
-    /// Metres along every other board.
+    /// Metres along every board between head and tail.
     pub body_length: f64,
-    /// Metres across every board.
+    /// Metres along the tail's board.
+    pub tail_length: f64,
+    /// Metres across the head's board.
+    pub head_width: f64,
+    /// Metres across every board between head and tail.
     pub width: f64,
+    /// Metres across the tail's board.
+    pub tail_width: f64,
     /// Metres from the centre of a handle's hole to the nearest end of the board.
     pub hole_inset: f64,
     /// Metres per turn of the spiral on which the head starts, or else of the first one; NaN if the path has none.
@@ -299,7 +306,7 @@ pub struct StageCue {
 /// assert!((stage.freeze_time - 412.473_837_682).abs() < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
-#[type_name("bench_dragon/Stage/6")]
+#[type_name("bench_dragon/Stage/7")]
 #[repr(C)]
 pub struct Stage {
     /// The run, as [`FrameHeader::run_id`](super::FrameHeader::run_id).
@@ -338,7 +345,10 @@ impl Stage {
         const NONE: &StageDragon = &StageDragon {
             head_length: 0.0,
             body_length: 0.0,
+            tail_length: 0.0,
+            head_width: 0.0,
             width: 0.0,
+            tail_width: 0.0,
             hole_inset: 0.0,
             pitch: f64::NAN,
             start_turn: f64::NAN,

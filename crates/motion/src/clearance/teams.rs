@@ -24,6 +24,8 @@ pub(super) struct Teams {
     pairs: Pairs,
     /// By dragon: the team, and the number of its first handle.
     parts: Vec<(Team, usize)>,
+    /// The hole inset and the width of all boards, if they are alike, in metres.
+    alike: Option<(f64, f64)>,
     /// The number of all handles.
     pub handles: usize,
     /// The radius of the circle about the largest board, the greatest displacement of a board's points per metre of
@@ -41,13 +43,18 @@ impl Teams {
             (*team, handles - team.handles())
         };
         let parts: Vec<_> = teams.iter().map(&mut part).collect();
+        let mut sizes =
+            teams.iter().flat_map(|team| team.kinds().map(|bench| (team.hole_inset, team.board_width(bench))));
+        let first = sizes.next();
+        let alike = first.filter(|first| sizes.all(|size| size == *first));
         let most = |of: &dyn Fn(&Team) -> f64| teams.iter().map(of).fold(0.0, f64::max);
         Self {
             pairs,
             parts,
+            alike,
             handles,
-            radius: most(&|team| circle_radius(team, 0).max(circle_radius(team, 1))),
-            reach: most(&|team| corner_reach(team, 0).max(corner_reach(team, 1))),
+            radius: most(&|team| most_of(team, circle_radius)),
+            reach: most(&|team| most_of(team, corner_reach)),
             longest_link: most(&Team::longest_link),
         }
     }
@@ -59,9 +66,12 @@ impl Teams {
         }
     }
 
-    /// Returns the team of a bench.
-    pub(super) fn team(&self, bench: usize) -> &Team {
-        &self.parts[self.part(bench)].0
+    /// Returns the hole inset and the width of the board of a bench, in metres.
+    pub(super) fn inset_and_width(&self, bench: usize) -> (f64, f64) {
+        self.alike.unwrap_or_else(|| {
+            let (team, first) = &self.parts[self.part(bench)];
+            (team.hole_inset, team.board_width(bench - first))
+        })
     }
 
     /// Returns the numbers of all benches.
@@ -89,8 +99,13 @@ impl Teams {
     }
 
     pub(super) fn board(&self, chain: Positions, number: usize) -> Board {
-        let team = self.team(number);
+        let (hole_inset, width) = self.inset_and_width(number);
         let handle = |k: usize| Point::new(chain.x[k], chain.y[k]);
-        Board::from_handles(handle(number), handle(number + 1), team.hole_inset, team.width)
+        Board::from_handles(handle(number), handle(number + 1), hole_inset, width)
     }
+}
+
+/// Returns the most that a quantity is for any bench of a team.
+fn most_of(team: &Team, of_bench: fn(&Team, usize) -> f64) -> f64 {
+    team.kinds().map(|bench| of_bench(team, bench)).into_iter().fold(0.0, f64::max)
 }

@@ -11,6 +11,8 @@ use crate::model::description::PathDescription;
 use crate::model::path::Path;
 use crate::model::path::tests::any_path;
 use crate::model::shape::Shape;
+use crate::model::team::Ends;
+use crate::model::team::tests::{Factors, any_ends};
 use crate::placement::Placement;
 use crate::solve::newton::Newton;
 use crate::solve::paper::PaperRules;
@@ -20,7 +22,7 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
 fn team(benches: usize, width: f64) -> Team {
-    Team { benches, head_length: 3.41, body_length: 2.2, width, hole_inset: 0.275 }
+    Team { benches, head_length: 3.41, body_length: 2.2, width, hole_inset: 0.275, ends: Ends::NONE }
 }
 
 /// Exact motion of a metre a second, as it predicts itself.
@@ -147,8 +149,9 @@ fn the_same_as_all_pairs_on_the_known_scenes() {
 /// The handle behind the head is pushed out again to its earlier place, while the head is elsewhere.
 #[test]
 fn the_same_as_all_pairs_past_a_stall() {
-    let four = Team { benches: 4, head_length: 9.5, body_length: 6.5, width: 2.7, hole_inset: 1.1 };
-    let fourteen = Team { benches: 14, head_length: 8.9, body_length: 7.7, width: 1.4, hole_inset: 0.8 };
+    let four = Team { benches: 4, head_length: 9.5, body_length: 6.5, width: 2.7, hole_inset: 1.1, ends: Ends::NONE };
+    let fourteen =
+        Team { benches: 14, head_length: 8.9, body_length: 7.7, width: 1.4, hole_inset: 0.8, ends: Ends::NONE };
     for team in [four, fourteen] {
         let (compared, _) = agree(team, &Path::spiral(8.0, 2.5), &[158.2, 158.22, 158.24, 158.26]);
         assert_eq!(compared, 4);
@@ -421,16 +424,18 @@ fn large_teams() {
 }
 
 fn any_team() -> impl Strategy<Value = Team> {
-    (3..90usize, 0.1..5.0f64, 0.1..5.0f64, any::<bool>(), 0.01..1.5f64, 0.0..1.0f64).prop_map(
-        |(benches, head, body, equal, width, hole_inset)| {
+    let ends = prop_oneof![any_ends(), Just(Factors::default())];
+    (3..90usize, 0.1..5.0f64, 0.1..5.0f64, any::<bool>(), 0.01..1.5f64, 0.0..1.0f64, ends).prop_map(
+        |(benches, head, body, equal, width, hole_inset, ends)| {
             let long = |link: f64| link + 2.0 * hole_inset;
-            Team {
+            ends.ends_of(Team {
                 benches,
                 head_length: long(if equal { body } else { head }),
                 body_length: long(body),
                 width,
                 hole_inset,
-            }
+                ends: Ends::NONE,
+            })
         },
     )
 }

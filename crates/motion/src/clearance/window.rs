@@ -216,8 +216,8 @@ impl Window {
         };
         (work.most_travel, work.most_radius) = (0.0, 0.0);
         for bench in stage.teams.benches() {
-            let team = stage.teams.team(bench);
-            let board = MovingBoard::new(&[handle(bench), handle(bench + 1)], team.hole_inset, team.width);
+            let (hole_inset, width) = stage.teams.inset_and_width(bench);
+            let board = MovingBoard::new(&[handle(bench), handle(bench + 1)], hole_inset, width);
             work.most_travel = work.most_travel.max(board.travel);
             work.most_radius = work.most_radius.max(board.radius());
             work.boards[bench] = Some((board, board.middle()));

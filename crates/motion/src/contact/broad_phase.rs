@@ -37,8 +37,9 @@ impl ChainSearch<'_, '_, '_> {
         self.extend(before, after.as_deref_mut(), &mut step, 2)?;
         let limit = self.limit(before);
         let all = self.all_pairs(&[before, after.as_deref().unwrap_or(before)], step.excursion());
+        let tail = self.chain.team.own_tail();
         let mut benches = 2;
-        while all && benches < self.chain.team.benches {
+        while (all || tail.is_some()) && benches < self.chain.team.benches {
             let ends = [&*before, after.as_deref().unwrap_or(before)];
             if self.quiet.is_some_and(|quiet| self.all_behind(&ends, benches, quiet, step.excursion())) {
                 break;
@@ -60,7 +61,9 @@ impl ChainSearch<'_, '_, '_> {
         let mut pairs = if all {
             before.near_pairs(benches, limit + step.most_relative_motion(self.chain, benches))
         } else {
-            (0..2).flat_map(|a| (a + 2..benches).map(move |b| (a, b))).collect()
+            let of_tail = tail.filter(|tail| *tail < benches).map(|tail| (2..tail - 1).map(move |a| (a, tail)));
+            let foremost = (0..2).flat_map(|a| (a + 2..benches).map(move |b| (a, b)));
+            foremost.chain(of_tail.into_iter().flatten()).collect()
         };
         self.retain_uncertain_in(&step, ends, &mut pairs)?;
         Ok(pairs)

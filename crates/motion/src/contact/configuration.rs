@@ -37,6 +37,9 @@ impl Configuration {
     pub fn solve_to(&mut self, benches: usize, path: &Path, team: &Team, budget: &mut Budget) -> Result<(), Halt> {
         let first = self.boards.len();
         let missing = benches.saturating_sub(first);
+        if missing == 0 {
+            return Ok(());
+        }
         self.places.reserve(missing);
         self.boards.reserve(missing);
         for bench in first..benches {
@@ -46,7 +49,8 @@ impl Configuration {
             let (front, link) = (self.places[bench], team.link(bench));
             let rear = follower(path, front, link)?;
             let direction = link_pose(path, front, rear, link).direction;
-            self.boards.push(Board::from_front(path.point(front), direction, link, team.hole_inset, team.width));
+            let width = team.board_width(bench);
+            self.boards.push(Board::from_front(path.point(front), direction, link, team.hole_inset, width));
             self.places.push(rear);
         }
         Ok(())

@@ -95,7 +95,11 @@ impl Displacements {
         handle: usize,
         budget: &mut Budget,
     ) -> Result<Vec<Param>, Halt> {
-        let turns = if handle == 0 { &chain.head_turns } else { &chain.body_turns };
+        let turns = match chain.team.own_tail() {
+            _ if handle == 0 => &chain.head_turns,
+            Some(tail) if handle == tail => &chain.tail_turns,
+            _ => &chain.body_turns,
+        };
         if self.turned_at.is_empty() && turns.is_empty() {
             return Ok(Vec::new());
         }
@@ -254,7 +258,7 @@ impl Weights {
             Self::OnePoint => front.max(rear),
             Self::Additive => both,
         };
-        link_part + (team.hole_inset + 0.5 * team.width) / team.link(bench) * both
+        link_part + (team.hole_inset + 0.5 * team.board_width(bench)) / team.link(bench) * both
     }
 }
 

@@ -18,7 +18,8 @@
 //! board by the turn times the distance of the two centres.
 //!
 //! **Which boards.** A body board is where board 1 is when handle 1 is at the front handle's place. So boards behind
-//! board 1 matter only in steps in which handle 2 is somewhere behind the first place of handle 1, as in [`super`].
+//! board 1 matter only in steps in which handle 2 is somewhere behind the first place of handle 1, as in [`super`]. A
+//! tail with a size of its own always matters, and is solved with all boards ahead of it.
 
 use crate::event::Budget;
 use crate::ground::{Ground, Obstacle};
@@ -192,7 +193,7 @@ impl<'s, 'a, 'b> GroundSearch<'s, 'a, 'b> {
                     self.chain.path.arc_length(at, self.second_handle) > -excursion
                 }
             };
-            if behind(before.places[2]) || behind(after.places[2]) {
+            if self.chain.team.own_tail().is_some() || behind(before.places[2]) || behind(after.places[2]) {
                 benches = all_benches;
                 self.extend(before, after, &mut step, benches)?;
             }

@@ -26,8 +26,8 @@ impl Reach {
     /// is at least min(sqrt(r^2 - link^2 / 4), r - inset) from the origin, and its points half a width less.
     pub fn rearmost(&self, path: &Path, team: &Team, limit: f64) -> Option<Param> {
         let half = 0.5 * team.longest_link();
-        let disc = self.radius + limit + hypot(half.max(team.hole_inset), 0.5 * team.width);
-        let ring = self.outermost + limit + 0.5 * team.width;
+        let disc = self.radius + limit + hypot(half.max(team.hole_inset), 0.5 * team.widest());
+        let ring = self.outermost + limit + 0.5 * team.widest();
         let about_origin = hypot(ring, half).max(ring + team.hole_inset);
         let disc = ReachedDisc { centre: self.centre, radius: disc, about_origin };
         let near = |segment: &usize| path.can_meet(*segment, disc.centre, disc.radius);

@@ -6,13 +6,16 @@ use proptest::prelude::*;
 use super::*;
 use crate::event::unreported;
 use crate::model::curve::Side;
+use crate::model::team::Ends;
+use crate::model::team::tests::{Factors, any_ends};
 use crate::model::{Point, Vector};
 use crate::placement::Placement;
 use crate::singularities::Singularities;
 
 mod ground;
 
-const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+const PAPER: Team =
+    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 
 /// Returns the results of the searches for a whole motion: the contact, the least clearance up to `show_end`, the
 /// motion's end.
@@ -21,7 +24,8 @@ fn search(path: &Path, team: &Team, show_end: Option<f64>) -> (Option<Event>, Op
     let mut budget = Budget::new(200_000_000, &mut unreported);
     let singular = Singularities::search(path, team, &mut budget);
     let end = singular.end.map_or(singular.searched_until, |end| end.travelled);
-    let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns);
+    let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns)
+        .with_tail_turns(&singular.tail_turns);
     let contact = searches.first_contact(0.0, end, &mut budget).unwrap();
     let least = searches.least_clearance(0.0, show_end.unwrap_or(end), &mut budget).unwrap();
     assert!(contact.searched_until >= end && least.searched_until >= show_end.unwrap_or(end));
@@ -74,13 +78,14 @@ fn spirals_touch_where_the_earlier_searches_did() {
     assert!((place - Point::new(1.474_394_671_647_727_4, 2.110_664_876_932_433)).norm() < 1e-11, "{place}");
     assert_contact(&Path::spiral(0.45, 16.0), &PAPER, 215.337_252_953_147_58, (0, 19));
     assert_contact(&Path::spiral(0.55, 6.0), &Team { benches: 20, ..PAPER }, 32.298_201_353_636_706, (0, 8));
-    let all_but_touching = Team { benches: 3, head_length: 1.996, body_length: 1.996, width: 0.1, hole_inset: 0.498 };
+    let all_but_touching =
+        Team { benches: 3, head_length: 1.996, body_length: 1.996, width: 0.1, hole_inset: 0.498, ends: Ends::NONE };
     assert_contact(&Path::spiral(2.4, 12.0), &all_but_touching, 657.988_566_973_9, (0, 2));
 }
 
 #[test]
 fn a_touch_within_a_step_in_which_handles_turn_is_found() {
-    let team = Team { benches: 12, head_length: 1.7, body_length: 3.7, width: 0.05, hole_inset: 0.6 };
+    let team = Team { benches: 12, head_length: 1.7, body_length: 3.7, width: 0.05, hole_inset: 0.6, ends: Ends::NONE };
     let lane = Path::route(0.25).line(19.994_074_807_700_006).arc(Side::Right, 3.0, 0.75).line(2.1);
     let bend = lane.arc(Side::Left, 0.3, 0.25).line(0.36).arc(Side::Left, 0.01, 1.0);
     let path = bend.arc(Side::Left, 0.039_788_735_772_973_836, 4.0).build().unwrap();
@@ -148,8 +153,14 @@ fn what_overlaps_at_the_start_is_the_deepest_pair() {
 #[test]
 fn rounding_in_the_last_digits_before_a_lock_is_no_error() {
     let hole_inset = 0.028413322610933628;
-    let team =
-        Team { benches: 3, head_length: 3.350262415408828, body_length: 1.3837549674849094, width: 0.02, hole_inset };
+    let team = Team {
+        benches: 3,
+        head_length: 3.350262415408828,
+        body_length: 1.3837549674849094,
+        width: 0.02,
+        hole_inset,
+        ends: Ends::NONE,
+    };
     let pitch = 3.4942913904095154;
     let fold = Path::spiral(pitch, 1.0).as_spiral().and_then(|(spiral, _)| spiral.fold(team.link(0))).unwrap();
     let (contact, least, _) = search(&Path::spiral(pitch, 7.063442453912254 + fold / TAU), &team, None);
@@ -171,10 +182,11 @@ fn a_spent_budget_tells_how_far_the_search_came() {
 }
 
 fn any_team() -> impl Strategy<Value = Team> {
-    (3..25usize, 0.5..4.0f64, 0.5..4.0f64, 0.02..0.8f64, 0.01..0.48f64).prop_map(
-        |(benches, head, body, width, inset)| {
+    let ends = prop_oneof![any_ends(), Just(Factors::default())];
+    (3..25usize, 0.5..4.0f64, 0.5..4.0f64, 0.02..0.8f64, 0.01..0.48f64, ends).prop_map(
+        |(benches, head, body, width, inset, ends)| {
             let hole_inset = inset * f64::min(head, body);
-            Team { benches, head_length: head, body_length: body, width, hole_inset }
+            ends.ends_of(Team { benches, head_length: head, body_length: body, width, hole_inset, ends: Ends::NONE })
         },
     )
 }
@@ -218,5 +230,5 @@ proptest! {
     }
 }
 
-const CASES: u32 = 12;
+const CASES: u32 = 24;
 const SAMPLES: usize = 300;

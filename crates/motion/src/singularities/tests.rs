@@ -4,9 +4,10 @@ use super::*;
 use crate::event::unreported;
 use crate::model::curve::Side;
 use crate::model::path::Route;
+use crate::model::team::Ends;
 
 fn team(benches: usize, head_length: f64, body_length: f64) -> Team {
-    Team { benches, head_length, body_length, width: 0.30, hole_inset: 0.275 }
+    Team { benches, head_length, body_length, width: 0.30, hole_inset: 0.275, ends: Ends::NONE }
 }
 
 fn search(path: &Path, team: &Team) -> Singularities {
@@ -185,7 +186,8 @@ fn wide_bends_hold_nothing() {
 fn tight_bends_stall_at_once() {
     let path = route().line(5.0).arc(Side::Left, 0.03, 0.5).line(20.0).build().unwrap();
     assert!((search(&path, &team(20, 3.41, 2.20)).stall.unwrap().travelled - 5.047441916962).abs() < 1e-11);
-    let team = Team { benches: 14, head_length: 2.63, body_length: 1.9, width: 0.4, hole_inset: 0.45 };
+    let team =
+        Team { benches: 14, head_length: 2.63, body_length: 1.9, width: 0.4, hole_inset: 0.45, ends: Ends::NONE };
     let path = route().line(20.73).arc(Side::Right, 0.021277099139995617, 0.2415370362213321);
     let path = path.arc(Side::Left, 0.02770720113482116, 0.11516399630650424);
     let path = path.arc(Side::Right, 0.010232884755659723, 0.3446585013052239).line(0.06698729339347953);
@@ -219,7 +221,14 @@ fn u_turns_as_wide_as_the_link_end_with_the_path() {
                 let path = u_turn(link, 0.5 * link * (1.0 + excess));
                 let mut none = unreported;
                 let mut budget = Budget::new(20_000, &mut none);
-                let team = Team { benches: 9, head_length: link, body_length: link, width: 1e-4, hole_inset: 0.0 };
+                let team = Team {
+                    benches: 9,
+                    head_length: link,
+                    body_length: link,
+                    width: 1e-4,
+                    hole_inset: 0.0,
+                    ends: Ends::NONE,
+                };
                 let found = Singularities::search(&path, &team, &mut budget);
                 // As the team is pushed back, the two places at the distance are near each other, and steps as short.
                 let is_narrow = excess < 0.0 && (-13..=-3).contains(&power);
@@ -233,8 +242,14 @@ fn u_turns_as_wide_as_the_link_end_with_the_path() {
 
 #[test]
 fn extremes_are_searched_to_the_last_place() {
-    let extreme =
-        |benches, head_length, body_length| Team { benches, head_length, body_length, width: 1e-3, hole_inset: 1e-3 };
+    let extreme = |benches, head_length, body_length| Team {
+        benches,
+        head_length,
+        body_length,
+        width: 1e-3,
+        hole_inset: 1e-3,
+        ends: Ends::NONE,
+    };
     for (path, team) in [
         (Path::spiral(1e-3, 1e7), extreme(1_000_000, 0.003, 0.003)),
         (Path::spiral(1e-3, 1e7), extreme(3, 1e4, 0.003)),
@@ -328,7 +343,12 @@ fn check_chain(path: &Path, team: &Team) {
         }
         let turns = |turns: &[f64], at: f64| turns.iter().filter(|turn| **turn <= at).count();
         for (index, (front, cosine)) in links.iter().enumerate() {
-            let turns = turns(if index == 0 { &found.head_turns } else { &found.body_turns }, *front);
+            let of_link = match index {
+                0 => &found.head_turns,
+                _ if team.ends.tail_length.is_some() && index + 1 == team.benches => &found.tail_turns,
+                _ => &found.body_turns,
+            };
+            let turns = turns(of_link, *front);
             if index > 0 || stall > 0.0 {
                 assert!(
                     cosine.abs() < 1e-6 || (*cosine < 0.0) == (turns % 2 == 1),
@@ -361,6 +381,18 @@ proptest! {
     #[test]
     fn chains_on_routes(path in routes(), head in 0.3f64..2.0, body in 0.3f64..2.0) {
         check_chain(&path, &team(5, head + 0.55, body + 0.55));
+    }
+
+    #[test]
+    fn chains_with_a_tail_of_its_own(
+        path in prop_oneof![routes(), (0.2f64..3.0, 0.01f64..2.0).prop_map(|(pitch, start)| Path::spiral(pitch, start))],
+        benches in 3..6usize, head in 0.3f64..2.0, body in 0.3f64..2.0, tail in 0.3f64..3.0,
+    ) {
+        let ends = Ends { tail_length: Some(tail + 0.55), ..Ends::NONE };
+        let team = Team { ends, ..team(benches, head + 0.55, body + 0.55) };
+        if search(&path, &team).end.unwrap().travelled > 0.0 {
+            check_chain(&path, &team);
+        }
     }
 
     #[test]

@@ -39,8 +39,13 @@ impl Newton {
         let mut front = self.path.param_at(travelled);
         let mut speed = self.head_speed;
         let last = self.team.benches;
+        let [head, body, tail] = self.team.kinds().map(|bench| self.team.link(bench));
         for bench in 0..last {
-            let link = self.team.link(bench);
+            let link = match bench {
+                0 => head,
+                _ if bench + 1 == last => tail,
+                _ => body,
+            };
             let rear = follower(&self.path, front, link)?;
             let pose = link_pose(&self.path, front, rear, link);
             self.write(chain, bench, front, pose.direction, speed);

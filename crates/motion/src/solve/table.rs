@@ -16,6 +16,7 @@ mod packed;
 mod polynomial;
 pub(crate) mod rows;
 mod single_kernel;
+mod tail;
 #[cfg(test)]
 mod tests;
 mod track;
@@ -28,13 +29,14 @@ use packed::PackedRows;
 pub(crate) use packed::{Allowed, Format};
 use rows::Rows;
 pub(crate) use rows::Tolerance;
+use tail::OwnTail;
 use track::Track;
 
 use super::newton::Newton;
 use super::{ChainMut, Solver, Velocities};
 use crate::linkage::NoFollower;
 use crate::model::path::Path;
-use crate::model::team::Team;
+use crate::model::team::{Ends, Team};
 
 /// The instructions that a code path may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,6 +113,8 @@ pub struct FollowerTable {
     instructions: Instructions,
     /// Shared, so that a clone costs little.
     rows: Arc<Rows>,
+    /// The tail, if its link has a length of its own.
+    tail: Option<OwnTail>,
     /// The packed rows, if frames are read from them.
     packed: Option<Arc<PackedRows>>,
     head: Arc<HeadTable>,
@@ -146,9 +150,17 @@ impl FollowerTable {
             return None;
         }
         let track = Track::new(path);
-        let mut rows = band::rows(&track, &team, tolerance)?;
-        let head = HeadBuilder::new(&track, &team, &rows).build()?;
-        rows.bands.iter_mut().for_each(|band| band.centres = Vec::new());
+        let tail = OwnTail::of(&team, &track);
+        // In the table the tail is like any other bench.
+        let chain = Team {
+            ends: Ends { tail_length: tail.as_ref().map_or(team.ends.tail_length, |_| None), ..team.ends },
+            ..team
+        };
+        let mut rows = band::rows(&track, &chain, tolerance, tail.is_some())?;
+        let head = HeadBuilder::new(&track, &chain, &rows).build()?;
+        if tail.is_none() {
+            rows.bands.iter_mut().for_each(|band| band.centres = Vec::new());
+        }
         let newton = Newton::new(path.clone(), team, head_speed, velocities);
         let instructions = Instructions::fastest(team.handles());
         let exact_bytes_per_handle = rows.bytes_per_row(team.benches);
@@ -158,6 +170,7 @@ impl FollowerTable {
             velocities,
             instructions,
             rows,
+            tail,
             packed: None,
             head,
             newton,
@@ -219,7 +232,8 @@ impl FollowerTable {
 
     /// Returns the same solver without the data that its frames do not read.
     pub fn for_frames(&self) -> Self {
-        let rows = if self.packed.is_some() { Arc::new(Rows::empty()) } else { self.rows.clone() };
+        let reads_rows = self.packed.is_none() || self.tail.is_some();
+        let rows = if reads_rows { self.rows.clone() } else { Arc::new(Rows::empty()) };
         Self { rows, ..self.clone() }
     }
 
@@ -246,8 +260,9 @@ impl FollowerTable {
         self.fallbacks
     }
 
-    /// Fills the chain for `travelled` metres of the head, within the table.
-    fn interpolate(&self, travelled: f64, chain: &mut ChainMut) {
+    /// Fills the chain for `travelled` metres of the head, within the table. Returns `None` if the tail has a link of its
+    /// own and cannot be found from the table.
+    fn interpolate(&self, travelled: f64, chain: &mut ChainMut) -> Option<()> {
         debug_assert!(self.instructions.is_available(), "{}", self.instructions.name());
         match self.instructions {
             // SAFETY: a solver is only made with instructions that this processor has.
@@ -258,6 +273,8 @@ impl FollowerTable {
             Instructions::Avx2 => unsafe { self.interpolate_with_avx2(travelled, chain) },
             _ => self.interpolate_with::<false>(travelled, chain),
         }
+        let Some(tail) = &self.tail else { return Some(()) };
+        tail.write(&self.rows, self.head.at(travelled).alpha, self.velocities, chain)
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -308,8 +325,7 @@ impl Solver for FollowerTable {
 
     fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
         let travelled = self.head_speed * time;
-        if (0.0..=self.head.valid_until()).contains(&travelled) {
-            self.interpolate(travelled, chain);
+        if (0.0..=self.head.valid_until()).contains(&travelled) && self.interpolate(travelled, chain).is_some() {
             return Ok(());
         }
         self.fallbacks += 1;

@@ -144,15 +144,30 @@ pub fn next_event(stage: &Stage, header: &FrameHeader) -> Option<(f64, &'static 
     Some(((next.time - header.sim_time) / header.time_scale, name))
 }
 
-/// Returns messages in their order as datagrams: bundles to be executed at once, since a desk has another clock.
-pub fn datagrams(messages: Vec<OscMessage>) -> Vec<Vec<u8>> {
+/// The content of a datagram.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Packing {
+    /// Messages of one moment together.
+    Bundles,
+    /// A single message, for receivers that read no bundles.
+    Messages,
+}
+
+/// Returns messages in their order as datagrams. Bundles are to be executed at once, since a desk has another clock.
+pub fn datagrams(messages: Vec<OscMessage>, packing: Packing) -> Vec<Vec<u8>> {
     let immediately = OscTime { seconds: 0, fractional: 1 };
-    let bundle = |messages: &[OscMessage]| {
-        let content = messages.iter().cloned().map(OscPacket::Message).collect();
-        // Only an invalid address could be refused, and `Addresses` makes none.
-        encode(&OscPacket::Bundle(OscBundle { timetag: immediately, content })).ok()
-    };
-    messages.chunks(MOST_MESSAGES).filter_map(bundle).collect()
+    let packets = messages.into_iter().map(OscPacket::Message);
+    // Only an invalid address could be refused, and neither `Addresses` nor a map has one.
+    let encoded = |packet: &OscPacket| encode(packet).ok();
+    match packing {
+        Packing::Messages => packets.filter_map(|packet| encoded(&packet)).collect(),
+        Packing::Bundles => {
+            let bundle = |content: &[OscPacket]| {
+                encoded(&OscPacket::Bundle(OscBundle { timetag: immediately, content: content.to_vec() }))
+            };
+            Vec::from_iter(packets).chunks(MOST_MESSAGES).filter_map(bundle).collect()
+        }
+    }
 }
 
 fn text(text: &str) -> OscType {
@@ -222,7 +237,9 @@ mod tests {
     fn bundles_fit_a_datagram_and_keep_the_order() {
         let addresses = Addresses::new(&"n".repeat(60));
         let cue = |number| Cue { number, name: SceneName::new(&"x".repeat(64)), ..Cue::default() };
-        let datagrams = datagrams((0..20).map(|number| addresses.cue(&cue(number))).collect());
+        let messages = || (0..20).map(|number| addresses.cue(&cue(number))).collect();
+        assert_eq!(datagrams(messages(), Packing::Messages).len(), 20);
+        let datagrams = datagrams(messages(), Packing::Bundles);
         assert_eq!(datagrams.len(), 3);
         let mut numbers = Vec::new();
         for datagram in &datagrams {

@@ -5,8 +5,10 @@ use std::time::{Duration, Instant};
 use rosc::OscMessage;
 
 use super::network::Outlet;
-use super::osc::{Addresses, State, datagrams, next_event};
+use super::osc::{Addresses, Packing, State, datagrams, next_event};
+use super::osc_map::OscMap;
 use super::{Arrivals, Pace};
+use bench_dragon_client::clock::realtime_ns;
 use bench_dragon_client::feed::FeedEvent;
 use bench_dragon_client::polling::Handler;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, HandlePose, Stage, StageDragon};
@@ -26,7 +28,7 @@ const CUE_GRACE_NS: u64 = 1_000_000_000;
 pub struct OscSummary {
     /// Frames of the publisher that were sent.
     pub frames: u64,
-    /// Alerts sent.
+    /// Alerts sent; of the user's messages, levels.
     pub alerts: u64,
     /// Cues sent.
     pub cues: u64,
@@ -49,9 +51,22 @@ impl OscSummary {
     }
 }
 
+/// The options of a sender.
+#[derive(Debug, Clone)]
+pub struct OscOptions {
+    /// The most frames per second that are sent.
+    pub rate: f64,
+    /// The content of a datagram.
+    pub packing: Packing,
+    /// The user's messages, which are sent in place of all others.
+    pub map: Option<OscMap>,
+}
+
 /// The sender of one publisher's messages.
 pub struct OscSender {
     addresses: Addresses,
+    packing: Packing,
+    map: Option<OscMap>,
     outlet: Outlet,
     pace: Pace,
     arrivals: Arrivals,
@@ -75,10 +90,13 @@ pub struct OscSender {
 }
 
 impl OscSender {
-    /// Creates a sender of at most `rate` bundles of frames per second by `outlet`.
-    pub fn new(addresses: Addresses, rate: f64, outlet: Outlet) -> Self {
+    /// Creates a sender by `outlet`.
+    pub fn new(addresses: Addresses, options: OscOptions, outlet: Outlet) -> Self {
+        let OscOptions { rate, packing, map } = options;
         Self {
             addresses,
+            packing,
+            map,
             outlet,
             pace: Pace::new(rate),
             arrivals: Arrivals::default(),
@@ -102,7 +120,7 @@ impl OscSender {
     /// Sends receivers the state `stopped`, and returns the counts.
     pub fn finish(mut self) -> OscSummary {
         let mut messages = std::mem::take(&mut self.pending);
-        if self.latest.is_some() {
+        if self.latest.is_some() && self.map.is_none() {
             messages.push(self.addresses.state(State::Stopped));
         }
         self.send_all(messages);
@@ -110,7 +128,7 @@ impl OscSender {
     }
 
     fn send_all(&mut self, messages: Vec<OscMessage>) {
-        datagrams(messages).iter().for_each(|datagram| self.outlet.send(datagram));
+        datagrams(messages, self.packing).iter().for_each(|datagram| self.outlet.send(datagram));
     }
 
     /// Sends an alert once: a new connection begins with the current alert again.
@@ -119,7 +137,16 @@ impl OscSender {
         if self.last_alert.as_ref().is_some_and(|last| of(last) == of(alert)) {
             return;
         }
-        self.last_alert = Some(*alert);
+        let before = self.last_alert.replace(*alert).filter(|before| before.run_id == alert.run_id);
+        if let Some(map) = &self.map {
+            let is_old = before.is_none() && alert.stamp_ns.saturating_add(CUE_GRACE_NS) < realtime_ns();
+            let level = alert.alert_level().filter(|_| !is_old);
+            let level = level.filter(|level| before.is_none_or(|before| before.alert_level() != Some(*level)));
+            let messages = Vec::from_iter(level.iter().flat_map(|level| map.of_level(*level)));
+            self.summary.alerts += u64::from(!messages.is_empty());
+            self.pending.extend(messages);
+            return;
+        }
         let header = self.latest.filter(|header| header.run_id == alert.run_id);
         let stage = self.stage.as_deref().filter(|stage| stage.run_id == alert.run_id);
         self.pending.push(self.addresses.alert(alert, stage, header.map_or(0, |header| header.cue)));
@@ -141,8 +168,23 @@ impl OscSender {
             return;
         }
         self.last_cue = Some(*cue);
-        self.pending.push(self.addresses.cue(cue));
+        match &self.map {
+            None => self.pending.push(self.addresses.cue(cue)),
+            Some(map) => self.pending.extend(map.of_cue(cue)),
+        }
         self.summary.cues += 1;
+    }
+
+    /// Sends the user's messages of the events between the latest frame and this one.
+    fn take_events(&mut self, header: &FrameHeader) {
+        let (Some(map), Some(stage), Some(latest)) = (&self.map, &self.stage, &self.latest) else { return };
+        // After a jump nothing has happened in between.
+        if (latest.run_id, latest.epoch) != (header.run_id, header.epoch) || stage.run_id != header.run_id {
+            return;
+        }
+        let has_come = |time: f64| latest.sim_time < time && time <= header.sim_time;
+        let happened = stage.events.iter().filter(|event| has_come(event.time));
+        self.pending.extend(happened.flat_map(|event| map.of_event(event.state)));
     }
 }
 
@@ -153,14 +195,15 @@ impl OscSender {
         match event {
             FeedEvent::Frame { header, handles, .. } => {
                 let Some(stage) = &self.stage else { return };
-                if self.latest.is_none_or(|latest| latest.run_id != header.run_id) {
-                    (self.first_tick, self.first_stamp_ns) = (header.tick, header.stamp_ns);
-                }
-                self.latest = Some(*header);
                 let head =
                     |dragon: &StageDragon| handles.get(dragon.first_handle as usize).copied().unwrap_or_default();
                 self.heads.clear();
                 self.heads.extend(stage.dragons.iter().map(head));
+                if self.latest.is_none_or(|latest| latest.run_id != header.run_id) {
+                    (self.first_tick, self.first_stamp_ns) = (header.tick, header.stamp_ns);
+                }
+                self.take_events(header);
+                self.latest = Some(*header);
                 self.due |= self.pace.is_due(header);
             }
             FeedEvent::Stage { stage, .. } => self.stage = Some(Box::new(*stage)),
@@ -176,7 +219,8 @@ impl OscSender {
     fn send_due(&mut self, now: Instant) {
         let mut messages = std::mem::take(&mut self.pending);
         let due = std::mem::take(&mut self.due);
-        if let Some(header) = &self.latest {
+        if let Some(header) = self.latest.filter(|_| self.map.is_none()) {
+            let header = &header;
             let stopped = self.arrivals.stopped_since(now).is_some();
             let state = if stopped { Some(State::Stopped) } else { State::of(header) };
             // A change is sent at once, and so is the end of a countdown.
@@ -236,16 +280,49 @@ impl Handler for OscSenders {
 mod tests {
     use std::net::{Ipv4Addr, SocketAddrV4};
 
+    use bench_dragon_messages::state::FrameState;
+    use bench_dragon_messages::{List, StageEvent};
+
     use super::super::network::Route;
     use super::*;
 
     const HOUR_NS: u64 = 3_600_000_000_000;
 
-    #[test]
-    fn cues_come_where_the_clock_was_set_back_and_old_ones_do_not() {
+    /// A sender to no receiver.
+    fn sender(map: Option<OscMap>) -> OscSender {
         let discard = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 9);
         let outlet = Outlet::open(&[discard], Route { interface: None, multicast_ttl: 1 }).unwrap();
-        let mut sender = OscSender::new(Addresses::new("show"), 10.0, outlet);
+        let options = OscOptions { rate: 10.0, packing: Packing::Bundles, map };
+        OscSender::new(Addresses::new("show"), options, outlet)
+    }
+
+    #[test]
+    fn an_event_has_its_messages_once_and_none_after_a_jump() {
+        let text = "[[messages]]\nevent = \"stall\"\naddress = \"/stalls\"\n\
+                    [[messages]]\nevent = \"contact\"\naddress = \"/meets\"\n";
+        let mut sender = sender(Some(OscMap::parse(text, "").unwrap()));
+        let event = |time, state: FrameState| StageEvent { time, state: state as u32, ..StageEvent::default() };
+        let events = List::of([event(10.0, FrameState::Contact), event(20.0, FrameState::Stall)]);
+        let stage = Stage { run_id: 1, freeze_time: 30.0, events, ..Stage::default() };
+        sender.take(FeedEvent::Stage { stage: &stage, segments: &[] });
+        let mut sent = |sim_time, epoch| {
+            let header = FrameHeader { run_id: 1, sim_time, epoch, ..FrameHeader::default() };
+            sender.take(FeedEvent::Frame { header: &header, handles: &[], missed: 0 });
+            Vec::from_iter(sender.pending.drain(..).map(|message| message.addr))
+        };
+        assert_eq!(sent(9.0, 0), [""; 0]);
+        assert_eq!(sent(10.0, 0), ["/meets"]);
+        assert_eq!(sent(10.1, 0), [""; 0]);
+        assert_eq!(sent(25.0, 0), ["/stalls"]);
+        assert_eq!(sent(5.0, 1), [""; 0], "a seek back");
+        assert_eq!(sent(21.0, 1), ["/meets", "/stalls"], "a fast show");
+        assert_eq!(sent(5.0, 2), [""; 0]);
+        assert_eq!(sent(21.0, 3), [""; 0], "a seek forward");
+    }
+
+    #[test]
+    fn cues_come_where_the_clock_was_set_back_and_old_ones_do_not() {
+        let mut sender = sender(None);
         sender.take(FeedEvent::Stage { stage: &Stage::default(), segments: &[] });
         let header = FrameHeader { run_id: 1, tick: 1000, stamp_ns: 100 * HOUR_NS, ..FrameHeader::default() };
         sender.take(FeedEvent::Frame { header: &header, handles: &[], missed: 0 });

@@ -47,7 +47,7 @@ impl Token {
     }
 
     /// Returns true if a text is this token, in a time that does not depend on the matching letters.
-    fn is(&self, text: &str) -> bool {
+    pub(crate) fn is(&self, text: &str) -> bool {
         self.0.as_bytes().ct_eq(text.as_bytes()).into()
     }
 }

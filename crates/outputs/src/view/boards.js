@@ -3,17 +3,30 @@
 
 import { STRIDE } from "./hermite.js";
 
+/** The length and the width of a bench's board, m. */
+export function boardSize(stage, bench) {
+  if (bench === 0) return [stage.head_length, stage.head_width];
+  return bench + 1 === stage.benches ? [stage.tail_length, stage.tail_width] : [stage.body_length, stage.width];
+}
+
+/** The length of a team's longest board, m. */
+export const longestOf = (stage) => Math.max(stage.head_length, stage.body_length, stage.tail_length);
+
+/** The width of a team's widest board, m. */
+export const widestOf = (stage) => Math.max(stage.head_width, stage.width, stage.tail_width);
+
 /** A bench's rectangle: its middle, its direction, half its length and half its width. */
 export function rectangle(stage, places, bench) {
   const k = STRIDE * bench, rear = k + STRIDE;
   const x = places[k] - places[rear], y = places[k + 1] - places[rear + 1], link = Math.hypot(x, y) || 1;
+  const [length, width] = boardSize(stage, bench);
   return {
     x: (places[k] + places[rear]) / 2,
     y: (places[k + 1] + places[rear + 1]) / 2,
     c: x / link,
     s: y / link,
-    l: (bench === 0 ? stage.head_length : stage.body_length) / 2,
-    w: stage.width / 2,
+    l: length / 2,
+    w: width / 2,
   };
 }
 
@@ -89,7 +102,7 @@ function gap(a, b) {
  */
 function eachWithin(dragons, most, found) {
   const longest = Math.max(
-      ...dragons.map(({ stage }) => Math.hypot(Math.max(stage.head_length, stage.body_length), stage.width)));
+      ...dragons.map(({ stage }) => Math.hypot(longestOf(stage), widestOf(stage))));
   const side = longest + Math.max(0, most), squares = new Map(), boards = new Map();
   for (const dragon of dragons) {
     const { stage, places, first } = dragon, count = countOf(dragon);

@@ -1,5 +1,6 @@
 // The camera: from metres to pixels and back. Shows everything, one bench, or a fixed view; may be turned.
 
+import { longestOf, widestOf } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 
 /** The margin on each side of everything shown, as a share of its size. */
@@ -67,7 +68,7 @@ export class Camera {
    * followed bench. The camera keeps up with `rate`, the simulated seconds per second of the fastest show.
    */
   update(teams, passed, followed = teams[0], rate = 1) {
-    this.longest = Math.max(...teams.map(({ stage }) => Math.max(stage.head_length, stage.body_length)));
+    this.longest = Math.max(...teams.map(({ stage }) => longestOf(stage)));
     const all = teams.map(({ stage, places }) => this.box(stage, places)).reduce(around), { places } = followed;
     const boards = teams.reduce((box, { stage, places }) => this.ahead(box, all, stage, places), all);
     const box = teams.flatMap(({ stage }) => this.obstacles(stage)).reduce(around, boards);
@@ -96,7 +97,7 @@ export class Camera {
       if (y < low) low = y;
       if (y > high) high = y;
     }
-    const edge = stage.width + stage.hole_inset;
+    const edge = widestOf(stage) + stage.hole_inset;
     return [(left + right) / 2, (low + high) / 2, (right - left) / 2 + edge, (high - low) / 2 + edge];
   }
 

@@ -53,7 +53,8 @@ function takeToken() {
     return given ?? null;
   }
 }
-const token = takeToken();
+/** The token for commands, or null. */
+export const token = takeToken();
 
 /** Returns true if a certificate of exactly this scene proves the announced time of an event. */
 const isProved = (stage, { event, time }) =>
@@ -273,8 +274,8 @@ export function conduct(publishers, keysConduct, keySwitch) {
       greeted.set(stream, stream.socket);
       allowed.set(stream, message.allowed);
       bar.hidden = ![...allowed.values()].some(Boolean);
-      // The curve of the clearance stands under the time line where there is one.
-      if (!bar.hidden) line.parentElement.after(document.getElementById("curve"));
+      // The second thumb and the curve of the clearance stand under the time line where there is one.
+      if (!bar.hidden) line.parentElement.after(document.getElementById("scrub"), document.getElementById("curve"));
       if (stream === lead()) [sought, wanted] = [null, null];
       show();
     }
@@ -342,7 +343,7 @@ export function conduct(publishers, keysConduct, keySwitch) {
    * theirs.
    */
   const usedBy = (target, key) =>
-    target.closest("select, input:not([type=range]), dialog") || (key === " " && target.closest("button")) ||
+    target.closest("select, input:not([type=range]), dialog, #scrub") || (key === " " && target.closest("button")) ||
         (key.startsWith("Arrow") && target.closest("canvas"));
   addEventListener("keydown", (event) => {
     const { key, target } = event;

@@ -1,6 +1,7 @@
 // One dragon of a publisher's show: its present pose, its path and colours, its lanterns and its part of the marks.
 // Knows the words at its ends, and no canvas.
 
+import { widestOf } from "./boards.js";
 import { centreOf, obstaclesOf, pathOf } from "./drawing.js";
 import { STRIDE, speedOf } from "./hermite.js";
 import { SpeedScale } from "./palette.js";
@@ -12,7 +13,7 @@ function reachOf(stage, handles, { x, y }) {
   let most = 0;
   for (let k = 0; k < handles.length; k += STRIDE) most = Math.max(most,
       Math.hypot(handles[k] - x, handles[k + 1] - y));
-  return most + stage.width + stage.hole_inset || 1;
+  return most + widestOf(stage) + stage.hole_inset || 1;
 }
 
 export class Dragon {

@@ -1,6 +1,6 @@
 // The drawing: one picture of the stage on a canvas. Knows nothing of the network; keeps the ground.
 
-import { rectangle } from "./boards.js";
+import { longestOf, rectangle } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 import { NARROW } from "./labels.js";
 import { SHADES } from "./palette.js";
@@ -252,21 +252,45 @@ export class Ground {
  * if the picture has the focus. A dragon has stage, places (STRIDE numbers a handle, as all handles here), colours (a
  * SpeedScale), path, and marks (see marks.js). It has chosen (a bench, or -1), its chosenName, and its endNames. It
  * also has stale (true if it is stale beside live ones), and identity (see palette.js; null for a single dragon).
- * Returns the words written, as boxes in pixels.
+ * `ghosts` are outlines at other times, each with `stage`, `places`, `kind` and `text`. Returns the words written, as
+ * boxes in pixels.
  */
-export function draw(context, camera, palette, { ground, dragons, labels, measure, hasFocus }) {
+export function draw(context, camera, palette, { ground, dragons, ghosts = [], labels, measure, hasFocus }) {
   ground.cover(context, camera, palette,
       dragons.map(({ path, obstacles, identity }) => ({ lines: path, obstacles, dashes: identity?.dashes ?? [] })));
   const stale = dragons.filter((dragon) => dragon.stale);
   for (const dragon of stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   if (stale.length) ground.dim(context, DIMMED);
+  for (const ghost of ghosts) drawGhost(context, camera, palette, ghost);
   for (const dragon of dragons) if (!dragon.stale) drawDragon(context, camera, palette, ground.transparent, dragon);
   const measured = measure.draw(context, camera, palette, hasFocus);
   if (!labels) return measured;
   const keep = [scaleBar(context, camera, palette), ...measured], { items, rings, marked } = wordsOf(dragons, palette,
       camera.width < NARROW);
+  for (const [k, { kind, places: [x, y], text }] of ghosts.entries()) items.push(
+      { key: `ghost ${k} ${text}`, text, ink: palette[GHOSTS[kind].ink], x, y });
   return labels.draw(context, camera, palette, { dragons, items, rings: rings.map(({ x, y }) => camera.toPixel(x, y)),
       marked, keep });
+}
+
+/** The outlines of a team at other times: dashed before the shown time, in the colour of danger at an event. */
+const GHOSTS = { before: { ink: "ink", dashes: [3, 3] }, after: { ink: "ink", dashes: [] },
+    event: { ink: "danger", dashes: [] } };
+/** The opacity of a ghost. */
+const GHOSTLY = 0.55;
+
+function drawGhost(context, camera, palette, { stage, places, kind }) {
+  const pixel = camera.unit / camera.scale, { ink, dashes } = GHOSTS[kind];
+  inMetres(context, camera);
+  Object.assign(context, { strokeStyle: palette[ink], lineWidth: pixel, globalAlpha: GHOSTLY });
+  context.setLineDash(dashes.map((dash) => dash * pixel));
+  for (const bench of inSight(camera, stage, places)) {
+    context.beginPath();
+    outline(context, rectangle(stage, places, bench));
+    context.stroke();
+  }
+  context.setLineDash([]);
+  context.globalAlpha = 1;
 }
 
 function drawDragon(context, camera, palette, transparent, dragon) {
@@ -380,7 +404,7 @@ function halved(text) {
 
 /** The benches that are in the picture. */
 function inSight(camera, stage, places) {
-  const count = places.length / STRIDE - 1, reach = Math.max(stage.head_length, stage.body_length), seen = [];
+  const count = places.length / STRIDE - 1, reach = longestOf(stage), seen = [];
   const across = camera.width / camera.scale / 2, down = camera.height / camera.scale / 2, { c, s } = camera;
   const wide = Math.abs(c) * across + Math.abs(s) * down + reach, high = Math.abs(s) * across + Math.abs(c) * down +
       reach;
@@ -397,9 +421,9 @@ function inSight(camera, stage, places) {
  */
 export function fillBoards(context, stage, places, benches, colour, edge) {
   context.strokeStyle = colour;
-  context.lineWidth = stage.width;
   for (const bench of benches) {
-    const { x, y, c, s, l } = rectangle(stage, places, bench);
+    const { x, y, c, s, l, w } = rectangle(stage, places, bench);
+    context.lineWidth = 2 * w;
     context.beginPath();
     context.moveTo(x - l * c, y - l * s);
     context.lineTo(x + l * c, y + l * s);

@@ -1,7 +1,7 @@
 // Words on the picture: their plates, and the lines to their boards. Keeps the layout between pictures, so that words
 // stand still beside their boards and move without jumps.
 
-import { rectangle } from "./boards.js";
+import { longestOf, rectangle } from "./boards.js";
 import { STRIDE } from "./hermite.js";
 import { RING, along, beyond, layout, shortOf, standsAtOwn } from "./label_layout.js";
 
@@ -169,8 +169,7 @@ function boardOf({ stage, places }, bench, camera) {
 function boardsNear(dragons, camera, box, unit) {
   const [x, y] = camera.toStage(box.x, box.y), near = [];
   for (const dragon of dragons) {
-    const { stage, places } = dragon, reach = beyond(box, unit) / camera.scale + Math.max(stage.head_length,
-        stage.body_length);
+    const { stage, places } = dragon, reach = beyond(box, unit) / camera.scale + longestOf(stage);
     for (let bench = 0; bench < places.length / STRIDE - 1; bench++) {
       const k = STRIDE * bench;
       if (Math.abs(places[k] - x) < reach && Math.abs(places[k + 1] - y) < reach) near.push(

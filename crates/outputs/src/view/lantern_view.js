@@ -1,5 +1,6 @@
 // Geometry of the lantern look: boards in pixels of the canvas, and the part of the picture that light reaches.
 
+import { boardSize } from "./boards.js";
 import { STRIDE, speedOf } from "./hermite.js";
 
 /** The pearl's distance ahead of the head's board, m. */
@@ -58,9 +59,9 @@ export function boardsOf(view, dragon) {
         cx = (ax + bx) / 2, cy = (ay + by) / 2;
     if (cx < -margin || cx > view.width + margin || cy < -margin || cy > view.height + margin) continue;
     const long = Math.hypot(ax - bx, ay - by) || 1, c = (ax - bx) / long, s = (ay - by) / long,
-        half = ((bench ? stage.body_length : stage.head_length) / 2) * view.pixels;
-    boards.push({ bench, x: cx, y: cy, c, s, ax, ay, half, dx: half * c, dy: half * s, lit: show.lit(bench, count),
-        burn: show.burning.get(bench) ?? 0 });
+        [length, width] = boardSize(stage, bench), half = (length / 2) * view.pixels;
+    boards.push({ bench, x: cx, y: cy, c, s, ax, ay, half, width, dx: half * c, dy: half * s,
+        lit: show.lit(bench, count), burn: show.burning.get(bench) ?? 0 });
   }
   boards.count = count;
   const head = boards[0]?.bench === 0 ? boards[0] : null, tail = boards.at(-1)?.bench === count - 1 && count > 1

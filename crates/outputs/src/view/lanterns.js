@@ -249,13 +249,16 @@ export class Lanterns {
 
   /** The true rectangles: a lit edge, lacquer, a worn middle. */
   boards(context, view, { boards, dragon, kit }) {
-    const wide = dragon.stage.width * view.pixels, edge = Math.max(0.02 * view.pixels, 0.9);
-    const coats = wide > 7 ? [[kit.edge, wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
-    if (wide > 24) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
+    const edge = Math.max(0.02 * view.pixels, 0.9);
     context.globalAlpha = Math.min(1, dragon.show.life * 1.5);
-    for (const [strokeStyle, lineWidth, inset] of coats) {
-      Object.assign(context, { strokeStyle, lineWidth });
-      this.lines(context, boards, 1, inset);
+    for (const width of new Set(boards.map((board) => board.width))) {
+      const alike = boards.filter((board) => board.width === width), wide = width * view.pixels;
+      const coats = wide > 7 ? [[kit.edge, wide, 0], ["#1c0605", wide - 2 * edge, edge]] : [["#3d0f0a", wide, 0]];
+      if (wide > 24) coats.push(["#2c0a07", 0.46 * wide, edge + 0.02 * view.pixels]);
+      for (const [strokeStyle, lineWidth, inset] of coats) {
+        Object.assign(context, { strokeStyle, lineWidth });
+        this.lines(context, alike, 1, inset);
+      }
     }
     context.globalAlpha = 1;
   }

@@ -32,11 +32,10 @@ function pathEnd(stage, alert) {
 export class Publisher {
   /**
    * `name` is written before its words if there are `several` publishers; `show` selects the show look, `still` stops
-   * its motion.
+   * its motion. `stream` delivers its frames.
    */
-  constructor(name, { several, show, still }) {
-    Object.assign(this, { name, several, look: { show, still } });
-    this.stream = new Stream(several ? name : null);
+  constructor(name, { several, show, still }, stream = new Stream(several ? name : null)) {
+    Object.assign(this, { name, several, look: { show, still }, stream });
     this.transport = new Transport();
     this.overlap = new Overlap();
     this.nearest = new Nearest();

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use super::{Facts, Picture, Proofs, SceneHash, wire};
+use super::{Facts, Picture, Proofs, SceneHash, SceneInPlay, wire};
 use bench_dragon_client::feed::{Feed, FeedEvent};
 use bench_dragon_messages::{LoopStatus, Stage, StageMessage};
 use bench_dragon_proof::ProvedEvent;
@@ -86,6 +86,8 @@ struct Reader<'a> {
     cues: u64,
     /// The run and the scene whose facts are not computed yet.
     unknown: Option<(u64, SceneHash)>,
+    /// The run, the hash and the text of the latest scene, until the stage of its run has come.
+    scene: Option<(u64, SceneHash, String)>,
 }
 
 impl<'a> Reader<'a> {
@@ -101,6 +103,7 @@ impl<'a> Reader<'a> {
             status: None,
             cues: 0,
             unknown: None,
+            scene: None,
         }
     }
 
@@ -111,6 +114,7 @@ impl<'a> Reader<'a> {
                 self.stage = Some(StageMessage { stage: *stage, segments: segments.to_vec() });
                 self.proved = self.proofs.of(&stage.scene_hash);
                 self.describe();
+                self.set_scene();
                 self.warn_of_another_scene();
             }
             FeedEvent::Alert(alert) => {
@@ -140,8 +144,9 @@ impl<'a> Reader<'a> {
                 if !text.is_empty() {
                     self.facts.request(header.hash, text);
                     self.unknown = Some((header.run_id, header.hash));
+                    self.scene = Some((header.run_id, header.hash, text.to_owned()));
                 }
-                return false;
+                return self.set_scene();
             }
             FeedEvent::Chase(status) => {
                 self.picture.chase = wire::chase(status).into();
@@ -156,6 +161,16 @@ impl<'a> Reader<'a> {
 
     fn stage(&self) -> Option<&Stage> {
         self.stage.as_ref().map(|message| &message.stage)
+    }
+
+    /// Sets the scene of the picture once its text and its stage have come. Returns true then.
+    fn set_scene(&mut self) -> bool {
+        let Some(stage) = &self.stage else { return false };
+        let Some((_, hash, text)) = self.scene.take_if(|(run_id, ..)| *run_id == stage.stage.run_id) else {
+            return false;
+        };
+        self.picture.scene = Some(Arc::new(SceneInPlay::new(hash, text, stage)));
+        true
     }
 
     /// Looks for proofs of the scene that came after its stage. Returns true if they change the picture.

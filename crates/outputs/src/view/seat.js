@@ -4,6 +4,7 @@
 // Light on the floor and the bloom of lanterns are drawn at a quarter of the size and enlarged. The floor is paving
 // times light, and is made again in every third picture, or for another seat.
 
+import { boardSize } from "./boards.js";
 import { drawFigure, headFigure, tailFigure } from "./dragon_figure.js";
 import { STRIDE, speedOf } from "./hermite.js";
 import { OfLight } from "./lantern_light.js";
@@ -369,9 +370,9 @@ function teamOf(view, { stage, places, show }, kit) {
     if (k === count) break;
     const middle = [x - dx / 2, y - dy / 2], below = view.to(...middle, 0);
     if (!below || !isSeen(view, below, 4)) continue;
-    const half = (k ? stage.body_length : stage.head_length) / 2;
+    const [half, w] = boardSize(stage, k).map((metres) => metres / 2);
     things.push({ dancer: false, depth: below.depth, foot: below, bench: k, last: count - 1, x: middle[0],
-        y: middle[1], c, s, half, w: stage.width / 2, show, lit, burn: show.burning.get(k) ?? 0, kit });
+        y: middle[1], c, s, half, w, show, lit, burn: show.burning.get(k) ?? 0, kit });
   }
   const [x, y] = [sumX / (count + 1), sumY / (count + 1)];
   let reach = 1;

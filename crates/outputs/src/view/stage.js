@@ -23,6 +23,7 @@ import { Publisher } from "./publisher.js";
 import { publishers as names } from "./publishers.js";
 import { Resolution } from "./resolution.js";
 import { Roster } from "./roster.js";
+import { Scrub } from "./scrub.js";
 import { Seat } from "./seat.js";
 import { Sound } from "./sound.js";
 import { capital, say, setLanguage, translate } from "./words.js";
@@ -62,6 +63,10 @@ const measure = new Measure((said) => {
   element("measure").setAttribute("aria-pressed", measure.on);
 });
 const roster = new Roster(select);
+/** Another time than the live one; an audience sees the live one only. */
+const scrub = words.show ? null : new Scrub(publishers, words.at?.[0]);
+/** The dragons of the picture: the live ones, or those at another time. */
+const pictured = (dragons) => (scrub ? dragons.map((dragon) => scrub.of(dragon)) : dragons);
 /** The dragons of all publishers, and whether there are several. */
 let dragons = [], several = false;
 meet();
@@ -81,7 +86,7 @@ let passedAt = 0, beforeAt = 0, drawnAt = -Infinity;
  */
 const picture = { received: 0, passes: 0, drawn: 0, state: null, run: null, sequence: null, time: null, head: null,
     shown: null, range: null, marks: [], labels: [], latency: publishers[0].latency, ways: publishers[0].stream.ways,
-    played: sound.played, toPixel: (...place) => eye.toPixel(...place), dragons: [] };
+    played: sound.played, scrub: null, toPixel: (...place) => eye.toPixel(...place), dragons: [] };
 window.picture = picture;
 
 /** Lists the dragons that the publishers have now. Each of several has an identity. */
@@ -138,16 +143,17 @@ function pass() {
     showText(now);
     return drawNothing();
   }
-  camera.update(there, passed, there.includes(whose) ? whose : there[0],
+  const shown = pictured(there);
+  camera.update(shown, passed, shown[Math.max(0, there.indexOf(whose))],
       Math.max(...there.map(({ newest }) => newest.scale)));
-  camera.reach = Math.max(...there.map(({ path }) => path.reach));
+  camera.reach = Math.max(...shown.map(({ path }) => path.reach));
   showText(now);
   const soonest = publishers.map(
       ({ state, sight }) => (sight.stands || (state.severity === "ok" && !(sight.seconds < 10)) ? NaN
       : sight.seconds)).filter((seconds) => seconds > -1);
   sound.count(soonest.length ? Math.min(...soonest) : NaN);
   if (publishers.some(({ struck }) => struck)) sound.strike();
-  paint(there);
+  paint(shown);
   report();
 }
 
@@ -157,20 +163,22 @@ function paint(there) {
   const hasFocus = document.activeElement === canvas, least = PART / (camera.scale * camera.ratio);
   const [x, y] = [camera.x, camera.y].map((one) => Math.floor(one / least));
   const look = [there.map((dragon) => dragon.lookKey(least)), x, y, camera.scale, camera.c, camera.s, chosen,
-      whose.name, palette.ground, measure.key, hasFocus && measure.on].join();
+      whose.name, palette.ground, measure.key, hasFocus && measure.on, scrub?.isOn].join();
   if (look === last && !labels?.isDue(passedAt)) return;
   took(look);
   const allStale = there.every(({ sight }) => sight.stale);
   const scene = there.map((dragon) => {
     const { stage, places, colours, path, obstacles, marks, sight, identity } = dragon,
-        own = dragon === whose ? chosen : -1;
+        own = (dragon.original ?? dragon) === whose ? chosen : -1;
     const named = { chosen: own, chosenName: dragon.benchName(own), endNames: dragon.endNames() };
     // A line between boards has no meaning without words.
     const drawn = labels ? marks : marks.filter(({ kind }) => kind !== "nearest");
     return { stage, places, colours, path: path.lines, obstacles, marks: drawn, ...named, identity,
         stale: sight.stale && !allStale };
   });
-  const written = draw(context, camera, palette, { ground, dragons: scene, labels, measure, hasFocus });
+  const ghosts = scrub?.isOn ? there.flatMap((dragon) => scrub.ghostsOf(dragon).map(
+      (ghost) => ({ ...ghost, stage: dragon.stage }))) : [];
+  const written = draw(context, camera, palette, { ground, dragons: scene, ghosts, labels, measure, hasFocus });
   picture.drawn++;
   Object.assign(picture, { marks: there.flatMap(({ marks }) => marks), labels: written });
   drawnOf(isOneOfMany);
@@ -202,6 +210,7 @@ function drawnOf(isLiveOnly) {
 /** The picture stays; the data for tests of a publisher that is gone does not. */
 function report() {
   picture.dragons = dragons.map((dragon) => dragon.report(eye));
+  picture.scrub = scrub?.report() ?? null;
   const { name: _, time, ...rest } = picture.dragons[0];
   Object.assign(picture, rest, time === null ? {} : { time });
   if (picture.shown) picture.range = dragons[0].colours.ticks.map(({ speed }) => speed);
@@ -239,6 +248,7 @@ function showText(now) {
   put("notice", notices.join("\n"));
   showSeat();
   const dragon = selected ?? first.dragons[0], shown = dragon.publisher, { newest, stage, stream } = shown;
+  scrub?.update(newest ? stream.playback.time(now) : 0);
   curve.show(shown.isThere ? stream.facts : null, stage, newest?.time);
   // The scene of a picture that stays may no longer be played.
   showProofs(shown.isThere && !shown.sight.trouble ? stage : null);
@@ -246,7 +256,7 @@ function showText(now) {
   if (!shown.isThere || now - figuresAt < FIGURES_INTERVAL) return;
   figuresAt = now;
   showNames(stage, isOneOfMany ? names : null, first.transport.kind === "playing" ? "" : first.transport.sign);
-  const { colours, frame } = dragon;
+  const { colours } = dragon, { frame } = pictured([dragon])[0];
   showFigures({ clearance: newest.clearance, colours, time: stream.playback.time(now), scale: newest.scale });
   showBench(whose === dragon ? chosen : -1, frame.handles, dragon.part);
   if (now - countedAt < 1000) return;
@@ -310,7 +320,7 @@ function print(isBegin) {
   else delete root.dataset.theme;
   dressed();
   const there = dragons.filter(({ isThere, places }) => isThere && places);
-  if (there.length) paint(there);
+  if (there.length) paint(pictured(there));
 }
 addEventListener("beforeprint", () => print(true));
 addEventListener("afterprint", () => print(false));
@@ -364,7 +374,7 @@ function tap(x, y) {
   // A hit board has priority over a near one.
   for (const most of [0, reach]) {
     for (const dragon of there) {
-      const bench = benchAt(dragon.stage, dragon.places, ...place, most);
+      const bench = benchAt(dragon.stage, pictured([dragon])[0].places, ...place, most);
       if (bench >= 0) return choose(bench, dragon);
     }
   }

@@ -19,7 +19,7 @@ const CLOCK_INTERVAL = 5000;
 const JITTER_WINDOW = 2000;
 
 /** Parses a frame of the server's layout. Null for a layout of another version. */
-function frameOf(data, at) {
+export function frameOf(data, at) {
   const bytes = new DataView(data);
   if (data.byteLength < HEADER_BYTES || bytes.getUint8(0) !== VERSION) return null;
   return {

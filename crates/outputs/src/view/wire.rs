@@ -36,7 +36,7 @@ const VERSION: u8 = 3;
 const HEADER_BYTES: usize = 72;
 const HANDLE_BYTES: usize = 20;
 
-pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
+pub(crate) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER_BYTES + HANDLE_BYTES * handles.len());
     bytes.extend([VERSION, header.state as u8, header.playback as u8, 0]);
     bytes.extend((handles.len() as u32).to_le_bytes());
@@ -59,7 +59,7 @@ pub(super) fn frame(header: &FrameHeader, handles: &[HandlePose]) -> Vec<u8> {
 
 /// Returns the stage, the name of its publisher and, when they are known, the scene's name and the proofs of its
 /// events.
-pub(super) fn stage(
+pub(crate) fn stage(
     stage: &StageMessage,
     publisher: &str,
     scene: Option<&str>,

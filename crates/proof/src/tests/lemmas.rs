@@ -10,6 +10,7 @@ use crate::interval::{Interval, Vector};
 use crate::link;
 use crate::path::{Place, Span};
 use crate::scene::Scene;
+use crate::team::Size;
 
 fn scene(path: &str) -> Scene {
     let team = "[team]\nbenches = 9\nhead_length = 3.41\nbody_length = 2.2\nwidth = 0.3\nhole_inset = 0.275\n";
@@ -201,8 +202,8 @@ fn boards_are_apart_or_not() {
             let (sine, cosine) = angle.sin_cos();
             [single([rear[0] + length * cosine, rear[1] + length * sine]), single(rear)]
         });
-        let [a, b] =
-            handles.each_ref().map(|[front, rear]| Board::new(front, rear, Interval::new(length), &scene.team));
+        let size = || Size { link: Interval::new(length), ..scene.team.size(1) };
+        let [a, b] = handles.each_ref().map(|[front, rear]| Board::new(front, rear, size()));
         let edges = |shape: [[f64; 2]; 4]| (0..4).map(move |i| (shape[i], shape[(i + 1) % 4]));
         let from = |p: [[f64; 2]; 4], q: [[f64; 2]; 4]| {
             p.into_iter().flat_map(move |p| edges(q).map(move |(a, b)| distance(p, a, b))).fold(f64::INFINITY, f64::min)
@@ -243,9 +244,8 @@ fn boards_that_almost_touch() {
     let first = board(0.0, 0.0);
     let apart = |x: f64, y: f64| {
         let second = board(x, y);
-        let length = || *scene.team.link(1);
-        let second = Board::new(&second[0], &second[1], length(), &scene.team);
-        Board::new(&first[0], &first[1], length(), &scene.team).is_apart_from(&second)
+        let second = Board::new(&second[0], &second[1], scene.team.size(1));
+        Board::new(&first[0], &first[1], scene.team.size(1)).is_apart_from(&second)
     };
     for sign in [-1.0, 1.0] {
         assert!(apart(0.3, sign * (0.3 + 1e-14)) && !apart(0.3, sign * (0.3 - 1e-14)));
@@ -258,13 +258,14 @@ fn boards_that_almost_touch() {
 #[test]
 fn boards_inside_a_ring() {
     let team = &turnaround().team;
-    let corner = 0.275f64.hypot(0.15);
+    let (corner, width) = (0.275f64.hypot(0.15), &Interval::new(0.3));
     for rho in [0.9, 2.0, 10.0] {
         let inner = f64::min(f64::sqrt(rho * rho - 0.825 * 0.825), rho - 0.275) - 0.15;
-        let inside = |reach: f64| is_inside_ring(team, &Interval::new(reach), &Interval::new(rho), &Interval::new(0.0));
+        let inside =
+            |reach: f64| is_inside_ring(team, (&Interval::new(reach), width), &Interval::new(rho), &Interval::new(0.0));
         assert!(inside(inner - corner - 1e-12) && !inside(inner - corner + 1e-12), "{rho}");
     }
-    assert!(!is_inside_ring(team, &Interval::new(-10.0), &Interval::new(0.8), &Interval::new(0.0)));
+    assert!(!is_inside_ring(team, (&Interval::new(-10.0), width), &Interval::new(0.8), &Interval::new(0.0)));
 }
 
 /// *Nearer* is given up where it is true by too little: the stretches would have to be too short.

@@ -5,10 +5,12 @@
 
 use bench_dragon_ros2_messages::settings::Topic;
 
-/// The layouts of a topic's message, the newest first. Each layout has a field that older layouts do not have.
+/// The layouts of a topic's message, the newest first. Each layout has a field, of its own or of a message in it, that
+/// older layouts do not have.
 const fn history(topic: Topic) -> &'static [(&'static str, &'static str)] {
     match topic {
         Topic::Stage => &[
+            ("Stage/7", "tail_length"),
             ("Stage/6", "dragons"),
             ("Stage/5", "scene_hash"),
             ("Stage/4", "cue_list"),
@@ -26,11 +28,14 @@ const fn history(topic: Topic) -> &'static [(&'static str, &'static str)] {
     }
 }
 
-/// Returns two layouts of a topic's message. The first is the layout of a recording with `fields`, `None` if no earlier
+/// Returns two layouts of a topic's message. The first is the layout of a recording with these fields, those of messages in it included, `None` if no earlier
 /// version had this layout. The second is the layout of this program.
-pub fn layouts(topic: Topic, fields: &[[String; 2]]) -> (Option<&'static str>, &'static str) {
+pub fn layouts<'f>(
+    topic: Topic,
+    fields: impl Iterator<Item = &'f [String; 2]> + Clone,
+) -> (Option<&'static str>, &'static str) {
     let known = history(topic);
-    let found = known.iter().find(|(_, field)| fields.iter().any(|[_, name]| name == field));
+    let found = known.iter().find(|(_, field)| fields.clone().any(|[_, name]| name == field));
     let own = known.first().map_or("", |(layout, _)| layout);
     (found.map(|(layout, _)| *layout).filter(|layout| *layout != own), own)
 }
@@ -46,7 +51,7 @@ mod tests {
 
     fn found(topic: Topic, names: &str) -> Option<&'static str> {
         let fields: Vec<_> = names.split(' ').map(|name| [String::new(), name.to_owned()]).collect();
-        layouts(topic, &fields).0
+        layouts(topic, fields.iter()).0
     }
 
     #[test]
@@ -55,8 +60,8 @@ mod tests {
             let (newest, field) = history(topic)[0];
             assert!(names().contains(&format!("bench_dragon/{newest}").as_str()), "{newest} has a successor");
             let name = MessageType::of(topic).ros_name().replace("/msg/", "/");
-            let own = &fields(&name, &MessageType::of(topic).schema())[&name];
-            assert!(own.iter().any(|[_, name]| name == field), "{newest} has no {field}");
+            let own = fields(&name, &MessageType::of(topic).schema());
+            assert!(own.values().flatten().any(|[_, name]| name == field), "{newest} has no {field}");
         }
     }
 
@@ -66,6 +71,7 @@ mod tests {
         let geometry = "header run_id stamp_ns pitch start_turn hole_inset head_length body_length width";
         let events = "freeze_time benches segments events cues";
         for (layout, rest) in [
+            ("Stage/6", &format!("{events} scene_hash dragons obstacles cue_list") as &str),
             ("Stage/5", &format!("{events} scene_hash path timeline cue_list") as &str),
             ("Stage/4", &format!("{events} path timeline cue_list")),
             ("Stage/3", "benches segments path"),

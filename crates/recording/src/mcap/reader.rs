@@ -441,6 +441,6 @@ fn check_type(channel: &Channel<'_>, topic: Topic) -> Result<(), ReadError> {
     if found == fields(&name, &of.schema()) {
         return Ok(());
     }
-    let (found, own) = layouts(topic, found.get(&name).map_or(&[], Vec::as_slice));
+    let (found, own) = layouts(topic, found.values().flatten());
     Err(ReadError::Fields { topic: channel.topic.clone(), found, own })
 }

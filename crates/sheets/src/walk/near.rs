@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use bench_dragon_motion::clearance::board;
 use bench_dragon_motion::ensemble::Ensemble;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::{circle_bound_board_board, signed_distance_board_board};
 use bench_dragon_motion::solve::{Chain, Positions, Solver};
@@ -65,7 +66,7 @@ impl<'a> Nearest<'a> {
         let benches: Vec<(usize, usize)> = (0..ensemble.dragons().len()).flat_map(of).collect();
         let longest = |k: usize| {
             let team = ensemble.dragons()[k].motion.team();
-            (0..2).map(|bench| team.link(bench) + 2.0 * team.hole_inset + team.width).fold(0.0, f64::max)
+            team.longest_link() + 2.0 * team.hole_inset + team.widest()
         };
         let square = NEAR + (0..ensemble.dragons().len()).map(longest).fold(0.0, f64::max);
         let none = vec![None; ensemble.handles()];
@@ -139,11 +140,14 @@ impl<'a> Nearest<'a> {
         (step, end): (f64, f64),
         solver: &mut dyn Solver,
         searched: &Searched<'_>,
-        progress: &mut dyn FnMut(f64),
+        progress: Progress<'_>,
     ) -> Vec<(Option<Near>, Option<Near>)> {
         let mut chain = Chain::new(self.ensemble.handles());
         let mut known: HashMap<(usize, usize, u64), (f64, f64)> = HashMap::new();
         for (index, (bench, dragon)) in self.benches.clone().into_iter().enumerate() {
+            if progress(index as f64 / self.benches.len() as f64).is_break() {
+                break;
+            }
             if let Some(near) = self.boards[bench] {
                 let key = (bench.min(near.other), bench.max(near.other), near.time.to_bits());
                 let other = self.ensemble.owner(near.other).map_or(dragon, |(dragon, _)| dragon);
@@ -166,7 +170,6 @@ impl<'a> Nearest<'a> {
                 });
                 self.obstacles[bench] = Some(Near { distance, time, ..near });
             }
-            progress(index as f64 / self.benches.len() as f64);
         }
         self.take(searched, end, solver, &mut chain);
         self.boards.into_iter().zip(self.obstacles).collect()

@@ -216,6 +216,7 @@ pub(super) fn is_folded_after(pitch: f64, start_turn: f64, metres: f64, team: &T
 fn least_legal_start(pitch: f64, start_turn: f64, team: &Team) -> Option<f64> {
     let spiral = Spiral::new(pitch, Direction::Inward);
     let folds = [0, 1].map(|bench| spiral.fold(team.link(bench)));
+    let tail = team.own_tail().map(|tail| (tail, spiral.fold(team.link(tail))));
     let outside = |theta: f64, fold: Option<f64>| fold.is_none_or(|fold| theta > fold);
     let legal = |turns: f64| {
         let path = Path::spiral(pitch, turns);
@@ -223,11 +224,20 @@ fn least_legal_start(pitch: f64, start_turn: f64, team: &Team) -> Option<f64> {
         outside(head.coordinate().high, folds[0])
             && (team.benches < 2
                 || follower(&path, head, team.link(0)).is_ok_and(|second| outside(second.coordinate().high, folds[1])))
+            && tail.is_none_or(|(tail, fold)| {
+                let mut links = (0..tail).map(|bench| team.link(bench));
+                // All handles are further out than the head's.
+                outside(head.coordinate().high, fold)
+                    || links
+                        .try_fold(head, |front, link| follower(&path, front, link))
+                        .is_ok_and(|front| outside(front.coordinate().high, fold))
+            })
     };
     if legal(start_turn) {
         return None;
     }
-    // Beyond both folds every start is legal.
-    let safe = folds.iter().flatten().fold(start_turn, |most, fold| most.max(*fold / TAU)) * 1.01;
+    // Beyond all folds every start is legal.
+    let folds = folds.into_iter().chain(tail.map(|(_, fold)| fold));
+    let safe = folds.flatten().fold(start_turn, |most, fold| most.max(fold / TAU)) * 1.01;
     Some((bisect_predicate(legal, start_turn, safe) * 1e9).ceil() / 1e9)
 }

@@ -18,7 +18,9 @@ impl Source<'_> {
         let doubts = self.doubts.take();
         match (result, doubts.first()) {
             (Ok(scene), _) => Ok(Scene { doubts, ..scene }),
-            (Err(SceneError(sentence)), Some(doubt)) => Err(SceneError(format!("{sentence} ({doubt})"))),
+            (Err(SceneError { sentence, at }), Some(doubt)) => {
+                Err(SceneError { sentence: format!("{sentence} ({doubt})"), at })
+            }
             (Err(error), None) => Err(error),
         }
     }
@@ -31,18 +33,19 @@ impl Source<'_> {
 
     /// Converts an error of the TOML reader into one sentence.
     fn toml_error(&self, error: &toml::de::Error, field: &str) -> SceneError {
-        let place = error.span().map_or(String::new(), |span| format!(", line {}", self.line(span.start)));
+        let at = error.span().map(|span| span.start);
+        let place = at.map_or(String::new(), |at| format!(", line {}", self.line(at)));
         // `Spanned` values are wrapped in a field that no user wrote.
         let field = field.replace(".$__serde_spanned_private_value", "");
-        let line = error.span().map(|span| self.line(span.start));
+        let line = at.map(|at| self.line(at));
         let line = line.and_then(|line| self.text.lines().nth(line - 1)).unwrap_or_default();
         if let Some(sentence) = mend::sentence(error.message(), &field, line) {
-            return SceneError(format!("{}{place}: {sentence}", self.file));
+            return SceneError { sentence: format!("{}{place}: {sentence}", self.file), at };
         }
         let field = if field.is_empty() || field == "." { String::new() } else { format!("{field}: ") };
         let message = error.message().trim().replace('\n', ", ");
         let message =
             message.replace("expected i64", "expected an integer").replace("expected f64", "expected a number");
-        SceneError(format!("{}{place}: {field}{message}", self.file))
+        SceneError { sentence: format!("{}{place}: {field}{message}", self.file), at }
     }
 }

@@ -3,12 +3,24 @@
 //! In: TOML text and fields from serde. Out: checked numbers, or one sentence about the wrong field.
 
 use std::cell::RefCell;
+use std::ops::Range;
 use std::rc::Rc;
 
 use toml::Spanned;
 
 use super::{Accepted, SceneError};
 use bench_dragon_motion::model::Vector;
+
+/// A number of the text, or a pair of numbers that is a place, and the range in which it is accepted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedNumber {
+    /// Its bytes in the text.
+    pub span: Range<usize>,
+    /// The range in which it is accepted.
+    pub accepted: Accepted,
+    /// True for a number that has to be whole.
+    pub is_whole: bool,
+}
 
 /// The text being read, for line numbers.
 #[derive(Clone)]
@@ -19,11 +31,13 @@ pub(super) struct Source<'a> {
     dragon: Option<&'a str>,
     /// The sentences of [`Scene::doubts`](super::Scene::doubts).
     pub(super) doubts: Rc<RefCell<Vec<String>>>,
+    /// The numbers that were checked.
+    pub(super) numbers: Rc<RefCell<Vec<CheckedNumber>>>,
 }
 
 impl<'a> Source<'a> {
     pub fn new(text: &'a str, file: &'a str) -> Self {
-        Self { text, file, dragon: None, doubts: Rc::default() }
+        Self { text, file, dragon: None, doubts: Rc::default(), numbers: Rc::default() }
     }
 
     /// Returns the text of a dragon's tables, whose errors name the dragon.
@@ -33,7 +47,7 @@ impl<'a> Source<'a> {
 
     /// Notes that a number is accepted, and hardly meant.
     pub fn doubt<T>(&self, value: &Spanned<T>, sentence: &str) {
-        let SceneError(sentence) = self.field_error(value, sentence);
+        let SceneError { sentence, .. } = self.field_error(value, sentence);
         self.doubts.borrow_mut().push(sentence);
     }
 
@@ -48,7 +62,8 @@ impl<'a> Source<'a> {
 
     pub fn field_error_at(&self, offset: usize, sentence: &str) -> SceneError {
         let whose = self.dragon.map_or(String::new(), |dragon| format!("dragon \"{dragon}\": "));
-        SceneError(format!("{}, line {}: {whose}{sentence}", self.file, self.line(offset)))
+        let sentence = format!("{}, line {}: {whose}{sentence}", self.file, self.line(offset));
+        SceneError { sentence, at: Some(offset) }
     }
 
     /// Returns a name without control characters, since it is printed unchanged.
@@ -61,13 +76,20 @@ impl<'a> Source<'a> {
         Ok(name.clone())
     }
 
+    /// Notes a number whose range is known.
+    fn note<T>(&self, value: &Spanned<T>, accepted: Accepted, is_whole: bool) {
+        self.numbers.borrow_mut().push(CheckedNumber { span: value.span(), accepted, is_whole });
+    }
+
     pub fn check(&self, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
+        self.note(value, accepted, false);
         accepted.check(field, *value.get_ref()).map_err(|sentence| self.field_error(value, &sentence))
     }
 
     /// Returns a place of the stage; by default the origin.
     pub fn place(&self, field: &str, value: Option<&Spanned<[f64; 2]>>) -> Result<Vector, SceneError> {
         let Some(given) = value else { return Ok(Vector::zeros()) };
+        self.note(given, Accepted::PLACE, false);
         for number in given.get_ref() {
             let checked = Accepted::PLACE.check(field, *number);
             checked.map_err(|sentence| self.field_error(given, &sentence))?;
@@ -76,6 +98,7 @@ impl<'a> Source<'a> {
     }
 
     pub fn check_count(&self, field: &str, value: &Spanned<i64>, accepted: Accepted) -> Result<usize, SceneError> {
+        self.note(value, accepted, true);
         let number =
             accepted.check(field, *value.get_ref() as f64).map_err(|sentence| self.field_error(value, &sentence))?;
         Ok(number as usize)

@@ -36,7 +36,7 @@ impl SceneText {
                 std::io::ErrorKind::InvalidData => "it is not UTF-8 text".to_owned(),
                 _ => error.to_string(),
             };
-            SceneError(format!("{shown}: {reason}, expected a scene file in TOML"))
+            SceneError { sentence: format!("{shown}: {reason}, expected a scene file in TOML"), at: None }
         })?;
         let stem = file.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy().into_owned());
         Ok(Self { text, file: shown, stem })

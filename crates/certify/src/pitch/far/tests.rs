@@ -8,9 +8,10 @@ use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::path::Path;
 use bench_dragon_motion::model::separation::signed_distance_board_board;
-use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::model::team::{Ends, Team};
 
-const PAPER: Team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 };
+const PAPER: Team =
+    Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 
 /// Limit of handles of one team.
 const MOST_HANDLES: usize = 300;
@@ -46,7 +47,7 @@ fn teams() -> impl Strategy<Value = (Team, f64)> {
         |(body, head, inset, width, benches, pitch)| {
             let (hole_inset, width) = (inset * body, width * body);
             let [head_length, body_length] = [head * body, body].map(|link| link + 2.0 * hole_inset);
-            (Team { benches, head_length, body_length, width, hole_inset }, pitch * width)
+            (Team { benches, head_length, body_length, width, hole_inset, ends: Ends::NONE }, pitch * width)
         },
     )
 }

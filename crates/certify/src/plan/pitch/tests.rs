@@ -2,9 +2,10 @@
 
 use super::{LeastPitch, Obstacle, Proposal, decided, least_pitch};
 use bench_dragon_motion::event::{Progress, unreported};
-use bench_dragon_motion::model::team::Team;
+use bench_dragon_motion::model::team::{Ends, Team};
 
-const TEAM: Team = Team { benches: 20, head_length: 0.52, body_length: 0.57, width: 0.054, hole_inset: 0.135 };
+const TEAM: Team =
+    Team { benches: 20, head_length: 0.52, body_length: 0.57, width: 0.054, hole_inset: 0.135, ends: Ends::NONE };
 const RADIUS: f64 = 0.18;
 
 /// Returns the result for a sequence of proposed pitches, followed by none.
@@ -60,6 +61,7 @@ fn a_pair_of_boards_that_meets_again_is_no_end() {
         body_length: length,
         width,
         hole_inset,
+        ends: Ends::NONE,
     };
     for (team, radius) in [
         (team(15, 1.0024901830117714, 0.260087030130667, 0.20572542372242547), 0.295_520),

@@ -15,7 +15,8 @@ fn touches(path: &Path, team: &Team, ground: &Ground, to: f64) -> (Vec<Option<To
     let mut unreported = unreported;
     let mut budget = Budget::new(20_000_000, &mut unreported);
     let singular = Singularities::search(path, team, &mut budget);
-    let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns);
+    let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns)
+        .with_tail_turns(&singular.tail_turns);
     let to = to.min(singular.end.map_or(singular.searched_until, |end| end.travelled));
     let mut budget = Budget::new(20_000_000, &mut unreported);
     let (touches, until) = searches.first_touches(ground, 0.0, to, &mut budget).unwrap();

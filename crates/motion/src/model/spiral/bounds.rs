@@ -39,7 +39,7 @@ impl Spiral {
     /// limit, at the earliest `last`.
     pub(super) fn quiet_from(&self, team: &Team, limit: f64, last: Coordinate) -> Option<Coordinate> {
         let quiet = |radius: f64| self.board_clearance_bound(team, radius) > limit;
-        let least = 5.0 * (team.longest_link() + team.hole_inset + team.width).max(self.pitch());
+        let least = 5.0 * (team.longest_link() + team.hole_inset + team.widest()).max(self.pitch());
         // Beyond that the bound grows no more.
         let most = 1e16 * least;
         if !quiet(most) {
@@ -51,7 +51,8 @@ impl Spiral {
     }
 
     /// Returns a lower bound of the clearance of two boards without a common handle on an inward spiral. All handles
-    /// are at least `r` from the centre. The bound needs r >= 5 max(link + inset + width, pitch) and grows with r.
+    /// are at least `r` from the centre. The bound needs r >= 5 max(link + inset + width, pitch) and grows with r. Link
+    /// and width are those of the longest link and the widest board; the links between two boards are body links.
     ///
     /// There theta > 31, so that the curvature is at most 1.002 / r, and chord and arc differ by less than 1 %. So the
     /// tangent turns by at most tau = 1.03 link / r <= 0.21 along one link. A chord leans by at most half of that
@@ -69,7 +70,7 @@ impl Spiral {
     ///   Otherwise it is at least pitch r / hypot(r, 1.02 a) >= 0.999 pitch. This case is impossible where the whole
     ///   team turns by less.
     fn board_clearance_bound(&self, team: &Team, r: f64) -> f64 {
-        let Team { hole_inset, width, .. } = *team;
+        let (hole_inset, width) = (team.hole_inset, team.widest());
         let (longest, body) = (team.longest_link(), team.link(1));
         if width > body {
             return f64::NEG_INFINITY;

@@ -15,6 +15,7 @@ use crate::model::description::RouteStep;
 use crate::model::path::tests::any_spiral;
 use crate::model::path::{Param, Path};
 use crate::model::spiral::Direction;
+use crate::model::team::Ends;
 use crate::solve::newton::Newton;
 use crate::solve::{Chain, Velocities};
 
@@ -23,7 +24,7 @@ const TURNAROUND: PathDescription =
     PathDescription::Turnaround { pitch: 1.7, turn_radius: 4.5, arc_ratio: 2.0, lead_in: 100.0, lead_out: 369.16 };
 
 fn team(benches: usize) -> Team {
-    Team { benches, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275 }
+    Team { benches, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE }
 }
 
 /// The path of config/procession.toml.
@@ -180,7 +181,8 @@ fn decimal(text: &str) -> Real {
 }
 
 /// In centimetres, every number of both scenes is a double: the digits of the tables can be compared.
-const CENTIMETRES: Team = Team { benches: 223, head_length: 341.0, body_length: 220.0, width: 30.0, hole_inset: 27.5 };
+const CENTIMETRES: Team =
+    Team { benches: 223, head_length: 341.0, body_length: 220.0, width: 30.0, hole_inset: 27.5, ends: Ends::NONE };
 
 /// Returns the largest error of a reference in centimetres at whole seconds of a table, metres, and the number of rows.
 /// The table has x in a column; its clock begins `before` seconds after the motion.

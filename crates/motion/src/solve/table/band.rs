@@ -307,7 +307,8 @@ pub(super) fn within_half_turn(angle: f64) -> f64 {
 const FAR_ROW: usize = 512;
 
 /// Makes the table for `team` on `path`; `None` if there is none, or it would be too large.
-pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<Rows> {
+/// `all_centres`: the places of the pieces' centres are for frames, too, in every row.
+pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance, all_centres: bool) -> Option<Rows> {
     let beginning = Beginning::new(track, team)?;
     let link = team.link(1);
     let foremost = foremost(track, team)?;
@@ -351,7 +352,7 @@ pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance) -> Option<R
             lengths,
             end_row,
             needed: end - steps - 2,
-            with_centres: first_row <= end - behind_second,
+            with_centres: all_centres || first_row <= end - behind_second,
             budget: MOST_BYTES.saturating_sub(table.memory_bytes()),
         };
         let mut made = builder.nothing(table.valid_from);

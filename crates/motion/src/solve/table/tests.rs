@@ -4,7 +4,8 @@ use super::*;
 use crate::model::curve::Side;
 use crate::solve::Chain;
 
-const TEAM: Team = Team { benches: 60, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275 };
+const TEAM: Team =
+    Team { benches: 60, head_length: 3.41, body_length: 2.2, width: 0.3, hole_inset: 0.275, ends: Ends::NONE };
 
 fn paths() -> [Path; 3] {
     let route = Path::route(0.0).line(40.0).arc(Side::Left, 6.0, 0.25).line(12.0);
@@ -69,6 +70,30 @@ fn a_frame_does_not_depend_on_the_ones_before_and_past_the_table_the_safe_solver
     assert_eq!(table.fallbacks(), 1);
     table.solve(123.4, &mut again).unwrap();
     assert_eq!((first.x, first.y, first.heading), (again.x, again.y, again.heading));
+}
+
+#[test]
+fn a_tail_of_its_own_length_is_as_exact_in_every_format() {
+    for tail_length in [0.9, 4.1] {
+        let team = Team { ends: Ends { tail_length: Some(tail_length), ..Ends::NONE }, ..TEAM };
+        for path in paths() {
+            let newton = Newton::new(path.clone(), team, 1.0, Velocities::Computed);
+            let exact = FollowerTable::new(&path, team, 1.0, Velocities::Computed).unwrap();
+            let allowed = Allowed { place: 1e-4, heading: 1e-4, speed: 1e-3 };
+            let packed = FollowerTable::formats().into_iter().find_map(|format| exact.packed(format, allowed)).unwrap();
+            for (mut table, most) in [(exact.for_frames(), 1e-13), (packed.for_frames(), 1e-3)] {
+                let (mut found, mut wanted) = (Chain::new(team.handles()), Chain::new(team.handles()));
+                for time in (0..=200).map(f64::from) {
+                    table.solve(time, &mut found).unwrap();
+                    newton.solve_at(time, &mut wanted).unwrap();
+                    let [place, heading, speed] = differences(&found, &wanted);
+                    let allowed = 2.0 * f64::max(most, 8.0 * f64::EPSILON * time);
+                    assert!(place < allowed && heading < 10.0 * allowed && speed < 10.0 * allowed.max(1e-12));
+                }
+                assert_eq!(table.fallbacks(), 0);
+            }
+        }
+    }
 }
 
 #[test]

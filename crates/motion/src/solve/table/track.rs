@@ -1,8 +1,10 @@
 //! Places along a path relative to each other, to the last digit at any distance from the origin, and the step from a
 //! handle to the handle ahead.
 //!
-//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Frames do not use it, only
-//! the making of the table.
+//! In: a path and places on it. Out: displacements, places at a link's distance, [`Node`]s. Of frames only those of a
+//! team with a tail of its own length use it, besides the making of the table.
+
+use std::sync::Arc;
 
 use crate::linkage;
 use crate::model::Vector;
@@ -14,9 +16,11 @@ use crate::model::path::{Param, Path};
 #[derive(Debug)]
 pub(super) struct Track<'a> {
     pub path: &'a Path,
-    first: Vec<Coordinate>,
-    last: Vec<Coordinate>,
+    pub ends: Ends,
 }
+
+/// The first and the last coordinate of each segment. Shared, so that a frame makes a track without allocation.
+pub(super) type Ends = Arc<[[Coordinate; 2]]>;
 
 /// The place of one handle of a chain of equal links, and its change with alpha. Alpha is the number of links, with
 /// fraction, behind a fixed place of the chain.
@@ -46,9 +50,7 @@ const LAST_STEP: f64 = 1e-9;
 
 impl<'a> Track<'a> {
     pub(super) fn new(path: &'a Path) -> Self {
-        let segments = 0..path.segments();
-        let first = segments.clone().map(|segment| path.first(segment)).collect();
-        Self { path, first, last: segments.map(|segment| path.last(segment)).collect() }
+        Self { path, ends: (0..path.segments()).map(|segment| [path.first(segment), path.last(segment)]).collect() }
     }
 
     /// Returns the vector from one place to another, with a relative error of a few units in the last place.
@@ -57,8 +59,8 @@ impl<'a> Track<'a> {
             return -self.displacement(to, from);
         }
         if from.segment < to.segment {
-            let end = Param { segment: from.segment, at: self.last[from.segment] };
-            let next = Param { segment: from.segment + 1, at: self.first[from.segment + 1] };
+            let end = Param { segment: from.segment, at: self.ends[from.segment][1] };
+            let next = Param { segment: from.segment + 1, at: self.ends[from.segment + 1][0] };
             return self.displacement(from, end) + self.displacement(next, to);
         }
         self.path.segment(from).displacement(from.at, to.at)
@@ -77,10 +79,10 @@ impl<'a> Track<'a> {
             let by = left / rate;
             let ahead = metres > 0.0;
             let next = if ahead { place.segment + 1 } else { place.segment.wrapping_sub(1) };
-            let end = if ahead { self.last[place.segment] } else { self.first[place.segment] };
+            let end = if ahead { self.ends[place.segment][1] } else { self.ends[place.segment][0] };
             let over = (by - end.minus(place.at)) * rate;
-            if next < self.first.len() && over.abs() > 0.0 && (over > 0.0) == ahead {
-                let at = if ahead { self.first[next] } else { self.last[next] };
+            if next < self.ends.len() && over.abs() > 0.0 && (over > 0.0) == ahead {
+                let at = if ahead { self.ends[next][0] } else { self.ends[next][1] };
                 place = Param { segment: next, at };
                 left = over;
                 continue;
@@ -113,8 +115,8 @@ impl<'a> Track<'a> {
         let segment = self.path.segment(rear);
         let by = segment.ahead(rear.at, gap, link)?;
         let at = Param { at: rear.at.plus(by), ..rear };
-        let is_last = rear.segment + 1 == self.last.len();
-        let is_on_segment = is_last || segment.progress(self.last[rear.segment], at.at) <= 0.0;
+        let is_last = rear.segment + 1 == self.ends.len();
+        let is_on_segment = is_last || segment.progress(self.ends[rear.segment][1], at.at) <= 0.0;
         (by.is_finite() && segment.contains(at.at) && is_on_segment).then_some(at)
     }
 

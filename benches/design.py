@@ -1,0 +1,148 @@
+"""Times of the page of `design`: from a change to its picture and to its events.
+
+    cargo build --release
+    .venv/bin/python benches/design.py              # the table of docs/design-page.md
+    .venv/bin/python benches/design.py picture      # makes docs/design-page.jpg
+
+Uses the release build, Debian's Chromium without a graphics card, and Playwright, which tests/run installs. Everything
+runs on this machine, in one run. A change is a number that is typed into a field; its picture is on the canvas at the
+end of a pass of the page. A time includes the browser, the server and the way between them.
+"""
+
+import contextlib
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import time
+
+from playwright.sync_api import sync_playwright
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+PROGRAM = next(path for kind in ("release", "debug") if (path := ROOT / "target" / kind / "bench-dragon").exists())
+# A scene, a field of it, two values between which it changes, and the number of changes.
+SCENES = [
+    ("paper.toml", "path.pitch", (0.55, 0.551), 100),
+    ("square.toml", None, None, 60),
+    ("long.toml", None, None, 30),
+]
+EXACT = """() => {
+    const { session, picture } = design, lists = ["events", "facts"].map((id) => document.getElementById(id).dataset.state);
+    return picture.stage && !picture.coming && !session.inFlight && !session.waiting.length && lists.every((one) => one !== "computing");
+}"""
+
+
+@contextlib.contextmanager
+def design(scene):
+    child = subprocess.Popen([PROGRAM, "design", ROOT / "config" / scene, "--json", "--port", "0"], stdout=subprocess.PIPE, text=True)
+    try:
+        yield json.loads(child.stdout.readline())["url"], child.pid
+    finally:
+        child.kill()
+        child.wait()
+
+
+@contextlib.contextmanager
+def opened(url, **viewport):
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium")
+        page = browser.new_page(viewport=viewport or {"width": 1280, "height": 720})
+        page.set_default_timeout(120_000)
+        page.goto(url)
+        until(page, EXACT)
+        yield page
+
+
+def until(page, condition):
+    """Waits without the evaluation of strings in the page, which its policy refuses."""
+    while not page.evaluate(condition):
+        time.sleep(0.005)
+
+
+def percentile(times, share):
+    return sorted(times)[min(len(times) - 1, int(share * len(times)))]
+
+
+def one_by_one(page, name, values, count):
+    """Returns the times from each change to its picture, to its events and to its clearances, ms."""
+    for number in range(count):
+        page.evaluate("""([name, value]) => {
+            const box = document.querySelector(`[data-field="${name}"]`);
+            box.value = value;
+            box.dispatchEvent(new Event("input"));
+        }""", [name, values[number % 2]])
+        until(page, EXACT)
+    times = page.evaluate("[...design.session.times.values()]")[-count:]
+    return {what: [one[what] - one["began"] for one in times if what in one] for what in ("drawn", "events", "facts")}
+
+
+def flood(page, name, values, seconds=5):
+    """Changes a number at every pass of the page, 60 times a second; returns the ms until the last one is exact."""
+    return page.evaluate("""async ([name, [from, to], seconds]) => {
+        const box = document.querySelector(`[data-field="${name}"]`), begin = performance.now();
+        let count = 0;
+        while (performance.now() - begin < 1000 * seconds) {
+            box.value = from + (to - from) * ((performance.now() - begin) / 1000 / seconds);
+            box.dispatchEvent(new Event("input"));
+            count++;
+            await new Promise((next) => setTimeout(next, 1000 / 60));
+        }
+        const ended = performance.now(), isExact = EXACT;
+        while (!isExact()) await new Promise((next) => setTimeout(next, 1));
+        return [count, performance.now() - ended];
+    }""".replace("EXACT", EXACT), [name, list(values), seconds])
+
+
+def processor(pid):
+    """Returns the processor time of a process, s."""
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def stopped_search(page, pid):
+    """Returns the processor time that the server uses in the second after a search was stopped, ms."""
+    page.click("[data-plan=prove]")
+    time.sleep(0.3)
+    page.evaluate("document.getElementById('plan-stop').click()")
+    before = processor(pid)
+    time.sleep(1)
+    return 1000 * (processor(pid) - before)
+
+
+def field_of(page):
+    """Returns the first pitch, radius or length that can change, and two values."""
+    name, value = page.evaluate("""() => {
+        const one = design.scene.fields.find(({ name }) => /\\.(pitch|radius|length)$/.test(name) && !name.includes("obstacles"));
+        return [one.name, one.value];
+    }""")
+    return name, (value, round(value * 1.001, 6))
+
+
+def table():
+    print("| scene | picture p50 | p95 | events p50 | p95 | clearances p95 | exact after 5 s of 60 changes/s |")
+    print("|---|---|---|---|---|---|---|")
+    for scene, name, values, count in SCENES:
+        with design(scene) as (url, pid), opened(url) as page:
+            if name is None:
+                name, values = field_of(page)
+            times = one_by_one(page, name, values, count)
+            changes, last = flood(page, name, values)
+            row = [f"{statistics.median(times[what]):.0f} ms | {percentile(times[what], 0.95):.0f} ms" for what in ("drawn", "events")]
+            print(f"| `{scene}` | {' | '.join(row)} | {percentile(times['facts'], 0.95):.0f} ms | {last:.0f} ms ({changes} changes) |", flush=True)
+            if scene == "paper.toml":
+                stopped = stopped_search(page, pid)
+    print(f"\nProcessor time of the server in the second after a stopped proof: {stopped:.0f} ms.")
+    print(f"Load average: {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores.")
+
+
+def picture():
+    with design("village.toml") as (url, _), opened(url, width=1440, height=810) as page:
+        page.evaluate("document.getElementById('when').value = 95; document.getElementById('when').oninput()")
+        until(page, "() => design.picture.time > 90")
+        time.sleep(1)
+        page.screenshot(path=ROOT / "docs" / "design-page.jpg", type="jpeg", quality=80)
+
+
+picture() if sys.argv[1:] == ["picture"] else table()

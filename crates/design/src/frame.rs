@@ -1,0 +1,96 @@
+//! The picture of a scene at a time: its stage and its frame.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use bench_dragon_messages::state::EventKind;
+use bench_dragon_messages::{FrameHeader, HandlePose, Stage, StageMessage};
+use bench_dragon_motion::Method;
+use bench_dragon_motion::event::Event;
+use bench_dragon_motion::timeline::{TimedEvent, Timeline};
+use bench_dragon_show::convert::{Stamps, frame_header, handle_poses, stage_without_show};
+use bench_dragon_show::moments::Moments;
+use bench_dragon_show::scene::Scene;
+
+/// The time after which a search for the end of the motion gives up, while a page waits for its picture.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Returns the stage of a scene whose events are not known yet.
+pub fn stage(scene: &Scene, run: u64, end: f64) -> StageMessage {
+    let message = stage_without_show(&scene.ensemble, end, &[], &[]);
+    StageMessage { stage: Stage { run_id: run, ..message.stage }, ..message }
+}
+
+/// The frames of a scene.
+pub struct Frames {
+    /// The scene in exact motion.
+    exact: Scene,
+    moments: Moments,
+    run: u64,
+    /// The events that the frames know.
+    knowledge: Knowledge,
+}
+
+/// The events that the frames of a scene know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Knowledge {
+    /// The end of the path.
+    PathEnd,
+    /// Stalls, locks and the end of the path.
+    Singularities,
+    All,
+}
+
+impl Frames {
+    /// Creates the frames of a scene of a number. They are of exact motion, each follower bracketed, because a table
+    /// would take longer than the first frame. Without `timeline` they know no events.
+    pub fn new(scene: &Scene, run: u64, timeline: Option<Timeline>) -> Self {
+        // The paper's rules stay: only a change to them can fail.
+        let exact = scene.ensemble.try_map(|motion| match motion.method() {
+            Method::Paper(_) => Ok(motion.clone()),
+            _ => motion.with_method(Method::Newton),
+        });
+        let exact = Scene {
+            ensemble: exact.unwrap_or_else(|_| scene.ensemble.clone()),
+            // A clearance in each frame would cost more than the frame.
+            alerts: None,
+            ..scene.clone()
+        };
+        let knowledge = if timeline.is_some() { Knowledge::All } else { Knowledge::PathEnd };
+        let timeline = timeline.unwrap_or_else(|| path_end(&exact));
+        Self { moments: Moments::new(&exact, timeline), exact, run, knowledge }
+    }
+
+    /// Returns true if the states of the frames know all events.
+    pub fn know_all_events(&self) -> bool {
+        self.knowledge == Knowledge::All
+    }
+
+    /// Returns the frame at a time, or at the end of the motion before that, for the request of a number; `None`
+    /// without a solution.
+    pub fn at(&mut self, time: f64, id: u64) -> Option<(FrameHeader, Vec<HandlePose>)> {
+        if self.moments.frame(time).is_none() && self.knowledge == Knowledge::PathEnd {
+            // The motion ends earlier, with a lock.
+            self.knowledge = Knowledge::Singularities;
+            let until = Instant::now() + PATIENCE;
+            let mut progress =
+                |_| if Instant::now() < until { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+            let timeline = self.exact.ensemble.timeline_without_contact(&mut progress);
+            self.moments = Moments::new(&self.exact, timeline);
+        }
+        let frame = self.moments.frame(time)?;
+        let stamps = Stamps { run_id: self.run, sequence: id, stamp_ns: 0, deadline_ns: 0 };
+        Some((frame_header(frame, stamps), handle_poses(&frame.chain).collect()))
+    }
+}
+
+/// Returns the timeline of a motion of which nothing but the length of the path is known.
+fn path_end(scene: &Scene) -> Timeline {
+    let ends = scene.ensemble.dragons().iter().map(|dragon| {
+        let travelled = dragon.motion.path().length();
+        (dragon.delay + dragon.motion.time_at(travelled), travelled)
+    });
+    let (time, travelled) = ends.max_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or_default();
+    let event = Event { kind: EventKind::PathEnd, travelled, bench_a: None, bench_b: None, place: None };
+    Timeline::new(vec![TimedEvent { event, time }], None)
+}

@@ -1,0 +1,78 @@
+// The searches: least pitch, least turn, greatest speed, proof. In: clicks, progress and answers. Out: requests; a text
+// that the user uses.
+
+const element = (id) => document.getElementById(id);
+
+export class Plans {
+  /** `session` sends requests; `use` is called with the text of a result. */
+  constructor(session, use) {
+    Object.assign(this, { session, use, running: null, text: null, varied: null });
+    for (const button of document.querySelectorAll("[data-plan]")) button.onclick = () => this.start(button);
+    element("plan-stop").onclick = () => this.stop();
+    element("plan-use").onclick = () => {
+      const { text } = this;
+      this.clear();
+      use(text);
+    };
+    element("plan-discard").onclick = () => this.clear();
+    this.clear();
+    this.vary(null);
+  }
+
+  start(button) {
+    if (this.running !== null) this.stop();
+    if (!this.session.isOpen) return;
+    this.clear();
+    const { plan } = button.dataset;
+    this.running = this.session.send(plan === "fit" ? { plan, vary: [this.varied] } : { plan });
+    this.put(`${button.textContent} …`, { isRunning: true });
+    element("plan-progress").removeAttribute("value");
+  }
+
+  /** Names the field that a fit changes: the one that was used last. */
+  vary(name) {
+    this.varied = name;
+    const fit = element("plan-fit");
+    fit.disabled = name === null;
+    fit.textContent = name === null ? "Fit" : `Fit ${name}`;
+  }
+
+  stop() {
+    if (this.running !== null && this.session.isOpen) this.session.send({ cancel: true });
+    this.clear("Stopped.");
+  }
+
+  progress(id, share) {
+    if (id === this.running) element("plan-progress").value = share;
+  }
+
+  /** Shows a result; with a text it can be used. */
+  result(id, { sentence, status, list }, text) {
+    if (id !== this.running) return;
+    this.running = null;
+    this.text = text;
+    const lines = [sentence ?? status ?? "No result.", ...(list ?? []).map((one) => one.sentence ?? "")];
+    this.put(lines.filter(Boolean).join("\n"), { hasText: text !== null, isDone: true });
+  }
+
+  /** Shows the reason of a refusal. Returns true for the running search. */
+  refuse(id, { sentence }) {
+    if (id !== this.running) return false;
+    this.running = null;
+    this.put(sentence, { isDone: true });
+    return true;
+  }
+
+  /** A search of an earlier text is over. */
+  clear(sentence = "") {
+    this.running = this.text = null;
+    this.put(sentence, {});
+  }
+
+  put(sentence, { isRunning = false, isDone = false, hasText = false }) {
+    element("plan-answer").textContent = sentence;
+    element("plan-progress").hidden = element("plan-stop").hidden = !isRunning;
+    element("plan-use").hidden = !hasText;
+    element("plan-discard").hidden = !isDone;
+  }
+}

@@ -1,0 +1,75 @@
+//! Ctrl-C during a search: the command prints what it knows, says that it was stopped, and exits with 1.
+
+use std::fs::read_to_string;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use nix::sys::signal::Signal::SIGINT;
+use serde_json::Value;
+
+use crate::harness::{Process, json_lines, text, wait_until};
+
+/// The bit of SIGINT in a mask of signals (proc(5), SigCgt).
+const SIGINT_BIT: u64 = 1 << (SIGINT as u64 - 1);
+
+/// Writes a scene whose searches take long: a team of 100,000 benches.
+fn long_scene(folder: &Path) -> String {
+    let paper = read_to_string("config/paper.toml").unwrap();
+    let long = paper.replace("benches = 223", "benches = 100_000").replace("start_turn = 16", "start_turn = 400");
+    let file = folder.join("long.toml");
+    std::fs::write(&file, long).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+/// Starts a command, and interrupts it as soon as it handles the signal.
+fn interrupted(arguments: &[&str]) -> Output {
+    let process = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments));
+    let status = format!("/proc/{}/status", process.id());
+    wait_until("the command handles SIGINT", || {
+        let status = read_to_string(&status).unwrap();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+        u64::from_str_radix(caught.trim(), 16).unwrap() & SIGINT_BIT != 0
+    });
+    process.signal(SIGINT);
+    let output = process.output();
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {told}");
+    assert!(told.contains("stopped by a signal"), "{arguments:?}: {told}");
+    output
+}
+
+#[test]
+fn an_interrupted_search_says_how_far_it_came() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = long_scene(folder.path());
+    let events = interrupted(&["events", &scene]);
+    assert!(text(&events.stderr).contains("the search for events was stopped: searched up to t = "));
+    let told = text(&events.stdout);
+    assert!(told.contains("There is no contact up to t = ") && told.contains("where the search was stopped"), "{told}");
+    assert!(!told.contains("path_end") && !told.contains("least clearance"), "{told}");
+    assert_eq!(text(&interrupted(&["events", "--json", &scene]).stdout), "", "no event is known");
+    assert!(!text(&interrupted(&["check", &scene]).stdout).contains("path_end"));
+    // A table that ends early must not look complete.
+    let file = folder.path().join("table.csv");
+    interrupted(&["solve", &scene, "--at", "contact", "-o", file.to_str().unwrap()]);
+    assert!(!file.exists());
+}
+
+#[test]
+fn an_interrupted_plan_prints_what_is_proved() {
+    let output = interrupted(&["plan", "pitch", "--reach-radius", "4.5", "--json"]);
+    let [line] = &json_lines(&output)[..] else { panic!("{}", text(&output.stdout)) };
+    assert_eq!((&line["plan"], &line["status"], &line["value_hi"]), (&"pitch".into(), &"stopped".into(), &Value::Null));
+    let turn = interrupted(&["plan", "turn", "config/turnaround.toml"]);
+    assert!(text(&turn.stdout).contains("the search was stopped"), "{}", text(&turn.stdout));
+}
+
+#[test]
+fn a_second_signal_ends_the_command_at_once() {
+    let process = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["trade", "config/paper.toml"]));
+    let status = format!("/proc/{}/status", process.id());
+    wait_until("two signals end it", || {
+        process.signal(SIGINT);
+        read_to_string(&status).is_ok_and(|status| status.contains("State:\tZ"))
+    });
+}
