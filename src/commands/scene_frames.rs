@@ -7,16 +7,14 @@ use bench_dragon::outputs::view::SceneFrames;
 use bench_dragon::show::convert::{Stamps, frame_header, handle_poses};
 use bench_dragon::show::moments::Moments;
 use bench_dragon::show::scene::Scene;
-use nix::libc;
 
 /// The nice value of the thread that computes: a publisher on this machine comes first.
 const NICE: i32 = 10;
 
 /// Opens the scene with this text, and lowers the priority of the calling thread; `None` for a text that is no scene.
 pub fn scene_frames(text: &str) -> Option<Box<dyn SceneFrames>> {
-    // SAFETY: changes the priority of this thread alone (setpriority(2), "C library/kernel differences"), reads no
-    // memory. A failure leaves the priority as it is.
-    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
+    // Of this thread alone: setpriority(2), "C library/kernel differences". Where it fails, the priority stays.
+    let _ = rustix::process::setpriority_process(None, NICE);
     let scene = Scene::parse(text, "the scene of the show", "show").ok()?;
     let timeline = scene.ensemble.timeline_without_contact(&mut unreported);
     Some(Box::new(Frames(Moments::new(&scene, timeline))))

@@ -1,6 +1,7 @@
 //! Ctrl-C during a search: the command prints what it knows, says that it was stopped, and exits with 1.
 
 use std::fs::read_to_string;
+use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -21,15 +22,20 @@ fn long_scene(folder: &Path) -> String {
     file.to_str().unwrap().to_owned()
 }
 
-/// Starts a command, and interrupts it as soon as it handles the signal.
-fn interrupted(arguments: &[&str]) -> Output {
-    let process = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments));
+/// Waits until a process handles the signal.
+fn handles_interrupts(process: &Process) {
     let status = format!("/proc/{}/status", process.id());
     wait_until("the command handles SIGINT", || {
         let status = read_to_string(&status).unwrap();
         let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
         u64::from_str_radix(caught.trim(), 16).unwrap() & SIGINT_BIT != 0
     });
+}
+
+/// Starts a command, and interrupts it as soon as it handles the signal.
+fn interrupted(arguments: &[&str]) -> Output {
+    let process = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments));
+    handles_interrupts(&process);
     process.signal(SIGINT);
     let output = process.output();
     let told = text(&output.stderr);
@@ -67,9 +73,11 @@ fn an_interrupted_plan_prints_what_is_proved() {
 #[test]
 fn a_second_signal_ends_the_command_at_once() {
     let process = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["trade", "config/paper.toml"]));
+    handles_interrupts(&process);
     let status = format!("/proc/{}/status", process.id());
     wait_until("two signals end it", || {
         process.signal(SIGINT);
         read_to_string(&status).is_ok_and(|status| status.contains("State:\tZ"))
     });
+    assert_eq!(process.output().status.signal(), Some(SIGINT as i32));
 }

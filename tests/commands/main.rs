@@ -8,7 +8,7 @@ mod design;
 mod draw;
 mod files;
 mod first_scene;
-
+mod fit;
 mod ground;
 mod hard_scenes;
 #[path = "../harness/mod.rs"]

@@ -1,6 +1,7 @@
 //! Searches that the receiver of their progress stops: their results are a part of the whole result, and say that they
 //! are a part.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -34,6 +35,7 @@ fn stopped<T>(mut search: impl FnMut(Progress<'_>) -> T, mut check: impl FnMut(&
         check(&whole, search(&mut progress));
         // The searches of a part end at their first answers; a golden section ends its few steps.
         assert!(done <= most + 2_000, "{done} calls, stopped after {most}");
+        assert!(share > 0.2 || done < calls, "{done} of {calls} calls, stopped after {most}");
     }
     whole
 }
@@ -68,7 +70,10 @@ fn events_are_complete_up_to_where_the_search_came() {
 
 fn stopped_without_contact(ensemble: &bench_dragon::motion::ensemble::Ensemble) {
     let part = ensemble.timeline_without_contact(&mut |_| ControlFlow::Break(()));
-    assert!(part.is_stopped() && part.searched_until().is_some());
+    let whole = ensemble.timeline_without_contact(&mut unreported);
+    let until = part.searched_until().unwrap();
+    assert!(part.is_stopped());
+    assert_eq!(up_to(&part.all(), until), up_to(&whole.all(), until));
 }
 
 #[test]
@@ -76,8 +81,10 @@ fn a_least_clearance_is_the_least_up_to_where_the_search_came_or_none() {
     for text in scenes() {
         let ensemble = text.parse().unwrap().ensemble;
         let timeline = ensemble.timeline(&mut unreported);
+        let known = Cell::new(0);
         let check = |whole: Option<TimedClearance>, part: Option<TimedClearance>| {
             let (Some(part), Some(whole)) = (part, whole) else { return };
+            known.set(known.get() + 1);
             assert!(part == whole || part.searched_until.is_some_and(|until| until < timeline.end().time), "{part:?}");
             assert!(part.least.value >= whole.least.value, "{part:?} {whole:?}");
             // The place of the whole show's least clearance is left out only by a search that has not come to it.
@@ -92,6 +99,7 @@ fn a_least_clearance_is_the_least_up_to_where_the_search_came_or_none() {
                 check(whole.of_show, part.of_show);
             },
         );
+        assert!(known.get() > 0, "{}", text.text);
         if !ensemble.ground().is_empty() {
             stopped(
                 |progress| ensemble.obstacle_clearances(timeline.end(), progress),
@@ -165,6 +173,8 @@ fn plans_enclose_no_more_than_they_have_proved() {
             },
         );
     }
+    // One step suffices for the paper's scene.
+    let scene = SceneText::load(Path::new("config/turnaround.toml")).unwrap().parse().unwrap();
     let timeline = scene.ensemble.timeline(&mut unreported);
     stopped(
         |progress| greatest_speed(&scene, &timeline, 2.0, progress).unwrap(),

@@ -337,7 +337,7 @@ fn too_little_shared_memory_is_refused_with_figures() {
     let place = Place::new("small");
     for size in ["100k", "1m", "6m"] {
         let printed = refusal(&with_shared_memory(&place, size, "exec \"$PROGRAM\" run --json --duration 1"));
-        for part in ["/dev/shm", "7333888 bytes", "publish.queue", "publish.subscribers"] {
+        for part in ["/dev/shm", "7347712 bytes", "publish.queue", "publish.subscribers"] {
             assert!(printed.contains(part), "{printed}");
         }
     }

@@ -18,22 +18,15 @@ import threading
 import time
 
 from chromium import be_patient, browser as chromium
+from show_process import ShowProcess
 
 # No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 550
 CONTACT = 412.473837682115
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
-
-
-@contextlib.contextmanager
-def started(*arguments):
-    child = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdout=subprocess.PIPE, text=True)
-    try:
-        yield child
-    finally:
-        child.kill()
-        child.wait()
+SHOW = ShowProcess(PROGRAM, NAME)
+started, state, until = SHOW.started, SHOW.state, SHOW.until
 
 
 @contextlib.contextmanager
@@ -49,12 +42,6 @@ def server(*arguments):
         yield json.loads(child.stdout.readline())
 
 
-def state():
-    """Returns the state of the show, or None if no publisher runs."""
-    asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
-    return json.loads(asked.stdout) if asked.returncode == 0 else None
-
-
 def opened(browser, url):
     page = browser.new_context(viewport={"width": 1280, "height": 720}).new_page()
     # Another test's processes can hold a page up for longer than Playwright's 30 s.
@@ -65,15 +52,6 @@ def opened(browser, url):
     page.goto(url)
     until(lambda: page.evaluate("picture.drawn > 0"), "a picture")
     return page
-
-
-def until(condition, what, seconds=120):
-    """Returns the value of a condition as soon as it is true."""
-    deadline = time.monotonic() + seconds
-    while not (value := condition()):
-        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
-        time.sleep(0.05)
-    return value
 
 
 def bar_is_shown(page):

@@ -17,7 +17,7 @@ from by_design import opaque
 # Three numbers of eight bytes and two of four come before the hash. After it stand four lists, each with its length and
 # room for dragons, obstacles, events and cues.
 HASH = slice(3 * 8 + 2 * 4, 3 * 8 + 2 * 4 + 32)
-SIZE = HASH.stop + (8 + 16 * 128) + (8 + 65 * 88) + (8 + 160 * 24) + (8 + 32 * 80)
+SIZE = HASH.stop + (8 + 16 * 152) + (8 + 65 * 88) + (8 + 160 * 24) + (8 + 32 * 80)
 
 
 def main():
@@ -28,7 +28,7 @@ def main():
     iox2.set_log_level(iox2.LogLevel.Fatal)
     node = iox2.NodeBuilder.new().signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
     service = node.service_builder(iox2.ServiceName.new(f"{arguments.name}/stage"))
-    service = service.publish_subscribe(iox2.Slice[opaque("StageSegment", 6, 72)]).user_header(opaque("Stage", 6, SIZE))
+    service = service.publish_subscribe(iox2.Slice[opaque("StageSegment", 6, 72)]).user_header(opaque("Stage", 7, SIZE))
     deadline = time.monotonic() + 60
     while True:
         try:

@@ -17,21 +17,14 @@ import time
 import numpy as np
 
 from chromium import be_patient, browser as chromium
+from show_process import ShowProcess
 
 # No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 550
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
-
-
-@contextlib.contextmanager
-def started(*arguments):
-    child = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdout=subprocess.PIPE, text=True)
-    try:
-        yield child
-    finally:
-        child.kill()
-        child.wait()
+SHOW = ShowProcess(PROGRAM, NAME)
+started, state, until = SHOW.started, SHOW.state, SHOW.until
 
 
 @contextlib.contextmanager
@@ -40,21 +33,6 @@ def served(*arguments, control=()):
         until(state, "a publisher")
         with started("view", "--json", "--port", "0", *control) as server:
             yield json.loads(server.stdout.readline())["url"]
-
-
-def state():
-    """Returns the state of the show, or None if no publisher runs."""
-    asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
-    return json.loads(asked.stdout) if asked.returncode == 0 else None
-
-
-def until(condition, what, seconds=120):
-    """Returns the value of a condition as soon as it is true."""
-    deadline = time.monotonic() + seconds
-    while not (value := condition()):
-        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
-        time.sleep(0.05)
-    return value
 
 
 def opened(browser, url, complaints):
@@ -86,6 +64,11 @@ def shows(page, at):
     assert handles.shape == truth.shape and (handles.view(np.uint32) == truth.view(np.uint32)).all(), f"{at} s"
 
 
+def address(page):
+    """Returns the page's address. Playwright's own is that of the latest event of navigation, which may be missing."""
+    return page.evaluate("location.href")
+
+
 def number(page, name):
     return float(page.evaluate(f"document.getElementById('scrub-line').{name}"))
 
@@ -108,7 +91,7 @@ def contrast(page, front, back):
 
 def thumb_shows_another_time():
     complaints = []
-    with served("--start", "50") as url, chromium() as browser:
+    with served("--start", "50", "--time-scale", "0.2") as url, chromium() as browser:
         page = opened(browser, url, complaints)
         until(lambda: not page.evaluate("document.getElementById('scrub').hidden"), "the second thumb")
         assert page.evaluate("document.getElementById('conduct').hidden"), "there is no --control"
@@ -120,8 +103,9 @@ def thumb_shows_another_time():
         for share in (0.55, 0.6, 0.7):
             page.mouse.move(box["x"] + box["width"] * share, box["y"] + box["height"] / 2)
         page.mouse.up()
-        at = until(lambda: (found := re.search(r"#at=([\d.]+)$", page.url)) and found.group(1), "the address")
-        assert abs(float(at) / end - 0.7) < 0.05, (at, end)
+        reached = lambda: (found := re.search(r"#at=([\d.]+)$", address(page))) and abs(float(found.group(1)) / end - 0.7) < 0.05
+        until(reached, "the address")
+        at = re.search(r"#at=([\d.]+)$", address(page)).group(1)
         shows(page, at)
         assert words(page) == f"t = {float(at):.1f} s, not live" and page.is_visible("#live")
         frame = page.evaluate("getComputedStyle(document.querySelector('main'), '::after').borderTopWidth")
@@ -142,13 +126,13 @@ def thumb_shows_another_time():
         assert "10 s before" in told and "10 s after" in told and any(one.startswith("contact at 412.5") for one in told if one), told
         page.click("#live")
         until(lambda: shown(page) is None and not page.is_visible("#scrubbed"), "Live")
-        until(lambda: "#at" not in page.url, "the address is the live one's")
+        until(lambda: "#at" not in address(page), "the address is the live one's")
         assert not complaints, complaints
 
 
 def address_and_keys():
     complaints = []
-    with served("--start", "50", control=("--control",)) as url, chromium() as browser:
+    with served("--start", "50", "--time-scale", "0.2", control=("--control",)) as url, chromium() as browser:
         page = opened(browser, url + "#dark&at=300", complaints)
         shows(page, "300")
         assert words(page) == "t = 300.0 s, not live"
@@ -165,7 +149,7 @@ def address_and_keys():
         page.keyboard.press("End")
         end = number(page, "max")
         until(lambda: shown(page) and abs(shown(page)[0] - end) < 1e-3, "the end")
-        until(lambda: re.search(r"#dark&at=412\.474$", page.url), "the address keeps its other words")
+        until(lambda: re.search(r"#dark&at=412\.474$", address(page)), "the address keeps its other words")
         # The next Tab reaches Live.
         page.focus("#live")
         page.keyboard.press("Enter")
@@ -174,7 +158,7 @@ def address_and_keys():
         page.keyboard.press("ArrowRight")
         until(lambda: shown(page), "a key leaves the live picture")
         page.keyboard.press("Escape")
-        until(lambda: shown(page) is None and page.url.endswith("#dark"), "Escape")
+        until(lambda: shown(page) is None and address(page).endswith("#dark"), "Escape")
         show = state()
         assert show["playback"] == "playing" and 50 < show["sim_time"] < 250, f"the show got a command: {show}"
         for theme in ("dark", "light"):
@@ -189,7 +173,8 @@ def address_and_keys():
         # An audience sees the live show.
         for look in ("show", "seat"):
             page = opened(browser, url + f"#{look}&at=300", complaints)
-            time.sleep(0.5)
+            passed = page.evaluate("picture.passes")
+            until(lambda: page.evaluate("picture.passes") >= passed + 3, "passes of the page")
             assert shown(page) is None and not page.is_visible("#scrubbed") and not page.is_visible("#scrub"), look
             page.close()
         assert not complaints, complaints

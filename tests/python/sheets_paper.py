@@ -36,8 +36,7 @@ FAULTS = """() => {
     for (const word of section.querySelectorAll("svg.map text:not(.rim)")) {
       const box = word.getBoundingClientRect();
       const inside = box.left >= frame.left - 1 && box.right <= frame.right + 1 && box.bottom <= frame.bottom + 4;
-      // The stage's words are used in each map.
-      if (!word.closest("symbol") && !inside) faults.push(`section ${k}: ${word.textContent} leaves the map`);
+      if (!inside) faults.push(`section ${k}: ${word.textContent} leaves the map`);
     }
     if (own.width === 0) faults.push(`section ${k} is not shown`);
   }

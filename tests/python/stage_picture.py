@@ -25,6 +25,7 @@ import numpy
 
 import chromium
 from chromium import at_rest
+from show_process import ShowProcess
 
 TRUTH = pathlib.Path(__file__).resolve().parents[1] / "truth" / "paper_scene_exact.csv"
 CONTACT = 412.473837682115
@@ -34,16 +35,7 @@ WATCHDOG = 550
 STILL = ["--start", "300", "--time-scale", "1e-6"]
 
 _, SCENARIO, PROGRAM, NAME = sys.argv
-
-
-@contextlib.contextmanager
-def started(*arguments):
-    child = subprocess.Popen([PROGRAM, "--name", NAME, *arguments], stdout=subprocess.PIPE, text=True)
-    try:
-        yield child
-    finally:
-        child.kill()
-        child.wait()
+started = ShowProcess(PROGRAM, NAME).started
 
 
 def publisher(*arguments):

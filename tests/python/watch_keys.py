@@ -8,7 +8,6 @@ Starts a publisher of SCENE under the service name NAME, and reads its state wit
 
 import contextlib
 import fcntl
-import json
 import os
 import pty
 import signal
@@ -19,11 +18,15 @@ import termios
 import threading
 import time
 
+from show_process import ShowProcess
+
 # No wait here may last forever; an alarm still ends everything that was started.
 WATCHDOG = 550
 LEFT, RIGHT = "\x1b[D", "\x1b[C"
 
 _, SCENARIO, PROGRAM, NAME, SCENE = sys.argv
+SHOW = ShowProcess(PROGRAM, NAME)
+state, until = SHOW.state, SHOW.until
 
 
 @contextlib.contextmanager
@@ -36,20 +39,6 @@ def publisher(*arguments):
     finally:
         child.kill()
         child.wait()
-
-
-def state():
-    """Returns the state of the show, or None if no publisher runs."""
-    asked = subprocess.run([PROGRAM, "--name", NAME, "--json", "control", "state"], capture_output=True)
-    return json.loads(asked.stdout) if asked.returncode == 0 else None
-
-
-def until(condition, what, seconds=120):
-    deadline = time.monotonic() + seconds
-    while not (value := condition()):
-        assert time.monotonic() < deadline, f"{what}: not within {seconds} s; the show: {state()}"
-        time.sleep(0.02)
-    return value
 
 
 class Watch:

@@ -102,9 +102,9 @@ pub enum FeedEvent<'a> {
 /// A publisher and its subscriber, here in one process:
 ///
 /// ```
-/// use bench_dragon_motion::event::unreported;
 /// use std::time::Duration;
 ///
+/// use bench_dragon_motion::event::unreported;
 /// use bench_dragon_publisher::live::{Outgoing, Publisher};
 /// use bench_dragon_show::scene::Scene;
 /// use bench_dragon_show::{Playback, Show};

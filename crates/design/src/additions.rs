@@ -11,6 +11,7 @@ use crate::handles::arc_through;
 use crate::request::Addition;
 use crate::scene::{DesignedScene, Fault};
 use crate::tables::{Path, table};
+use bench_dragon_messages::MOST_OBSTACLES;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::{Point, Vector};
 use bench_dragon_show::scene::MOST_DRAGONS;
@@ -53,6 +54,10 @@ pub fn remove(scene: &DesignedScene, name: &str) -> Result<String, Fault> {
 /// # Errors
 /// [`Fault`] for a text without polygons.
 pub fn add_polygons(scene: &DesignedScene, polygons: Vec<(Option<String>, Vec<Point>)>) -> Result<String, Fault> {
+    if polygons.len() > MOST_OBSTACLES {
+        let sentence = format!("the file has {} polygons, expected at most {MOST_OBSTACLES}", polygons.len());
+        return Err(sentence.into());
+    }
     let mut document = document(&scene.text)?;
     let mut names = names(scene);
     for (name, corners) in polygons {

@@ -144,7 +144,11 @@ impl Search<'_> {
         if !self.is_wanted() {
             return;
         }
-        let gave_up = timeline.is_stopped() || least.is_stopped;
+        let gave_up = timeline.searched_until().is_some()
+            || least.is_stopped
+            || least.of_show.is_some_and(|found| found.searched_until.is_some())
+            || beside.len() < scene.ensemble.ground().obstacles().len()
+            || beside.iter().any(|found| found.searched_until.is_some());
         let searched = Searched { timeline: &timeline, boards: least.of_show, obstacles: &beside, gave_up: "gave up" };
         let lines = clearance_lines(scene, &timeline, &least, &beside);
         let lines = lines.iter().map(|line| json!(line));

@@ -91,7 +91,7 @@ impl Rules {
         let ensemble = &scene.ensemble;
         let timeline = ensemble.timeline_without_contact(&mut |share| progress(0.1 * share));
         let end = timeline.end();
-        if progress(0.1).is_break() {
+        if progress(0.1).is_break() || timeline.searched_until().is_some() {
             return None;
         }
         let mut parts = Vec::new();
@@ -108,6 +108,11 @@ impl Rules {
         if found.is_stopped {
             return None;
         }
+        let dragons = ensemble.dragons();
+        let can_meet = dragons.len() > 1 || dragons.iter().any(|dragon| dragon.motion.team().benches > 2);
+        if can_meet && found.of_show.is_none() {
+            return None;
+        }
         if let Some(found) = found.of_show {
             found.searched_until.is_none().then_some(())?;
             let benches = (found.least.bench_a, Some(found.least.bench_b));
@@ -120,6 +125,9 @@ impl Rules {
             stopped |= flow == ControlFlow::Break(());
             flow
         });
+        if beside.len() < ensemble.ground().obstacles().len() {
+            return None;
+        }
         let kept = |number: usize| self.applies_to(&ensemble.ground().obstacles()[number]);
         for found in beside.iter().filter(|found| kept(found.obstacle)) {
             found.searched_until.is_none().then_some(())?;
@@ -131,8 +139,8 @@ impl Rules {
 
     /// Returns the margins at samples. Ends early with what it has once the least margin is not above `floor`: more
     /// samples do not raise it. `None` for a scene whose motion cannot be computed.
-    pub fn sampled(&self, scene: &Scene, floor: f64) -> Option<Judgement> {
-        Sampler::new(scene, *self)?.judgement(floor)
+    pub fn sampled(&self, scene: &Scene, floor: f64, is_stopped: &mut dyn FnMut() -> bool) -> Option<Judgement> {
+        Sampler::new(scene, *self)?.judgement(floor, is_stopped)
     }
 }
 
@@ -183,7 +191,7 @@ impl Sampler {
         !solved || boundary.is_none_or(|boundary| boards.iter().all(|(_, _, board)| boundary.clearance(board) >= 0.0))
     }
 
-    fn judgement(mut self, floor: f64) -> Option<Judgement> {
+    fn judgement(mut self, floor: f64, is_stopped: &mut dyn FnMut() -> bool) -> Option<Judgement> {
         let end = duration(&self.ensemble);
         let fastest = self.ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).fold(0.0, f64::max);
         let samples = (end * fastest / STEP).clamp(1.0, MOST_SAMPLES).ceil();
@@ -191,6 +199,9 @@ impl Sampler {
         let mut parts: Vec<Part> = Vec::new();
         for sample in 0..=samples as usize {
             let time = end * sample as f64 / samples;
+            if is_stopped() {
+                return None;
+            }
             // The last sample is the end of the path, which rounding may put past it.
             if solve_at_or_just_before(solver.as_mut(), time, &mut self.chain).is_err() {
                 let margin = LOCKED - left(&self.ensemble, time);
@@ -271,7 +282,8 @@ mod tests {
         for text in [include_str!("../../../config/village.toml"), include_str!("../../../config/square.toml")] {
             let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
             let rules = Rules::new(&scene, 0.2);
-            let (exact, sampled) = (rules.exact(&scene, &mut unreported), rules.sampled(&scene, f64::NEG_INFINITY));
+            let (exact, sampled) =
+                (rules.exact(&scene, &mut unreported), rules.sampled(&scene, f64::NEG_INFINITY, &mut || false));
             let (exact, sampled) = (exact.unwrap(), sampled.unwrap());
             assert_eq!(exact.parts.len(), sampled.parts.len(), "{exact:?} {sampled:?}");
             for part in &exact.parts {

@@ -248,7 +248,9 @@ impl Search<'_, '_> {
     /// Returns the cost of a place at samples; `None` once the search is stopped.
     fn sampled(&self, place: &[f64], floor: f64) -> Option<f64> {
         self.report()?;
-        let judgement = self.scene(&self.values(place)).and_then(|scene| self.rules.sampled(&scene, floor));
+        let judgement = self
+            .scene(&self.values(place))
+            .and_then(|scene| self.rules.sampled(&scene, floor, &mut || self.told(self.done()).is_break()));
         let cost = judgement.map_or(REFUSED, |judgement| cost(&judgement));
         let mut state = self.state.borrow_mut();
         state.judged.0 += 1;
@@ -265,7 +267,9 @@ impl Search<'_, '_> {
         let Some(scene) = self.scene(&values) else { return Some(REFUSED) };
         let best = self.state.borrow().best.as_ref().map_or(f64::INFINITY, |best| cost(&best.judgement));
         self.state.borrow_mut().judged.0 += 1;
-        let bound = self.rules.sampled(&scene, f64::NEG_INFINITY).map_or(REFUSED, |judgement| cost(&judgement));
+        let mut is_stopped = || self.told(self.done()).is_break();
+        let bound = self.rules.sampled(&scene, f64::NEG_INFINITY, &mut is_stopped);
+        let bound = bound.map_or(REFUSED, |judgement| cost(&judgement));
         if bound >= best {
             return Some(bound);
         }
@@ -307,10 +311,11 @@ impl Search<'_, '_> {
     fn finish(self) -> Result<Fitted, FitError> {
         let mut state = self.state.borrow_mut();
         let (refusal, best) = (state.refusal.take(), state.best.take());
-        let (given, judged) = (std::mem::take(&mut state.given), state.judged);
+        let (given, judged, stopped) = (std::mem::take(&mut state.given), state.judged, state.stopped);
         drop(state);
         let (values, judgement) = match best {
             Some(best) => (best.values, best.judgement),
+            None if stopped => return Err(FitError::GaveUp),
             None => {
                 let (cost, place) = given.first().cloned().ok_or(FitError::GaveUp)?;
                 let values = self.values(&place);

@@ -66,8 +66,7 @@ impl Singularities {
         let trace = |link: usize, start| LinkTrace::new(Link { path, length: team.link(link) }, start);
         let traces = trace(0, Some(0.0)).and_then(|head| {
             let body = if team.benches > 1 { Some(trace(1, None)?) } else { None };
-            let own_tail = team.own_tail().filter(|tail| team.link(*tail) != team.link(1));
-            let tail = own_tail.map(|tail| trace(tail, None)).transpose()?;
+            let tail = team.own_tail_link().map(|tail| trace(tail, None)).transpose()?;
             Ok((head, body, tail))
         });
         let Ok((head, body, tail)) = traces else {

@@ -103,6 +103,10 @@ impl Together {
             if !is_in_span(scene, heads[k], &from, &to) {
                 return Err(format!("head {k} of the two may be outside its span"));
             }
+            // A run of boards of one size begins behind the head.
+            if spans[k].is_empty() {
+                return Err("no span is listed".to_owned());
+            }
             let chain = Chain::check(scene, heads[k], spans[k])?;
             let on_stage = |capsule: &Capsule| capsule.placed(&scene.frame);
             together.links += chain.products.len() as u64;

@@ -276,7 +276,7 @@ impl HasStamp for MarkerArray {
 
 /// Returns the width of the widest board, in metres: signs and words have its size.
 fn greatest_width(stage: &Stage) -> f64 {
-    stage.dragons.iter().map(|dragon| dragon.width).fold(0.0, f64::max)
+    stage.dragons.iter().flat_map(|dragon| [dragon.head_width, dragon.width, dragon.tail_width]).fold(0.0, f64::max)
 }
 
 /// Returns the markers of the obstacles: the outlines, the keep-outs and the names.

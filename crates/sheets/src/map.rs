@@ -107,8 +107,9 @@ impl Map {
         format!(
             "<svg width=\"0\" height=\"0\" style=\"position:absolute\"><defs><clipPath id=\"frame\"><rect \
              width=\"{WIDTH}\" height=\"{height}\"/></clipPath><g id=\"stage\" clip-path=\"url(#frame)\"><g \
-             transform=\"{transform}\">{obstacles}</g>{ways}<g font-size=\"{SIZE}\">{names}</g><path d=\"M{left} {bottom}H{right}m0 -5v10M{left} \
-             {bottom}m0 -5v10\" stroke=\"#000\" stroke-width=\"1.5\"/><g font-size=\"{SIZE}\">{scale}{north}</g><path \
+             transform=\"{transform}\">{obstacles}</g>{ways}<g font-size=\"{SIZE}\">{names}</g><path \
+             d=\"M{left} {bottom}H{right}m0 -5v10M{left} {bottom}m0 -5v10\" stroke=\"#000\" stroke-width=\"1.5\"/><g \
+             font-size=\"{SIZE}\">{scale}{north}</g><path \
              d=\"M{x} 24l-5 13h10z\"/></g></defs></svg>\n",
             height = rounded(self.height(), 2),
             transform = camera.transform(),

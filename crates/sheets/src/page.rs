@@ -37,19 +37,7 @@ const WAY: [f64; 4] = [22.0, 6.0, 51.0, 53.0];
 const CALLS: [f64; 4] = [22.0, 6.0, 66.0, 38.0];
 const TEAM: [f64; 4] = [11.0, 30.0, 43.0, 48.0];
 
-const STYLE: &str = "@page{size:148mm 210mm;margin:8mm}*{box-sizing:border-box}body{margin:0;background:#fff;color:#000;\
-font:8.3pt/3.6mm Arial,\"Liberation Sans\",\"Noto Sans CJK SC\",\"Source Han Sans SC\",\"PingFang SC\",\"Microsoft YaHei\",sans-serif}\
-section{width:132mm;height:193mm;break-after:page;display:flex;flex-direction:column;overflow:hidden}\
-section:last-of-type{break-after:auto}h1{font-size:14pt;line-height:7mm;margin:0;display:flex;justify-content:space-between;\
-border-bottom:.5mm solid #000}h1 small{font-size:8.5pt;font-weight:400}h1+p{margin:.7mm 0 1.2mm}\
-.map{display:block;width:132mm;border:.3mm solid #000;margin-bottom:1.5mm}text{font-family:inherit}\
-.letter{font-weight:700}.rim{stroke:#fff;stroke-width:4;stroke-linejoin:round}\
-table{border-collapse:collapse;table-layout:fixed;width:132mm;margin-bottom:1.5mm}\
-td,th{border-bottom:.2mm solid #000;padding:.6mm 1mm .6mm 0;text-align:left;vertical-align:top;overflow-wrap:anywhere}\
-th{font-weight:700;border-bottom-width:.4mm;padding:.3mm 1mm .3mm 0}td:nth-child(2){font-weight:700}\
-.team td{height:5.9mm}.team td:first-child{font-weight:700;font-size:11pt}.team td:nth-child(2){border-left:.2mm solid #000;border-right:.2mm solid #000}\
-.team td:nth-child(3){padding-left:1.5mm}footer{margin-top:auto;border-top:.2mm solid #000;padding-top:.7mm;\
-display:flex;justify-content:space-between}@media screen{section{margin:8mm auto;padding:0;outline:8mm solid #fff;box-shadow:0 0 0 8.3mm #000}}";
+const STYLE: &str = include_str!("page.css");
 
 /// The wishes for the pages.
 pub struct Wishes<'w> {

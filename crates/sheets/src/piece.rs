@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_turnaround_goes_in_round_both_ways_and_out() {
-        let found = of("kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\nlead_in = 20.0");
+        let found = of("kind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2.0\nlead_in = 20.0");
         let kinds: Vec<Feet> = found.iter().map(|(feet, _)| *feet).collect();
         assert_eq!(kinds, [Feet::CoilIn, Feet::Circle, Feet::Circle, Feet::CoilOut]);
         // Clockwise in, counter-clockwise out.

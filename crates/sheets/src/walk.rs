@@ -131,7 +131,7 @@ impl<'a> Walk<'a> {
     fn follow(&mut self, searched: &Searched<'_>, is_drawn: &dyn Fn(usize) -> bool, progress: Progress<'_>) {
         let ensemble = &self.scene.ensemble;
         // Speeds stand on the sheets, even if the scene publishes none.
-        let mut solver = ensemble.solver(Velocities::Computed);
+        let mut solver = self.solver();
         let mut chain = Chain::new(ensemble.handles());
         let mut nearest = Nearest::new(ensemble);
         let fastest = ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).fold(0.0, f64::max);

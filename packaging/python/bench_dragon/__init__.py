@@ -7,8 +7,8 @@
 
 `subscribe` returns a `Feed`: frames, alerts, cues, statuses, the stage. `Controller` sends commands; one that is
 refused raises `CommandRefused`. `HermiteReader` gives the handles between two frames, `name_in` the names of benches and
-obstacles. `ask` has the program compute: the lines of a command. All messages have the layouts of the program of the same version; `print` shows their fields, states and
-levels by name.
+obstacles. `ask` returns the lines that a command of the program prints with `--json`. All messages have the layouts of
+the program of the same version; `print` shows their fields, states and levels by name.
 """
 
 import importlib

@@ -36,5 +36,5 @@ def ask(*arguments: object, scene: str | os.PathLike[str] | None = None) -> list
     command = [program(), *map(str, arguments), *of_scene, "--json", "--quiet"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise ProgramError(done.stderr.strip() or f"bench-dragon ended with {done.returncode}")
+        raise ProgramError(done.stderr.strip() or done.stdout.strip() or f"bench-dragon ended with {done.returncode}")
     return [json.loads(line) for line in done.stdout.splitlines()]

@@ -10,7 +10,7 @@ use bench_dragon::show::scene::{Accepted, Scene, SceneText, printable};
 use serde::Serialize;
 
 use super::super::events::bench_name;
-use super::super::signals::{are_searches_stopped, report};
+use super::super::signals::{are_searches_stopped, report, unstopped};
 use super::super::{CommandError, Common, Output, figure, progress_bar};
 
 /// Arguments of `plan fit`.
@@ -85,6 +85,9 @@ pub fn plan_fit(common: &Common, arguments: &FitArguments) -> Result<(), Command
     };
     let fitted = fit(&text, &arguments.vary, clearance, arguments.seed, &mut progress);
     bar.finish_and_clear();
+    if matches!(fitted, Err(FitError::GaveUp)) {
+        unstopped()?;
+    }
     let fitted = fitted.map_err(|error| match error {
         FitError::GaveUp => CommandError::Failed(error.to_string()),
         _ => CommandError::BadInput(error.to_string()),

@@ -124,10 +124,13 @@ fn run<S: Sink>(
     }
     poll_until(&stop, &common.names, Delivery::Newest, &mut master)?;
     let (sink, summary) = master.finish()?;
+    let MasterSummary { frames, sent, jumps, lost_ms } = summary;
     if sink.is_standard_output() {
+        if lost_ms > 0 {
+            log::warn!("{lost_ms} ms of sound were not read");
+        }
         return Ok(sink);
     }
-    let MasterSummary { frames, sent, jumps, lost_ms } = summary;
     let mut output = Output::standard();
     if common.json {
         output.json(&summary)?;

@@ -53,7 +53,8 @@ fn check_named_line(text: &str, sentence: &str, line: Option<usize>) {
     let Some((field, rest)) = named.filter(|_| sentence.contains(", expected a number from")) else { return };
     let line = line.expect("a number has its line");
     let on_it = text.split('\n').nth(line - 1).unwrap_or_default();
-    let field = field.rsplit('.').next().unwrap_or_default();
+    let list = field.strip_prefix("a corner of ").and_then(|list| list.split(" of ").next());
+    let field = list.unwrap_or(field).rsplit('.').next().unwrap_or_default();
     let number = rest.split(", expected").next().and_then(|number| number.parse::<f64>().ok());
     assert!(number.is_some() && on_it.contains(field), "{sentence} of {on_it:?}");
 }

@@ -12,6 +12,10 @@ pub const NOT_HERE: &[Line] = &[
     ("bench-dragon chase ltc show.wav", "the reader's own recording"),
     ("bench-dragon chase mtc /dev/snd/", "needs a MIDI device: tests/processes/chase.rs pipes the bytes of mido"),
     ("bench-dragon chase psn", "needs a network with multicast: tests/processes/chase.rs has a tracker"),
+    (
+        "bench-dragon send timecode mtc /dev/snd/",
+        "needs a MIDI device: tests/processes/timecode.rs reads the bytes by mido",
+    ),
     ("cargo +nightly", "needs a nightly toolchain"),
     ("cargo build", "builds for minutes: tests/run builds each way"),
     ("cargo deny check", "needs cargo-deny and the network"),
@@ -49,8 +53,12 @@ pub const LOOKED_UP: &[Line] =
     &[("cargo test", "a test, which tests/run runs"), ("cargo bench", "measures for minutes")];
 
 /// Commands that are run if these programs are installed.
-pub const NEEDS: &[Line] =
-    &[("curl", "curl promtool"), ("ffmpeg", "ffmpeg rsvg-convert"), ("for svg in", "rsvg-convert")];
+pub const NEEDS: &[Line] = &[
+    ("bench-dragon send timecode ltc - | aplay", "aplay"),
+    ("curl", "curl promtool"),
+    ("ffmpeg", "ffmpeg rsvg-convert"),
+    ("for svg in", "rsvg-convert"),
+];
 
 /// Commands that are run with `BENCH_DRAGON_LONG=1`.
 pub const LONG: &[Line] = &[
@@ -78,9 +86,12 @@ pub const INSTEAD: &[(&str, &str, &str)] = &[
 
 const LIGHT_SCENE: &str = "sed '/^\\[publish\\]/a precision = \"f32\"' config/paper.toml > light.toml";
 
+const OSC_MAP: &str = "sed -n '/^\\[\\[messages/,/^```/p' docs/show-control.md | grep -v '```' > qlab.toml";
+
 /// The commands that a page's text has its reader start before.
 pub const BEFORE: &[(&str, &[&str])] = &[
     ("bench-dragon --name gold control hold", &["bench-dragon --name gold run"]),
+    ("bench-dragon send osc --messages --map", &[OSC_MAP]),
     ("curl", &["bench-dragon run", "bench-dragon metrics"]),
     ("python3 examples/python/subscribe.py --light", &[LIGHT_SCENE, "bench-dragon --scene light.toml run"]),
     ("python3 examples/python/subscribe.py --seconds", &["bench-dragon run"]),

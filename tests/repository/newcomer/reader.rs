@@ -140,14 +140,17 @@ fn resident_kind(command: &str) -> Option<String> {
     let arguments = command.strip_prefix("bench-dragon ").or(command.strip_prefix("cargo run --release -- "))?;
     let words = Vec::from_iter(arguments.split(' '));
     let ends = ["--duration", "--recover", "--help", "--version"].iter().any(|option| words.contains(option));
-    let subcommand = words
-        .iter()
-        .find(|word| ["run", "replay", "watch", "view", "design", "record", "send", "chase", "metrics"].contains(word));
+    let subcommand = words.iter().find(|word| {
+        ["run", "replay", "watch", "view", "design", "record", "send", "chase", "control", "metrics"].contains(word)
+    });
     let name = words.iter().skip_while(|word| **word != "--name").nth(1).unwrap_or(&"bench_dragon");
     match *subcommand? {
         _ if ends => None,
         "run" | "replay" => Some(format!("publisher {name}")),
-        kind @ ("send" | "chase") => Some(format!("{kind} {}", words.iter().skip_while(|word| **word != kind).nth(1)?)),
+        "control" if !words.contains(&"osc") => None,
+        kind @ ("send" | "chase" | "control") => {
+            Some(format!("{kind} {}", words.iter().skip_while(|word| **word != kind).nth(1)?))
+        }
         other => Some(other.to_owned()),
     }
 }

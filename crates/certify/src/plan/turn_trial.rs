@@ -162,7 +162,7 @@ impl Family<'_> {
     pub fn folds(&self, radius: f64) -> Vec<Witness> {
         let mut folds = self.folds_of(radius, &self.team.foremost(2), 0);
         // The link of a tail that differs passes over the same path.
-        if let Some(tail) = self.team.own_tail() {
+        if let Some(tail) = self.team.own_tail_link() {
             let alone = Team { benches: 1, head_length: self.team.board_length(tail), ..*self.team };
             folds.extend(self.folds_of(radius, &alone, tail));
         }

@@ -140,7 +140,7 @@ fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), begin: &Begin, curv
         let corner = begin.start + radius * half * begin.along;
         let ray = Ray::towards(corner, middle);
         let per_metre = 1.0 / (0.5 * angle).cos() - 1.0;
-        let most = radius + (before.1.min(after.1) - LEAST_LENGTH) / half;
+        let most = (radius + (before.1.min(after.1) - LEAST_LENGTH) / half).max(LEAST_LENGTH);
         fields.extend([before.0.clone(), after.0.clone()]);
         found.add((format!("{name}.middle"), "middle"), middle, fields, move |pull| {
             let new = (pull.along(&ray) / per_metre).clamp(LEAST_LENGTH, most);

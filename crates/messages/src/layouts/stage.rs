@@ -289,7 +289,8 @@ pub struct StageCue {
 /// # Examples
 ///
 /// ```
-/// use bench_dragon_motion::event::unreported;
+/// use std::ops::ControlFlow;
+///
 /// use bench_dragon_messages::StageMessage;
 /// use bench_dragon_messages::state::EventKind;
 /// use bench_dragon_show::scene::Scene;
@@ -297,7 +298,8 @@ pub struct StageCue {
 /// use bench_dragon_show::convert::stage;
 ///
 /// let scene = Scene::paper();
-/// let show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
+/// let timeline = scene.ensemble.timeline(&mut |_| ControlFlow::Continue(()));
+/// let show = Show::new(&scene, timeline, Playback::of(&scene)).unwrap();
 /// let message = stage(1, 0, [0; 32], &scene.ensemble, &show);
 /// let StageMessage { stage, .. } = &message;
 /// assert_eq!((stage.dragons.len(), stage.first_dragon().benches), (1, 223));

@@ -95,8 +95,9 @@ impl Displacements {
         handle: usize,
         budget: &mut Budget,
     ) -> Result<Vec<Param>, Halt> {
-        let turns = match chain.team.own_tail() {
+        let turns = match chain.team.own_tail_link() {
             _ if handle == 0 => &chain.head_turns,
+            // A tail that differs in width alone turns where a body link does.
             Some(tail) if handle == tail => &chain.tail_turns,
             _ => &chain.body_turns,
         };

@@ -76,7 +76,8 @@ impl Ensemble {
         Some(TimedClearance {
             least: LeastClearance { value, travelled, bench_a: bench_a + first, bench_b: bench_b + first },
             time: time_at(travelled),
-            searched_until: (found.searched_until < to).then(|| time_at(found.searched_until)),
+            searched_until: (found.searched_until < to)
+                .then(|| if found.searched_until > 0.0 { time_at(found.searched_until) } else { 0.0 }),
         })
     }
 
@@ -146,7 +147,7 @@ impl Ensemble {
         let to = self.own_end(dragon, show_end);
         let (least, reached) = motion.obstacle_clearances(to, progress);
         let time_at = |travelled| motion.time_at(travelled) + delay;
-        let searched_until = (reached < to).then(|| time_at(reached));
+        let searched_until = (reached < to).then(|| if reached > 0.0 { time_at(reached) } else { 0.0 });
         let of_show = |(obstacle, least): (usize, Option<ObstacleClearance>)| {
             let ObstacleClearance { value, travelled, bench } = least?;
             let least = ObstacleClearance { value, travelled, bench: bench + self.first_handles[dragon] as u32 };
@@ -170,49 +171,35 @@ fn least((one, _): &(Meeting, [usize; 2]), (other, _): &(Meeting, [usize; 2])) -
     one.value.total_cmp(&other.value)
 }
 
-/// The result of a search that may have given up.
+/// The result of a search that may have given up: its value, and the time that it came to.
 trait Searched: Copy {
-    fn value(&self) -> f64;
-    fn searched_until(&self) -> Option<f64>;
-    fn up_to(self, searched_until: Option<f64>) -> Self;
+    fn parts(&mut self) -> (f64, &mut Option<f64>);
 }
 
 impl Searched for TimedClearance {
-    fn value(&self) -> f64 {
-        self.least.value
-    }
-
-    fn searched_until(&self) -> Option<f64> {
-        self.searched_until
-    }
-
-    fn up_to(self, searched_until: Option<f64>) -> Self {
-        Self { searched_until, ..self }
+    fn parts(&mut self) -> (f64, &mut Option<f64>) {
+        (self.least.value, &mut self.searched_until)
     }
 }
 
 impl Searched for TimedObstacleClearance {
-    fn value(&self) -> f64 {
-        self.least.value
-    }
-
-    fn searched_until(&self) -> Option<f64> {
-        self.searched_until
-    }
-
-    fn up_to(self, searched_until: Option<f64>) -> Self {
-        Self { searched_until, ..self }
+    fn parts(&mut self) -> (f64, &mut Option<f64>) {
+        (self.least.value, &mut self.searched_until)
     }
 }
 
 /// Returns the lesser clearance of two searches. One that failed, `None`, has searched nothing.
 fn nearer<T: Searched>(one: Option<T>, other: Option<T>) -> Option<T> {
-    let searched_until = match (one, other) {
-        (Some(one), Some(other)) => earlier(one.searched_until(), other.searched_until()),
-        _ => Some(0.0),
+    let (Some(mut one), Some(mut other)) = (one, other) else {
+        let mut only = one.or(other)?;
+        *only.parts().1 = Some(0.0);
+        return Some(only);
     };
-    let least = one.into_iter().chain(other).min_by(|one, other| one.value().total_cmp(&other.value()))?;
-    Some(least.up_to(searched_until))
+    let ((value, until), (other_value, other_until)) = (one.parts(), other.parts());
+    let until = earlier(*until, *other_until);
+    let mut least = if other_value < value { other } else { one };
+    *least.parts().1 = until;
+    Some(least)
 }
 
 fn earlier(one: Option<f64>, other: Option<f64>) -> Option<f64> {

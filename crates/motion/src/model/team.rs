@@ -74,6 +74,11 @@ impl Team {
         (differs && self.benches > 2).then(|| self.benches - 1)
     }
 
+    /// Returns the tail, if there are benches between it and the head and its link has a length of its own.
+    pub fn own_tail_link(&self) -> Option<usize> {
+        self.own_tail().filter(|tail| self.link(*tail) != self.link(1))
+    }
+
     /// Returns a bench of each kind: the head, the bench behind it, and the last.
     pub fn kinds(&self) -> [usize; 3] {
         [0, 1, self.benches.max(2) - 1]

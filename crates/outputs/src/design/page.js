@@ -69,7 +69,7 @@ const session = new Session({
   },
   progress: (id, share) => plans.progress(id, share),
   plan: (id, plan, text) => plans.result(id, plan, text),
-  cancelled: () => null,
+  cancelled: (id) => plans.cancelled(id),
 });
 const text = new SceneText(typed), results = new Results(select);
 const line = new TimeLine({ at: (time) => session.at(time), drop: () => fields.end(),
@@ -80,9 +80,9 @@ const fields = new Fields(element("fields"), {
   set: (name, value, gesture) => change({ set: { [name]: value } }, gesture, name),
   remove: (item) => change({ remove: item }, null),
   show: (number) => text.show(number),
-  focus: ({ name, line: number, value }) => {
+  focus: ({ name, line: number, value, integer }) => {
     text.show(number);
-    if (typeof value === "number") plans.vary(name);
+    if (typeof value === "number" && !integer) plans.vary(name);
   },
 });
 const handles = new Handles(element("handles"), { camera, canvas,
@@ -156,6 +156,7 @@ function show(next) {
   scene = next;
   root.dataset.stale = "false";
   text.error(null);
+  plans.outdate(session.accepted);
   fields.enable(true);
   fields.show(scene);
   handles.show(scene);

@@ -24,7 +24,7 @@ export class Plans {
     if (!this.session.isOpen) return;
     this.clear();
     const { plan } = button.dataset;
-    this.running = this.session.send(plan === "fit" ? { plan, vary: [this.varied] } : { plan });
+    this.running = this.id = this.session.send(plan === "fit" ? { plan, vary: [this.varied] } : { plan });
     this.put(`${button.textContent} …`, { isRunning: true });
     element("plan-progress").removeAttribute("value");
   }
@@ -61,6 +61,16 @@ export class Plans {
     this.running = null;
     this.put(sentence, { isDone: true });
     return true;
+  }
+
+  /** The server has stopped a search, since the text has changed. */
+  cancelled(id) {
+    if (id === this.running) this.clear("Stopped: the text has changed.");
+  }
+
+  /** Drops a result of a text before the change `accepted`. */
+  outdate(accepted) {
+    if (this.text !== null && this.id < accepted) this.clear();
   }
 
   /** A search of an earlier text is over. */

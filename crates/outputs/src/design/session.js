@@ -38,6 +38,7 @@ export class Session {
     address.protocol = address.protocol.replace("http", "ws");
     const socket = (this.socket = new WebSocket(address));
     socket.binaryType = "arraybuffer";
+    this.isOffered = false;
     socket.onopen = () => (this.retry = 250);
     socket.onmessage = ({ data }) => (typeof data === "string" ? this.receive(JSON.parse(data)) : this.draw(data));
     socket.onclose = () => {
@@ -110,7 +111,8 @@ export class Session {
   receive(message) {
     const { listener, inFlight } = this, { id } = message;
     if (message.hello) return this.greet(message.hello);
-    if (id === 0 && (message.scene || message.error)) {
+    if (id === 0 && !this.isOffered && (message.scene || message.error)) {
+      this.isOffered = true;
       this.isForeign = !listener.offer(message);
       return;
     }

@@ -8,7 +8,7 @@ use toml::Spanned;
 use bench_dragon_messages::Cue;
 use bench_dragon_messages::state::{FrameState, Level};
 
-/// The most bytes of an address.
+/// The most bytes of an address, and of a text.
 const MOST_BYTES: usize = 255;
 
 /// The messages of a file, in its order.
@@ -141,7 +141,9 @@ fn named<T: Copy>(
 fn argument(given: &Spanned<toml::Value>) -> Result<OscType, Refused> {
     let refused = |expected: &str| Err((given.span().start, format!("arguments: expected {expected}")));
     match given.get_ref() {
-        toml::Value::String(text) if text.contains('\0') => refused("text without a zero byte"),
+        toml::Value::String(text) if text.contains('\0') || text.len() > MOST_BYTES => {
+            refused("text of at most 255 bytes without a zero byte")
+        }
         toml::Value::String(text) => Ok(OscType::String(text.clone())),
         toml::Value::Boolean(value) => Ok(OscType::Bool(*value)),
         toml::Value::Float(value) => Ok(OscType::Float(*value as f32)),

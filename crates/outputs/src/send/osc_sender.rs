@@ -170,7 +170,13 @@ impl OscSender {
         self.last_cue = Some(*cue);
         match &self.map {
             None => self.pending.push(self.addresses.cue(cue)),
-            Some(map) => self.pending.extend(map.of_cue(cue)),
+            Some(map) => {
+                let before = self.pending.len();
+                self.pending.extend(map.of_cue(cue));
+                if self.pending.len() == before {
+                    return;
+                }
+            }
         }
         self.summary.cues += 1;
     }

@@ -166,6 +166,7 @@ impl<'a> Reader<'a> {
     /// Sets the scene of the picture once its text and its stage have come. Returns true then.
     fn set_scene(&mut self) -> bool {
         let Some(stage) = &self.stage else { return false };
+        self.picture.scene.take_if(|scene| scene.run_id != stage.stage.run_id);
         let Some((_, hash, text)) = self.scene.take_if(|(run_id, ..)| *run_id == stage.stage.run_id) else {
             return false;
         };

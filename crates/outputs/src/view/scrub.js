@@ -81,6 +81,12 @@ class Source {
     if (this.wanted) setTimeout(() => this.send(), RETRY);
   }
 
+  /** True if the frames are those of an earlier run, and no request is on its way. */
+  get isOld() {
+    const run = this.publisher.newest?.run, { shown, asked, wanted } = this;
+    return run !== undefined && !asked && !wanted && shown !== null && shown[0]?.frame.run !== run;
+  }
+
   /** Returns the frames of the run that the page shows; null until they have come. */
   get current() {
     const { shown } = this;
@@ -182,6 +188,8 @@ export class Scrub {
     this.line.setAttribute("aria-valuetext", this.isOn ? say("notLive", { time }) : say("liveAt", { time }));
     element("scrubbed").hidden = !this.isOn;
     if (!this.isOn) return;
+    // A new run of the show has frames of its own.
+    for (const source of this.sources) if (source.isOld) source.ask(this.moments(source));
     const isThere = this.sources.some((source) => source.current);
     const words = say(isThere ? "notLive" : "notLiveYet", { time });
     if (element("scrub-time").textContent !== words) element("scrub-time").textContent = words;

@@ -46,7 +46,7 @@ pub type OpenScene = fn(&str) -> Option<Box<dyn SceneFrames>>;
 /// The scene that a publisher plays.
 #[derive(Debug, PartialEq)]
 pub(super) struct SceneInPlay {
-    run_id: u64,
+    pub(super) run_id: u64,
     hash: SceneHash,
     text: String,
     /// The times and the states of the show's events, in order.
@@ -131,7 +131,7 @@ fn compute(open: OpenScene, orders: &Receiver<Order>) {
     }
 }
 
-/// Returns a frame for each time that has a solution.
+/// Returns a frame for each time, or none if one of them has no solution.
 fn answer(of_scene: &mut dyn SceneFrames, scene: &SceneInPlay, Request { id, times }: &Request) -> Vec<Bytes> {
     let frame = |(tick, time): (usize, &f64)| {
         let (header, handles) = of_scene.frame(*time)?;
@@ -139,7 +139,7 @@ fn answer(of_scene: &mut dyn SceneFrames, scene: &SceneInPlay, Request { id, tim
         let header = FrameHeader { run_id: scene.run_id, sequence: *id, tick: tick as u64, state, ..header };
         Some(wire::frame(&header, &handles).into())
     };
-    times.iter().enumerate().filter_map(frame).collect()
+    times.iter().enumerate().map(frame).collect::<Option<_>>().unwrap_or_default()
 }
 
 /// Serves the frames of one publisher's scene to a browser until the browser goes.
@@ -202,14 +202,16 @@ mod tests {
 
     #[test]
     fn a_frame_has_its_request_its_place_and_the_state_of_the_show() {
-        let request = request(r#"{"id": 7, "times": [19.5, 13, 20, 99]}"#).unwrap();
+        let request = request(r#"{"id": 7, "times": [19.5, 20, 99]}"#).unwrap();
         let frames = answer(&mut Times, &scene(), &request);
         let of = |frame: &Bytes| {
             let number = |at: usize| u64::from_le_bytes(frame[at..at + 8].try_into().unwrap());
             (frame[1], f64::from_bits(number(8)), number(24), number(32), number(48))
         };
-        let expected = [(0, 19.5, 7, 5, 0), (2, 20.0, 7, 5, 2), (2, 40.0, 7, 5, 3)];
+        let expected = [(0, 19.5, 7, 5, 0), (2, 20.0, 7, 5, 1), (2, 40.0, 7, 5, 2)];
         assert_eq!(frames.iter().map(of).collect::<Vec<_>>(), expected);
+        let unsolved = super::request(r#"{"id": 7, "times": [1, 13]}"#).unwrap();
+        assert!(answer(&mut Times, &scene(), &unsolved).is_empty());
     }
 
     #[test]

@@ -26,9 +26,8 @@ pub(super) struct OwnTail {
 impl OwnTail {
     /// Returns the tail of a team if it is not one of the table's links.
     pub(super) fn of(team: &Team, track: &Track) -> Option<Self> {
-        let link = team.link(team.own_tail()?);
-        let differs = link != team.link(1);
-        differs.then(|| Self { link, path: Arc::new(track.path.clone()), ends: track.ends.clone() })
+        let link = team.link(team.own_tail_link()?);
+        Some(Self { link, path: Arc::new(track.path.clone()), ends: track.ends.clone() })
     }
 
     /// Writes the last handle, and the heading of the tail's front handle. `second` is the place of the second handle.
