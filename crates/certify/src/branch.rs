@@ -17,7 +17,7 @@ const BEYOND_END: f64 = 1e-3;
 /// A stretch of the front handle of a link in which the follower is the first place at its distance back from `behind`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Branch {
-    /// 0 for the head's link, 1 for all others.
+    /// The [kind of the link](link_kind).
     link: usize,
     front: Span,
     behind: Place,
@@ -34,11 +34,11 @@ pub(super) fn branches(path: &Path, exact: &ExactPath, team: &Team) -> Vec<Branc
         let place = place(path.param_at(travelled));
         if travelled >= end { exact.moved(place, BEYOND_END, false) } else { inside(place, tiny) }
     };
-    let links = 0..team.benches.min(2);
+    let links = (0..team.benches.min(2)).chain(team.own_tail().map(|_| 2));
     let of_link = |link: usize| {
+        let length = team.link(team.kinds()[link]);
         // On parallel lines the place moves, which a certificate cannot state.
-        let of_link =
-            path.branches().iter().filter(move |branch| branch.link == team.link(link) && branch.drift == 0.0);
+        let of_link = path.branches().iter().filter(move |branch| branch.link == length && branch.drift == 0.0);
         of_link.map(move |branch| {
             let front = Span(at(branch.begin), at(branch.end));
             Branch { link, front, behind: inside(place(branch.behind), -tiny) }
@@ -55,15 +55,20 @@ impl Branch {
     }
 }
 
-/// Cuts a span of the front handle of a bench's link into the stretches with one rule: the place from which the follower
+/// Returns the kind of a bench's link: 0 for the head's, 2 for that of a tail with a size of its own, 1 for all others.
+pub(super) fn link_kind(team: &Team, bench: usize) -> usize {
+    if team.own_tail() == Some(bench) { 2 } else { bench.min(1) }
+}
+
+/// Cuts a span of the front handle of a link of some kind into the stretches with one rule: the place from which the follower
 /// is the first one back, or `None` for the front handle itself. A place at which two stretches meet is in both.
 pub(super) fn rules(
     branches: &[Branch],
     exact: &ExactPath,
-    bench: usize,
+    link: usize,
     span: Span,
 ) -> impl Iterator<Item = (Span, Option<Place>)> {
-    let of_link: Vec<&Branch> = branches.iter().filter(|branch| branch.link == bench.min(1)).collect();
+    let of_link: Vec<&Branch> = branches.iter().filter(|branch| branch.link == link).collect();
     let mut stretches = Vec::with_capacity(2 * of_link.len() + 1);
     let mut end = None;
     for Branch { front: Span(from, to), behind, .. } in of_link {

@@ -41,7 +41,7 @@ pub enum CertificateLine<'a> {
     },
     /// The follower of a link is not the first place at its distance, but the first one back from another place.
     Branch {
-        /// 0 for the head's link, 1 for all others.
+        /// 0 for the head's link, 2 for that of a tail with a size of its own, 1 for all others.
         link: usize,
         /// The first place of the front handle.
         from: Place,

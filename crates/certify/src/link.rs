@@ -28,20 +28,20 @@ pub(super) enum Front {
     Unknown,
 }
 
-/// Returns the sign of the front product if the follower of a bench is proved to be in `rear` for every place of
-/// `front`.
+/// Returns the sign of the front product if the follower of a link of some kind is proved to be in `rear` for every
+/// place of `front`.
 pub(super) fn follower_within(
     path: &ExactPath,
     front: &Spanned,
     rear: &Spanned,
     link: Interval,
-    (branches, bench): (&[Branch], usize),
+    (branches, kind): (&[Branch], usize),
 ) -> Option<Front> {
     let sign = one_place_within(path, front, rear, link)?;
     if branches.is_empty() {
         return is_first(path, front, rear, None, link).then_some(sign);
     }
-    let mut rules = rules(branches, path, bench, front.span);
+    let mut rules = rules(branches, path, kind, front.span);
     rules.all(|(part, behind)| is_first(path, &Spanned::new(path, part), rear, behind, link)).then_some(sign)
 }
 

@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 
 use super::boards::{MovingBoard, Shape};
-use super::branch::{Branch, branches};
+use super::branch::{Branch, branches, link_kind};
 use super::capsule::{Spanned, moved_back};
 use super::grid::{GridPoint, span};
 use super::ground::Barrier;
@@ -109,6 +109,11 @@ impl<'a> Chain<'a> {
     /// Returns the shape of the board of a bench.
     pub fn shape(&self, bench: usize) -> Shape {
         self.shapes[self.kind(bench)]
+    }
+
+    /// Returns all branches, and the kind of a bench's link.
+    pub fn branches_of(&self, bench: usize) -> (&[Branch], usize) {
+        (&self.branches, link_kind(self.team, bench))
     }
 
     fn kind(&self, bench: usize) -> usize {
@@ -343,7 +348,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let padded = self.multiples.iter().enumerate().skip(first).find_map(|(too_small, multiple)| {
             let pad = least + multiple * PAD * size / rear_cosine;
             let rear = Spanned::new(exact, span(exact, ends[0].param, ends[1].param, pad, fine));
-            let sign = follower_within(exact, &front, &rear, length, (&self.chain.branches, link))?;
+            let sign = follower_within(exact, &front, &rear, length, self.chain.branches_of(link))?;
             Some((too_small, pad, rear, sign))
         });
         let (too_small, pad, rear, sign) = padded.ok_or(Obstacle::Link(link))?;

@@ -118,9 +118,10 @@ pub struct Motion {
     followed: Followed,
 }
 
-/// The path with the branches of its followers, and the singular configurations: found when first needed.
+/// The path with the branches of its followers, and the singular configurations: found when first needed, for all
+/// clones of the motion.
 #[derive(Debug, Clone, Default)]
-struct Followed(OnceLock<Arc<(Path, Singularities)>>);
+struct Followed(Arc<OnceLock<(Path, Singularities)>>);
 
 impl PartialEq for Followed {
     /// They follow from the path and the team.
@@ -217,10 +218,21 @@ impl Motion {
 
     /// Returns the path, in its own coordinates, with the branches of this team's followers. An inward spiral has none.
     pub fn path(&self) -> &Path {
-        if self.path.as_spiral().is_none() && self.followed.0.get().is_none() {
-            self.singularities(&mut unreported);
-        }
+        self.search_branches(&mut unreported);
         self.searched_path()
+    }
+
+    /// Searches for the branches of this team's followers, if they are not known yet. [`Motion::path`] does the same, but
+    /// cannot be stopped.
+    pub fn search_branches(&self, progress: Progress<'_>) {
+        if self.path.as_spiral().is_none() && self.followed.0.get().is_none() {
+            self.singularities(progress);
+        }
+    }
+
+    /// Returns the same path without branches, and without a search for them.
+    pub fn bare_path(&self) -> &Path {
+        &self.path
     }
 
     /// Returns the same path, without branches before the search of [`Motion::singularities`] or if it was stopped.
@@ -457,7 +469,7 @@ impl Motion {
         let found = Singularities::search(&self.path, &self.team, &mut budget);
         if !budget.is_stopped() {
             let path = self.path.clone().with_branches(found.branches.clone());
-            self.followed.0.get_or_init(|| Arc::new((path, found.clone())));
+            self.followed.0.get_or_init(|| (path, found.clone()));
         }
         found
     }

@@ -399,8 +399,8 @@ impl Checker {
             if self.steps.end.is_some() || self.greatest.steps > 0 {
                 return Err("a branch has to precede all steps".to_owned());
             }
-            let Scene { path, branches, .. } = &mut self.scenes[section.unwrap_or(0)];
-            return branches.add(path, *link, Span(*from, *to), *behind);
+            let Scene { path, team, branches, .. } = &mut self.scenes[section.unwrap_or(0)];
+            return branches.add((path, team), *link, Span(*from, *to), *behind);
         }
         let so_far = self.results() - self.before;
         let Self { about, scenes, steps, events, greatest, pitch, proved, .. } = self;

@@ -50,8 +50,8 @@ pub(super) fn check(
         return Err("the latest place of the rear may be too far".to_owned());
     }
     for (stretch, behind) in rules {
-        let part = if *stretch == front.span { front.clone() } else { Capsule::new(path, *stretch) };
-        if !is_first(path, &part, rear.span, *behind, &squared) {
+        let part = (*stretch != front.span).then(|| Capsule::new(path, *stretch));
+        if !is_first(path, part.as_ref().unwrap_or(front), rear.span, *behind, &squared) {
             return Err("a place between the handles may be at the link's length".to_owned());
         }
     }

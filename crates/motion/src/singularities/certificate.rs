@@ -378,11 +378,10 @@ impl Link<'_> {
         (None, tested)
     }
 
-    /// Returns the least distance of the front handle, after `front` metres of travel, from the places near a valley.
-    pub fn least_distance(&self, front: f64, valley: f64) -> f64 {
+    /// Returns the least distance of the front handle, after `front` metres of travel, from the places around a valley.
+    pub fn least_distance(&self, front: f64, valley: f64, around: f64) -> f64 {
         let origin = self.path.point(self.path.param_at(front));
         let distance = |travelled: f64| (self.path.point(self.path.param_at(travelled)) - origin).norm();
-        let around = 1e-3 * self.length;
         golden_section_min(distance, valley - around, valley + around).0
     }
 

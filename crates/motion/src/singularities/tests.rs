@@ -80,9 +80,12 @@ impl<'a> Continued<'a> {
         let offset = |at: f64| origin - point(self.path, at);
         let cosine = |at: f64| offset(at).dot(&self.path.tangent(self.path.param_at(at))) / self.link;
         let reach = 4.0 * (front - before).abs() / cosine(rear) + 1e-13 * (self.link + rear.abs());
+        // Per metre, the cosine changes by no more.
+        let curvature = self.path.max_curvature_between(rear - reach, rear + reach);
+        let change = (1.0 + 1.1 * curvature * self.link) / self.link;
         let holds = reach > 0.0
             && reach < 0.05 * self.link
-            && (-8..=8).all(|k| cosine(rear + reach * f64::from(k) / 8.0) > 0.0)
+            && (-8..=8).all(|k| cosine(rear + reach * f64::from(k) / 8.0) > change * reach / 16.0)
             && offset(rear - reach).norm() > self.link
             && offset(rear + reach).norm() < self.link;
         let is_near = |at: f64| offset(at).norm() < self.link;
@@ -316,12 +319,13 @@ fn check_chain(path: &Path, team: &Team) {
     let end = found.end.unwrap();
     let stall = found.stall.map_or(end.travelled, |stall| stall.travelled);
     let behind = -4.0 * (team.length() + team.longest_link());
-    let links = [0, 1].map(|bench| Continued::new(path, team.link(bench), behind));
+    let links = team.kinds().map(|bench| Continued::new(path, team.link(bench), behind));
     // The front handles' travels and front cosines.
     let chain = |head: f64| {
         let mut front = head;
         let one = |bench: usize| {
-            let (rear, cosine) = links[bench.min(1)].at(front)?;
+            let kind = if bench > 0 && bench + 1 == team.benches { 2 } else { bench.min(1) };
+            let (rear, cosine) = links[kind].at(front)?;
             Some((std::mem::replace(&mut front, rear), cosine))
         };
         (0..team.benches).map_while(one).collect::<Vec<_>>()

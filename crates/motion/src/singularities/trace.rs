@@ -53,6 +53,10 @@ const LONGEST_UNRESOLVED: f64 = 1e-6;
 /// The rear cosine below which a link on parallel lines is nearly square to them.
 const NEARLY_SQUARE: f64 = 0.02;
 
+/// The distances, in links, from a place of least distance within which it is searched for again a little later.
+const NARROWEST: f64 = 1e-9;
+const WIDEST: f64 = 1e-3;
+
 /// The greatest difference of a rear handle found from two places ahead of it, in links.
 const SAME_PLACE: f64 = 1e-6;
 
@@ -229,13 +233,14 @@ impl<'a> LinkTrace<'a> {
             self.step = 0.5 * step;
             return Ok(None);
         }
-        // The follower meets the nearer place at the distance, where all places between the two are further away.
-        let (link, valley) = (self.link, self.link.path.travelled(branch.behind));
-        let is_lost = |front: f64| link.least_distance(front, valley) >= link.length;
+        // The follower meets the nearer place at the distance, where all places between the two are further away. A wider
+        // search would come to places that are nearer again.
+        let (link, at, valley) = (self.link, self.at, self.link.path.travelled(branch.behind));
+        let around = (2.0 * (valley - at.rear).abs()).clamp(NARROWEST * link.length, WIDEST * link.length);
+        let is_lost = |front: f64| link.least_distance(front, valley, around) >= link.length;
         if !is_lost(front) {
             return Err(*none);
         }
-        let at = self.at;
         self.lock(&at, bisect_predicate(is_lost, at.front, front));
         Ok(None)
     }
