@@ -262,7 +262,9 @@ class Walk:
         if k - self.begin > len(self.rears) + 1:
             raise Undecided("a follower past its lock")
         rear = self.rears[min(k - self.begin, len(self.rears) - 1)]
-        if not any(self.far(k, m) for m in range(rear + 1, k)):
+        # From the place itself: between two points of the walk a nearer place may come, and the follower vanish.
+        x, y = (float(part.mid()) for part in scene.point(place))
+        if not any(math.hypot(x - u, y - v) >= self.link for u, v in self.points[rear + 1 : k]):
             return place
         return self.valley(scene, place, rear)
 

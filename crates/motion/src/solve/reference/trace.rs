@@ -18,9 +18,6 @@ const POINTS_IN_LINK: f64 = 400.0;
 /// The most points that a follower passes while its front passes one: a follower that passes more has vanished.
 const MOST_PASSED: usize = 60;
 
-/// Points ahead of the follower's nearer neighbour from which it is sought.
-const AHEAD: usize = 2;
-
 /// The most points. On a longer path with tight bends the first place is taken for the follower.
 const MOST_POINTS: f64 = 1e7;
 
@@ -117,20 +114,27 @@ impl Trace {
         let index = begin + self.backs[begin..end].partition_point(|place| *place > back).max(1) - 1;
         let Some(rear) = self.rears.get(index - self.begins[1]) else {
             // The last point before the lock decides beyond it.
-            return if index <= self.begins[1] + self.rears.len() { self.last() } else { Err(NoFollower) };
+            return if index <= self.begins[1] + self.rears.len() { self.last(front) } else { Err(NoFollower) };
         };
-        Ok(self.beyond(rear + 1 + AHEAD, index))
+        Ok(self.beyond(*rear, index, front))
     }
 
     /// Returns the place ahead of the last follower.
-    fn last(&self) -> Result<Option<(usize, f64)>, NoFollower> {
+    fn last(&self, front: &RealParam) -> Result<Option<(usize, f64)>, NoFollower> {
         let rear = self.rears.last().ok_or(NoFollower)?;
-        Ok(self.beyond(rear + 1, self.begins[1] + self.rears.len() - 1))
+        Ok(self.beyond(*rear, self.begins[1] + self.rears.len() - 1, front))
     }
 
-    /// Returns a place, unless all places from there to the front are nearer than the link.
-    fn beyond(&self, ahead: usize, front: usize) -> Option<(usize, f64)> {
-        let is_first = ahead >= front || !(ahead..front).any(|place| self.is_far(front, place));
+    /// Returns the place of least distance that comes next ahead of `rear`, unless all places from there to the front
+    /// handle, past the point `index`, are nearer than the link.
+    fn beyond(&self, rear: usize, index: usize, front: &RealParam) -> Option<(usize, f64)> {
+        let point = front.point.rounded();
+        let distance = |place: usize| (point - self.points[place]).norm();
+        let mut ahead = rear + 1;
+        while ahead + 1 < index && distance(ahead + 1) < distance(ahead) {
+            ahead += 1;
+        }
+        let is_first = !(ahead..index).any(|place| distance(place) >= self.link);
         let segment = self.begins.partition_point(|begin| *begin <= ahead) - 1;
         (!is_first).then(|| (segment, self.backs[ahead]))
     }
