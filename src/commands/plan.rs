@@ -1,19 +1,21 @@
 //! `plan`: answers for a choreographer, with the place that decides them.
 
 mod fit;
+mod stage;
 mod turn;
 
 use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::CertificateLine;
 use bench_dragon::certify::plan::{
-    GreatestSpeed, LeastPitch, Overlap, PlanError, certify_greatest_speed, certify_least_pitch, greatest_speed,
-    least_pitch,
+    GreatestSpeed, LeastPitch, Overlap, PlanError, Planned, Spaced, certify_greatest_speed, certify_least_pitch,
+    greatest_speed, least_pitch,
 };
 use bench_dragon::certify::speed::MOST_HANDLES;
 use bench_dragon::show::scene::{Accepted, Scene};
 use serde::Serialize;
 
+use self::stage::Stage;
 use super::certificate_file::CertificateFile;
 use super::events::bench_name;
 use super::scene_argument::scene_argument;
@@ -35,6 +37,8 @@ enum Question {
         /// The distance from the centre that the front handle of the head must reach, in metres
         #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
         reach_radius: f64,
+        #[command(flatten)]
+        spacing: Spacing,
         /// Write the certificate of the proof to this file, for `verify`
         #[arg(long, value_name = "FILE")]
         certify: Option<PathBuf>,
@@ -55,10 +59,42 @@ enum Question {
         /// The radius of the first arc divided by that of the second; by default the best ratio that is found
         #[arg(long, value_name = "K", allow_negative_numbers = true)]
         arc_ratio: Option<f64>,
+        #[command(flatten)]
+        spacing: Spacing,
     },
     /// Numbers of the scene with which the show keeps what it must, with the greatest margin found
     #[command(arg = scene_argument())]
     Fit(fit::FitArguments),
+}
+
+/// The distance that boards must keep.
+#[derive(Debug, clap::Args)]
+pub struct Spacing {
+    /// The clearance of any two boards that share no handle, in metres; by default the scene's `[require]`, or 0
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    clearance: Option<f64>,
+}
+
+impl Spacing {
+    /// Returns the clearance that is required of a scene, in metres.
+    fn required(&self, scene: &Scene) -> Result<f64, CommandError> {
+        if let Some(metres) = self.clearance {
+            Accepted::KEEP_OUT.check("--clearance", metres).map_err(CommandError::BadInput)?;
+        }
+        let of_scene = scene.require.and_then(|require| require.clearance);
+        // No sentence has a sign of 0.
+        Ok(self.clearance.or(of_scene).unwrap_or(0.0).abs())
+    }
+}
+
+/// Returns the words for boards that are too near for a clearance.
+pub fn are_too_near(clearance: f64) -> String {
+    if clearance > 0.0 { format!("are nearer than {clearance} m") } else { "overlap".to_owned() }
+}
+
+/// Returns the words for boards that do not keep a clearance.
+pub fn come_too_near(clearance: f64) -> String {
+    if clearance > 0.0 { format!("come as near as {clearance} m") } else { "touch".to_owned() }
 }
 
 /// The line of `plan pitch --json`.
@@ -74,6 +110,12 @@ struct PitchLine {
     bench_a: Option<u32>,
     bench_b: Option<u32>,
     head_radius: Option<f64>,
+    /// The required clearance, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clearance: Option<f64>,
+    /// The obstacle of the stage that decides, if one does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    obstacle: Option<String>,
 }
 
 /// The line of `plan speed --json`.
@@ -107,34 +149,40 @@ fn given_up() -> &'static str {
 pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandError> {
     stop_searches_on_signals()?;
     match &arguments.question {
-        Question::Pitch { reach_radius, certify } => plan_pitch(common, *reach_radius, certify.as_deref()),
+        Question::Pitch { reach_radius, spacing, certify } => {
+            plan_pitch(common, *reach_radius, spacing, certify.as_deref())
+        }
         Question::Speed { max_handle_speed, certify } => plan_speed(common, *max_handle_speed, certify.as_deref()),
-        Question::Turn { arc_ratio } => turn::plan_turn(common, *arc_ratio),
+        Question::Turn { arc_ratio, spacing } => turn::plan_turn(common, *arc_ratio, spacing),
         Question::Fit(arguments) => fit::plan_fit(common, arguments),
     }
 }
 
-fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), CommandError> {
+fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Path>) -> Result<(), CommandError> {
     Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
     let text = common.scene_text()?;
     let (scene, motion) = text.parse_only()?;
-    warn_of_obstacles(&scene);
+    let clearance = spacing.required(&scene)?;
+    let asked = Spaced { team: motion.team(), clearance };
     let bar = progress_bar(1000, common).with_message("searching for the pitch");
     let mut progress = |share| report(&bar, share);
     let found = if let Some(file) = file {
         let mut certificate = CertificateFile::create(file)?;
         let mut write = |line: &CertificateLine| certificate.write(line);
-        let found = certify_least_pitch(motion.team(), radius, &text.text, &mut write, &mut progress)??;
+        let found = certify_least_pitch(asked, radius, &text.text, &mut write, &mut progress)??;
         certificate.finish()?;
         found
     } else {
-        least_pitch(motion.team(), radius, &mut progress)?
+        least_pitch(asked, radius, &mut progress)?
     };
-    bar.finish_and_clear();
     let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;
+    let stage = Stage::search(&motion, asked, Planned::Pitch { radius }, value_hi, &mut progress);
+    bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        let status = status(proved);
+        let of_boards = value_hi;
+        let value_hi = stage.value(of_boards);
+        let status = status(proved && value_hi == of_boards);
         let (bench_a, bench_b) = (overlap.map(|overlap| overlap.bench_a), overlap.map(|overlap| overlap.bench_b));
         let (value, head_radius) = (value_hi, overlap.map(|overlap| overlap.head_radius));
         let value_lo = (intervals > 0).then_some(value_lo);
@@ -148,23 +196,28 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
             bench_a,
             bench_b,
             head_radius,
+            clearance: Some(clearance).filter(|clearance| *clearance > 0.0),
+            obstacle: stage.obstacle(&motion),
         })?;
         return output.finish().and(unstopped());
     }
     if let Some(value_hi) = value_hi {
         output.line(&format!(
-            "With a pitch of {value_hi} m the head reaches {radius} m, and no two boards that share no handle touch before."
+            "With a pitch of {value_hi} m the head reaches {radius} m, and no two boards that share no handle {} before.",
+            come_too_near(clearance)
         ))?;
     }
     if let Some(Overlap { bench_a, bench_b, head_radius }) = overlap {
         output.line(&format!(
-            "With {value_lo} m {} and {} (counting from 1) overlap, the head being {head_radius:.6} m from the centre.",
+            "With {value_lo} m {} and {} (counting from 1) {}, the head being {head_radius:.6} m from the centre.",
             bench_name(&scene, bench_a),
-            bench_name(&scene, bench_b)
+            bench_name(&scene, bench_b),
+            are_too_near(clearance)
         ))?;
     }
     let blocked = format!(
-        "with every pitch from {from} m to {value_lo} m two boards overlap, or a link locks, before {radius} m"
+        "with every pitch from {from} m to {value_lo} m two boards {}, or a link locks, before {radius} m",
+        are_too_near(clearance)
     );
     let searched = format!("the search {} after {intervals} intervals of pitches", given_up());
     output.line(&match value_hi {
@@ -180,6 +233,9 @@ fn plan_pitch(common: &Common, radius: f64, file: Option<&Path>) -> Result<(), C
         None if intervals > 0 => format!("Not decided: {searched}. What is proved: {blocked}."),
         None => format!("Not decided: the search {}, and nothing is proved.", given_up()),
     })?;
+    if let Some(sentence) = stage.sentence(&motion, "pitch", value_hi) {
+        output.line(&sentence)?;
+    }
     output.finish().and(unstopped())
 }
 
@@ -228,13 +284,6 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
         )
     })?;
     output.finish().and(unstopped())
-}
-
-/// Warns that the obstacles of a scene change nothing.
-fn warn_of_obstacles(scene: &Scene) {
-    if !scene.ensemble.ground().is_empty() {
-        log::warn!("the plan leaves out the obstacles of the scene: it is about boards alone");
-    }
 }
 
 impl From<PlanError> for CommandError {

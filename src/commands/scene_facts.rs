@@ -35,11 +35,12 @@ fn clearance(scene: &Scene) -> Option<ClearanceCurve> {
 /// Returns the least clearance of the show; `None` if a search gave up.
 fn least(scene: &Scene, timeline: &Timeline, show_end: &TimedEvent) -> Option<LeastOfShow> {
     let mut silent = unreported;
-    let boards = scene.ensemble.least_clearances(timeline, show_end, &mut silent).of_show;
+    let boards = scene.ensemble.least_clearances(timeline, show_end, &mut silent);
     let obstacles = scene.ensemble.obstacle_clearances(show_end, &mut silent);
-    let is_whole = boards.is_none_or(|found| found.searched_until.is_none())
+    let is_whole = boards.is_complete
+        && obstacles.len() == scene.ensemble.ground().obstacles().len()
         && obstacles.iter().all(|found| found.searched_until.is_none());
-    let of_boards = boards.map(|found| LeastOfShow {
+    let of_boards = boards.of_show.map(|found| LeastOfShow {
         time: found.time,
         clearance: found.least.value,
         bench_a: found.least.bench_a,

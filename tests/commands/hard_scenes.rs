@@ -47,6 +47,19 @@ fn answer(arguments: &[&str]) -> (i32, String, String) {
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }
 
+/// On the line behind the start a handle is a link behind the head, to the last digits of the least accuracy.
+#[test]
+fn the_least_accuracy_is_kept() {
+    let (code, rows, errors) = answer(&["--scene", "tests/scenes/small_spirals.toml", "solve", "--at", "0"]);
+    assert_eq!(code, 0, "{errors}");
+    let link: f64 = 0.813_035_332_895_928_4 - 2.0 * 0.127_285_320_552_759_32;
+    for (handle, row) in rows.lines().skip(1).enumerate() {
+        let y: f64 = row.split(',').nth(3).unwrap().parse().unwrap();
+        let promised = 1e-15f64.max(8.0 * f64::EPSILON * y.abs());
+        assert!((y + handle as f64 * link).abs() <= promised, "{row}");
+    }
+}
+
 /// N1: no bench is pushed off a route, since an endless straight line lies behind its start.
 #[test]
 fn a_team_that_is_pushed_back_stays_on_its_route() {

@@ -14,6 +14,7 @@ mod hard_scenes;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod interrupted;
+mod margin;
 mod packages;
 mod placement;
 mod require;

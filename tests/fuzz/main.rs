@@ -12,8 +12,7 @@ mod targets;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Once, mpsc};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError, mpsc};
 use std::time::Duration;
 
 use fastrand::Rng;
@@ -31,8 +30,13 @@ const HUNG: Duration = Duration::from_secs(300);
 /// The name of the threads that run cases.
 const CASES: &str = "cases";
 
-/// Panics so far in threads that a target has started, such as a server's.
-static PANICS: AtomicU64 = AtomicU64::new(0);
+/// Panics so far in threads that a target has started, such as a server's. No one knows which target: several run at
+/// the same time. The place in the sentence shows it.
+static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+fn panics() -> MutexGuard<'static, Vec<String>> {
+    PANICS.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 fn count_panics() {
     static HOOK: Once = Once::new();
@@ -42,7 +46,9 @@ fn count_panics() {
             let thread = std::thread::current();
             let is_own =
                 thread.name().is_some_and(|name| name == CASES || TARGETS.iter().any(|target| name == target.name));
-            PANICS.fetch_add(u64::from(!is_own), Ordering::SeqCst);
+            if !is_own {
+                panics().push(info.to_string());
+            }
             before(info);
         }));
     });
@@ -65,14 +71,17 @@ fn setting(name: &str) -> Option<u64> {
 
 /// Runs an input: returns true if it was accepted, or the error.
 fn outcome(target: &Target, input: &[u8]) -> Result<bool, String> {
-    let before = PANICS.load(Ordering::SeqCst);
+    let before = panics().len();
     let said = |panic: Box<dyn Any + Send>| match panic.downcast::<String>() {
         Ok(text) => *text,
         Err(panic) => panic.downcast_ref::<&str>().copied().unwrap_or("a panic").to_owned(),
     };
     let run = catch_unwind(AssertUnwindSafe(|| (target.run)(input)));
     match run {
-        Ok(_) if PANICS.load(Ordering::SeqCst) != before => Err("another thread panicked".to_owned()),
+        Ok(_) if panics().len() > before => Err(format!(
+            "a thread of this target, or of one that runs at the same time, {}",
+            panics()[before..].join("; and then ")
+        )),
         run => run.map_err(said),
     }
 }

@@ -1,14 +1,14 @@
 """The least turn radius of a link by a search of its own: the radius below which the link locks.
 
-    least_turn.py PITCH LINK ARC_RATIO [BENCHES BODY_LINK INSET WIDTH]
+    least_turn.py PITCH LINK ARC_RATIO [BENCHES BODY_LINK INSET WIDTH [CLEARANCE]]
 
 A link locks where its rear handle is at a place p of the path whose tangent is perpendicular to the link. The front
 handle is then at the first place ahead at the distance of the link. So the least product of tangent and link over all p
 is 0 with the least radius. Prints that radius, and the metres from the beginning of the S to p. No contact and no stall
 is looked for. The script shares no code with the program.
 
-With the team's size the script prints another line. The line has the radius at which the boards come free, and the two
-benches that overlap last, counted from 0.
+With the team's size the script prints another line. The line has the radius at which the boards come free, or as far
+apart as the clearance, and the two benches that do so last, counted from 0.
 """
 
 import math
@@ -122,12 +122,30 @@ def root(function, low, high):
     return at
 
 
+def distance(one, other):
+    """Returns the distance of two rectangles that are apart, by their corners."""
+    both = [(one, other), (other, one)]
+    return min(to_segment(corner, *side) for mine, yours in both for corner in mine for side in sides(yours))
+
+
+def sides(corners):
+    front_left, front_right, rear_left, rear_right = corners
+    around = [front_left, front_right, rear_right, rear_left]
+    return zip(around, around[1:] + around[:1])
+
+
+def to_segment(point, begin, end):
+    (x, y), (u, v) = (point[0] - begin[0], point[1] - begin[1]), (end[0] - begin[0], end[1] - begin[1])
+    share = min(max((x * u + y * v) / (u * u + v * v), 0.0), 1.0)
+    return math.hypot(x - share * u, y - share * v)
+
+
 class Boards:
     """The boards of a team, links and sizes in metres."""
 
-    def __init__(self, benches, links, inset, width):
+    def __init__(self, benches, links, inset, width, clearance=0.0):
         self.links = [links[0]] + [links[1]] * (benches - 1)
-        self.inset, self.half_width = inset, 0.5 * width
+        self.inset, self.half_width, self.clearance = inset, 0.5 * width, clearance
 
     def handles(self, turn, s, count):
         points = [turn.at(s)[0]]
@@ -158,13 +176,15 @@ class Boards:
         return corners, (c, n)
 
     def gap(self, boards, a, b):
-        """Returns the greatest gap of two boards along a side: below 0 if and only if they overlap."""
+        """Returns a number that is below 0 if and only if two boards are nearer than the clearance."""
         greatest = -math.inf
         for axis in (*boards[a][1], *boards[b][1]):
             one = [axis[0] * x + axis[1] * y for x, y in boards[a][0]]
             other = [axis[0] * x + axis[1] * y for x, y in boards[b][0]]
             greatest = max(greatest, min(other) - max(one), min(one) - max(other))
-        return greatest
+        if greatest <= 0 or self.clearance == 0:
+            return greatest - self.clearance
+        return distance(boards[a][0], boards[b][0]) - self.clearance
 
     def gap_at(self, turn, s, a, b):
         points = self.handles(turn, s, b + 1)
@@ -221,8 +241,8 @@ def main():
             high = middle
     print(f"{high:.12f} {least_product(Turn(high, pitch, ratio), link)[1]:.6f}")
     if team:
-        benches, body, inset, width = team
-        boards = Boards(int(benches), (link, body), inset, width)
+        benches, body, inset, width, *clearance = team
+        boards = Boards(int(benches), (link, body), inset, width, *clearance)
         radius, a, b = contact(boards, lambda radius: Turn(radius, pitch, ratio), 1.001 * high)
         print(f"{radius:.12f} {a} {b}")
 

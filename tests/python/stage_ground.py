@@ -141,7 +141,9 @@ def lines_join_what_is_nearest():
             start, end = (numpy.array([place["x"], place["y"]]) for place in mark["line"])
             assert abs(numpy.hypot(*(end - start)) - mark["place"]["away"]) < 1e-6, mark
         start = shapely.Point(met["line"][0]["x"], met["line"][0]["y"])
-        assert boards[met["benches"][0]].distance(start) < 1e-6, met
+        # The handles are of 32 bits, which is a micrometre here, and the page and this test make boards of them each in
+        # its own way.
+        assert boards[met["benches"][0]].distance(start) < 1e-5, met
         # The panel's clearance is the least of both.
         command("pause")
         until(page, "document.getElementById('playback').textContent.includes('PAUSED')", "a pause")

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use syn::{Item, UseTree};
 
-use super::rooms::{crates, sources};
+use super::rooms::{crates, dependencies, listed, sources};
 
 /// The names that lead from the root of a crate to a module or an item in it.
 type Names = Vec<String>;
@@ -177,4 +177,20 @@ fn no_files_import_each_other_in_a_circle() {
         assert_eq!(modules.circles(), BTreeSet::new());
     }
     assert!(arrows > 500, "{arrows} imports were found");
+}
+
+/// Cargo permits a circle through `[dev-dependencies]`, and compiles the crate twice then.
+#[test]
+fn no_crate_needs_one_above_it_for_its_tests() {
+    let mut arrows = 0;
+    for name in crates() {
+        let (mut needed, mut next) = (BTreeSet::new(), Vec::from_iter(listed(&name, "dev-dependencies")));
+        arrows += next.len();
+        while let Some(below) = next.pop() {
+            next.extend(dependencies(&below).into_iter().filter(|further| !needed.contains(further)));
+            needed.insert(below);
+        }
+        assert!(!needed.contains(&name), "the tests of {name} need a crate that depends on it: {needed:?}");
+    }
+    assert!(arrows > 5, "{arrows} dev-dependencies were found");
 }

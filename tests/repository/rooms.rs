@@ -15,10 +15,15 @@ pub(crate) fn crates() -> Vec<String> {
 }
 
 /// Returns the crates of this workspace that a manifest names among its dependencies.
-fn dependencies(name: &str) -> BTreeSet<String> {
+pub(crate) fn dependencies(name: &str) -> BTreeSet<String> {
+    listed(name, "dependencies")
+}
+
+/// Returns the crates of this workspace that a table of a manifest names.
+pub(crate) fn listed(name: &str, table: &str) -> BTreeSet<String> {
     let manifest: Table = std::fs::read_to_string(format!("crates/{name}/Cargo.toml")).unwrap().parse().unwrap();
-    let normal = manifest.get("dependencies").and_then(|table| table.as_table()).cloned().unwrap_or_default();
-    normal.keys().filter_map(|key| key.strip_prefix("bench-dragon-")).map(str::to_owned).collect()
+    let listed = manifest.get(table).and_then(|table| table.as_table()).cloned().unwrap_or_default();
+    listed.keys().filter_map(|key| key.strip_prefix("bench-dragon-")).map(str::to_owned).collect()
 }
 
 /// Returns all Rust files below a folder.

@@ -141,6 +141,24 @@ pub(super) fn certify_part(
 /// A function that receives each line of a certificate.
 pub type Write<'w> = &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>;
 
+/// Returns true if all boards of a motion are proved to stay outside the keep-outs of its stage, and no link to lock,
+/// from the start until the head has travelled `to` metres.
+pub(super) fn stays_outside(motion: &Motion, to: f64, progress: Progress<'_>) -> bool {
+    let mut descent = Descent::new(chain_of(motion), to, MOST_CLEARANCE_STEPS, None);
+    let length = motion.path().length();
+    let target = if to < length {
+        descent.beside(to, 1.0, |travelled| travelled.lo >= to)
+    } else {
+        Some(path_end(&descent.chain.exact, motion.path()))
+    };
+    // A clearance of more than 0 is to be shown.
+    let outside = UpperBeside { value: WIDTH, travelled: 0.0, head: [descent.at.head; 2], bench: 0 };
+    descent.beside.iter_mut().for_each(|beside| beside.upper = Some(outside));
+    let is_at_end = target.is_some_and(|target| descent.go_to(&target, progress).is_none());
+    let is_shown = |beside: &Beside| !beside.is_lost && beside.shown.is_some_and(|(least, _)| least >= 0.0);
+    is_at_end && descent.beside.iter().all(is_shown)
+}
+
 fn chain_of(motion: &Motion) -> Chain<'_> {
     let chain = Chain::new(motion.path(), ExactPath::new(motion.description()), motion.team());
     Chain { barriers: ground::barriers(motion), ..chain }
@@ -385,9 +403,9 @@ impl<'a, 'w> Descent<'a, 'w> {
         self.at.head
     }
 
-    /// Returns true if no two boards touch, and no link locks, from the start to `target`.
-    pub fn stays_clear_to(mut self, target: &GridPoint, progress: Progress<'_>) -> bool {
-        self.floor = Some(0.0);
+    /// Returns true if boards are further apart than `metres`, and no link locks, from the start to `target`.
+    pub fn stays_apart_to(mut self, target: &GridPoint, metres: f64, progress: Progress<'_>) -> bool {
+        self.floor = Some(metres);
         self.go_to(target, progress).is_none()
     }
 

@@ -24,6 +24,7 @@ mod pitch;
 mod place;
 pub mod plan;
 mod search;
+mod spaced;
 pub mod speed;
 mod step;
 mod turn;

@@ -233,8 +233,12 @@ pub enum CertificateLine<'a> {
         radius: f64,
         /// The least pitch that is tested, metres per turn.
         from: f64,
+        /// The required clearance of boards, in metres.
+        #[serde(skip_serializing_if = "is_zero")]
+        clearance: f64,
     },
-    /// Two boards overlap with all pitches of an interval. Coordinates are in units of pitch / 2 pi.
+    /// Two boards overlap, or are nearer than the clearance, with all pitches of an interval. Coordinates are in units
+    /// of pitch / 2 pi.
     Overlap {
         /// The least pitch, metres per turn.
         from: f64,
@@ -246,8 +250,11 @@ pub enum CertificateLine<'a> {
         benches: [usize; 2],
         /// The spans of the handles from 1 on.
         spans: Vec<Span>,
-        /// The point.
+        /// A point of both boards; with `other`, of the first.
         point: [f64; 2],
+        /// A point of the second board.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        other: Option<[f64; 2]>,
     },
     /// The head's link locks with all pitches of an interval.
     HeadLocks {
@@ -286,8 +293,11 @@ pub struct CertifiedPitch {
     pub radius: f64,
     /// The least pitch that is tested, metres per turn.
     pub from: f64,
-    /// The lower pitch, in metres per turn: with every pitch from `from` to this one, two boards overlap or a link
-    /// locks before.
+    /// The required clearance of boards that share no handle, in metres; 0 if they need only be apart.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub clearance: f64,
+    /// The lower pitch, in metres per turn: with every pitch from `from` to this one, two boards overlap or are nearer
+    /// than `clearance`, or a link locks before.
     pub value_lo: Option<f64>,
     /// The higher pitch, in metres per turn: with it the head reaches the radius.
     pub value_hi: Option<f64>,
@@ -458,6 +468,11 @@ pub enum Status {
         /// The reason, in words.
         because: String,
     },
+}
+
+/// Returns true for the default of a number that is left out.
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 fn no_places(at: &[Vec<Place>; 2]) -> bool {

@@ -13,6 +13,7 @@ use super::interval::Interval;
 use super::lines::{CertificateLine, Links, Step};
 use super::path::ExactPath;
 use super::place::{Place, Span};
+use super::spaced::Spaced;
 use super::step::{Chain, Claim, Listed, link_of};
 use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::description::PathDescription;
@@ -22,8 +23,8 @@ use bench_dragon_motion::model::team::Team;
 /// An interval of pitches, and a position of a team on such a spiral.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pitches<'a> {
-    /// The team.
-    pub team: &'a Team,
+    /// The team, and the clearance that boards must keep.
+    pub asked: Spaced<'a>,
     /// The least pitch, metres per turn.
     pub from: f64,
     /// The greatest pitch, metres per turn.
@@ -45,10 +46,10 @@ impl Pitches<'_> {
         Interval::point(radius).over(self.radius_per_radian()).is_below(Interval::point(self.theta))
     }
 
-    /// Returns the spans of the handles from 1 on, and a point that the two boards are proved to have in common with
-    /// every pitch. Returns `None` without a proof. Lengths are in units of a.
-    pub fn overlap(&self) -> Option<(Vec<Span>, [f64; 2])> {
-        let Self { team, from, to, theta, benches } = *self;
+    /// Returns the spans of the handles from 1 on, and a point of each of the two boards with every pitch. The points
+    /// are one, or nearer than the clearance. Returns `None` without a proof. Lengths are in units of a.
+    pub fn overlap(&self) -> Option<(Vec<Span>, [[f64; 2]; 2])> {
+        let Self { asked: Spaced { team, clearance }, from, to, theta, benches } = *self;
         if benches[0] + 2 > benches[1] || benches[1] >= team.benches {
             return None;
         }
@@ -70,8 +71,8 @@ impl Pitches<'_> {
         while listed.handles.len() <= handle {
             listed.extend(first, last, claim).ok()?;
         }
-        let point = chain.common_point(&listed.handles, benches)?;
-        Some((listed.handles[1..].iter().map(|handle| handle.span).collect(), point))
+        let points = chain.near_points(&listed.handles, benches, Interval::point(clearance).over(a))?;
+        Some((listed.handles[1..].iter().map(|handle| handle.span).collect(), points))
     }
 }
 
@@ -113,10 +114,11 @@ pub(crate) fn head_locks(team: &Team, (from, to): (f64, f64), radius: f64) -> bo
     Interval::ONE.is_below(theta)
 }
 
-/// Returns a distance from the centre, at least `radius` and little more than the least. By Lemma 8 no two boards touch
-/// and no link locks while the head is further out. Returns `None` if the lemma shows it for no sensible distance.
-pub(crate) fn clear_beyond(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
-    far::least_radius(team, pitch, radius)
+/// Returns a distance from the centre, at least `radius` and little more than the least. By Lemma 8 no two boards are as
+/// near as `clearance` and no link locks while the head is further out. Returns `None` if the lemma shows it for no
+/// sensible distance.
+pub(crate) fn clear_beyond(asked: Spaced<'_>, pitch: f64, radius: f64) -> Option<f64> {
+    far::least_radius(asked, pitch, radius)
 }
 
 /// Limit of turns of a scene: no steps are tried beyond.
@@ -127,21 +129,22 @@ const MOST_TURNS: f64 = 1e7;
 pub(crate) struct Reached {
     /// The distance from the centre, in metres, from which on Lemma 8 holds.
     pub far: f64,
-    /// The steps from there to the radius.
+    /// The steps from there to the radius, if requested.
     pub steps: Vec<Step>,
 }
 
 /// Returns the proof, if there is one, that a team reaches `radius`, metres from the centre, on a spiral of this pitch
-/// from any distance. Until the head's front handle is there, no two boards touch and no link locks. `progress`
-/// receives the share of the way that is done.
+/// from any distance. Until the head's front handle is there, no two boards are as near as `clearance` and no link
+/// locks. `keeps` requests the steps. `progress` receives the share of the way that is done.
 pub(crate) fn reaches(
-    team: &Team,
+    asked: Spaced<'_>,
     pitch: f64,
     radius: f64,
-    most_steps: u64,
+    (most_steps, keeps): (u64, bool),
     progress: Progress<'_>,
 ) -> Option<Reached> {
-    let far = clear_beyond(team, pitch, radius)?;
+    let Spaced { team, clearance } = asked;
+    let far = clear_beyond(asked, pitch, radius)?;
     let mut steps = Vec::new();
     if far <= radius {
         return Some(Reached { far, steps });
@@ -165,7 +168,8 @@ pub(crate) fn reaches(
         Ok(())
     };
     let chain = Chain::new(&path, exact, team);
-    let descent = Descent::new(chain, travelled, most_steps, Some(&mut keep)).after_all_further_out();
-    let holds = far <= (a * descent.head().1).lo && descent.stays_clear_to(&end, progress);
+    let descent =
+        Descent::new(chain, travelled, most_steps, if keeps { Some(&mut keep) } else { None }).after_all_further_out();
+    let holds = far <= (a * descent.head().1).lo && descent.stays_apart_to(&end, clearance, progress);
     holds.then_some(Reached { far, steps })
 }

@@ -6,12 +6,15 @@
 //!
 //! In: a team or a scene. Out: two numbers that enclose the answer, proved, and the place that decides it.
 
+mod keep_outs;
 mod pitch;
 mod speed;
 mod trial;
 mod turn;
 mod turn_trial;
 
+pub use crate::spaced::Spaced;
+pub use keep_outs::{Outside, Planned, is_on_stage, outside_keep_outs};
 pub use pitch::{LeastPitch, Overlap, certify_least_pitch, least_pitch};
 pub use speed::{GreatestSpeed, certify_greatest_speed, greatest_speed};
 pub use turn::{LeastTurn, TurnLimit, least_turn};

@@ -149,6 +149,12 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         self
     }
 
+    /// Lets boards that are not further apart than some metres count as touching.
+    pub fn with_clearance(mut self, metres: f64) -> Self {
+        self.chain.clearance = metres;
+        self
+    }
+
     /// Leaves boards out: nothing is claimed of a contact.
     pub fn without_boards(mut self) -> Self {
         self.clear = false;

@@ -7,7 +7,7 @@ use super::branch::{Branch, branches, link_kind};
 use super::capsule::{Spanned, moved_back};
 use super::grid::{GridPoint, span};
 use super::ground::Barrier;
-use super::interval::Interval;
+use super::interval::{Interval, minus, norm};
 use super::lines::{Links, Step};
 use super::link::{Front, follower_within};
 use super::path::ExactPath;
@@ -16,7 +16,7 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::path::Path;
-use bench_dragon_motion::model::separation::overlap_centre;
+use bench_dragon_motion::model::separation::{closest_points_board_board, overlap_centre, separation_board_board};
 use bench_dragon_motion::model::team::Team;
 
 /// The statements that a step must show.
@@ -75,6 +75,8 @@ pub(super) struct Chain<'a> {
     /// The obstacles of the stage.
     pub barriers: Vec<Barrier>,
     pub branches: Vec<Branch>,
+    /// The metres that boards must keep from each other to be clear.
+    pub clearance: f64,
 }
 
 /// Length added to both ends of a span, as a multiple of the rounding of doubles.
@@ -98,7 +100,7 @@ impl<'a> Chain<'a> {
         let branches = branches(path, &exact, team);
         let kinds = team.kinds();
         let (links, shapes) = (kinds.map(|bench| link_of(team, bench)), kinds.map(|bench| Shape::new(team, bench)));
-        Self { path, exact, team, links, shapes, start: None, barriers: Vec::new(), branches }
+        Self { path, exact, team, links, shapes, start: None, barriers: Vec::new(), clearance: 0.0, branches }
     }
 
     /// Returns the metres between the handles of a bench.
@@ -212,6 +214,40 @@ impl<'a> Chain<'a> {
         benches.iter().all(holds).then_some(point)
     }
 
+    /// Returns a point of each of two boards that is proved to be in it. The two are less than `metres` apart, or one
+    /// point if `metres` is not positive.
+    pub fn near_points(&self, handles: &[Spanned], benches: [usize; 2], metres: Interval) -> Option<[[f64; 2]; 2]> {
+        if !metres.is_positive() {
+            return self.common_point(handles, benches).map(|point| [point; 2]);
+        }
+        let boards = benches.map(|bench| self.board(handles, bench).in_doubles());
+        let inside = |metres: f64| {
+            let [one, other] = boards.map(|board| board.grown(-metres));
+            if separation_board_board(&one, &other) > 0.0 {
+                return closest_points_board_board(&one, &other);
+            }
+            let point = overlap_centre(&one, &other);
+            (point, point)
+        };
+        let most = boards.iter().map(|board| board.half_width.min(board.half_length)).fold(f64::INFINITY, f64::min);
+        // As far inside as the metres allow: handles that are uncertain move the boards.
+        let is_too_far = |metres_inside: f64| {
+            let (one, other) = inside(metres_inside);
+            (other - one).norm() >= metres.lo * (1.0 - 1e-12)
+        };
+        let (mut near, mut far) = (0.0, most);
+        while far - near > 1e-3 * near && far > 1e-15 * most {
+            let middle = 0.5 * (near + far);
+            if is_too_far(middle) { far = middle } else { near = middle }
+        }
+        let (one, other) = inside(near);
+        let points = [one, other].map(<[f64; 2]>::from);
+        let [one, other] = points.map(|point| point.map(Interval::point));
+        let holds = |bench: usize, point| self.board(handles, bench).holds(point);
+        let are_near = norm(minus(other, one)).is_below(metres);
+        (are_near && holds(benches[0], one) && holds(benches[1], other)).then_some(points)
+    }
+
     /// Returns the board of a bench from listed handles.
     pub fn board(&self, handles: &[Spanned], bench: usize) -> MovingBoard {
         self.shape(bench).board(handles[bench].capsule, handles[bench + 1].capsule, self.link(bench))
@@ -317,7 +353,7 @@ impl<'c, 'a> Listed<'c, 'a> {
             // No other board has been where a tail with a size of its own is.
             Links::Front if self.chain.team.own_tail().is_some() => self.is_on_line(last),
             Links::Front if !claim.clear => true,
-            Links::Front if self.chain.exact.begins_inward() => self.is_beyond_front(0.0, last),
+            Links::Front if self.chain.exact.begins_inward() => self.is_beyond_front(self.chain.clearance, last),
             _ => self.is_on_line(last),
         }
     }
@@ -373,7 +409,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let is_spiral = chain.exact.begins_inward();
         let innermost: Vec<f64> = (0..=listed).map(|handle| self.innermost(handle)).collect();
         for (a, board) in boards.iter().enumerate() {
-            let outermost = chain.shape(a).outermost(board);
+            let outermost = sum_above(chain.shape(a).outermost(board), chain.clearance);
             let mut beyond = false;
             let Some(first) = chain.first_partner(links, a) else { break };
             for (b, other) in boards.iter().enumerate().skip(first) {
@@ -381,7 +417,7 @@ impl<'c, 'a> Listed<'c, 'a> {
                 if beyond {
                     break;
                 }
-                if !board.is_apart_from(other) {
+                if !board.is_apart_by(chain.clearance, other) {
                     return Err(Obstacle::Pair(a, b));
                 }
             }
@@ -391,7 +427,7 @@ impl<'c, 'a> Listed<'c, 'a> {
                 let apart = if is_spiral {
                     innermost[listed] > outermost
                 } else {
-                    chain.runs(next).all(|run| board.is_apart_from(&self.straight_run(run)))
+                    chain.runs(next).all(|run| board.is_apart_by(chain.clearance, &self.straight_run(run)))
                 };
                 if !apart {
                     return Err(Obstacle::Pair(a, next));
@@ -399,7 +435,7 @@ impl<'c, 'a> Listed<'c, 'a> {
             }
         }
         if links == Links::All && !is_spiral && listed < benches {
-            let inset = Interval::point(chain.team.hole_inset) * 2.0;
+            let inset = Interval::point(chain.team.hole_inset) * 2.0 + Interval::point(chain.clearance);
             if !inset.is_below(chain.links[1]) {
                 return Err(Obstacle::Pair(listed, listed + 2));
             }

@@ -16,6 +16,7 @@ use super::path::ExactPath;
 use super::pitch::clear_beyond;
 use super::place::{Place, Span};
 use super::search::{CertificateSearch, MOST_SPANS, path_end};
+use super::spaced::Spaced;
 use super::step::{Chain, Claim, Listed, link_of};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::{Event, Progress};
@@ -35,6 +36,8 @@ const BLUR: f64 = 1.1;
 /// All turnarounds of a team whose turn radius is in an interval.
 pub(crate) struct Turns<'a> {
     team: &'a Team,
+    /// The required clearance of boards, in metres.
+    clearance: f64,
     /// a = pitch / 2 pi, metres per radian.
     a: Interval,
     radius: Interval,
@@ -49,13 +52,14 @@ impl<'a> Turns<'a> {
     /// Creates the turnarounds of this pitch and arc ratio with turn radii between two. `path` is the turnaround with
     /// the middle radius. Places of an arc are places of `path`. A place of a spiral is the place of `path` at the same
     /// polar angle behind A or beyond -A.
-    pub fn new(team: &'a Team, (pitch, arc_ratio): (f64, f64), radii: [f64; 2], path: Path) -> Self {
+    pub fn new(asked: Spaced<'a>, (pitch, arc_ratio): (f64, f64), radii: [f64; 2], path: Path) -> Self {
+        let Spaced { team, clearance } = asked;
         let radius = Interval { lo: radii[0], hi: radii[1] };
         let a = Interval::point(pitch).over(pi() * 2.0);
         let middle = Interval::point(radius.middle());
         let turned = polar_angle((pitch, radius.middle()));
         let turnarounds = |radius: Interval| ExactPath::turnaround(pitch, radius, arc_ratio, Some(turned), 0.0);
-        Self { team, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
+        Self { team, clearance, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
     }
 
     /// Returns true if, with every radius, a link that passes over `pivot` with one handle is certain to stall or lock.
@@ -88,7 +92,7 @@ impl<'a> Turns<'a> {
         Some(self.exact.curve(innermost).distance_from_centre(innermost.1))
     }
 
-    /// Returns true if, with every radius, two boards are proved to have a point in common while the head is at a
+    /// Returns true if, with every radius, two boards are proved to overlap or to be too near while the head is at a
     /// place. The proof holds if the head comes there without a lock. The place is `head` with the middle radius, and
     /// its coordinate grows by `rate` per metre of the radius.
     pub fn overlap(&self, (head, rate): (Place, f64), [a, b]: [usize; 2]) -> bool {
@@ -117,7 +121,7 @@ impl<'a> Turns<'a> {
             let (link, shape) = (link_of(self.team, bench), Shape::new(self.team, bench));
             FirstOrderBoard::new(&shape, handle(bench), handle(bench + 1), link, half)
         };
-        board(a).at_most(&board(b), When::Always) < 0.0
+        board(a).at_most(&board(b), When::Always) < self.clearance
     }
 
     /// Returns the velocities of handles in metres per metre of the radius: "Velocities" in Lemma 10. `handles` are
@@ -255,9 +259,10 @@ const MOST_STEPS: u64 = 100_000;
 
 impl Passage {
     /// Creates the passage. Returns `None` if Lemma 8 holds at no sensible distance.
-    pub fn new(team: &Team, (pitch, arc_ratio): (f64, f64), turn_radius: f64) -> Option<Self> {
+    pub fn new(asked: Spaced<'_>, (pitch, arc_ratio): (f64, f64), turn_radius: f64) -> Option<Self> {
+        let team = asked.team;
         // Further out than a = pitch / 2 pi a link that is shorter than its distance from the centre does not stall.
-        let far = clear_beyond(team, pitch, turn_radius.max(pitch))?;
+        let far = clear_beyond(asked, pitch, turn_radius.max(pitch))?;
         let length = |radius: f64| Path::spiral(pitch, radius / pitch).length();
         let lead_in = 1.0 + length(far) - length(turn_radius);
         let mut lead_out = team.length();
@@ -279,9 +284,10 @@ impl Passage {
         }
     }
 
-    /// Returns true if the passage is proved to be free of contact, stall and lock, and the last bench to have turned
-    /// at its end. Boards are bounded to the first order if `closely` is true, which passes boards that all but touch.
-    pub fn is_free(&self, team: &Team, closely: bool, progress: Progress<'_>) -> bool {
+    /// Returns true if the passage is proved to be free of stall and lock, with boards further apart than the clearance,
+    /// and the last bench to have turned at its end. Boards are bounded to the first order if `closely` is true, which
+    /// passes boards that are all but too near.
+    pub fn is_free(&self, Spaced { team, clearance }: Spaced<'_>, closely: bool, progress: Progress<'_>) -> bool {
         let travelled = self.path.length();
         let end = Event { kind: EventKind::PathEnd, travelled, bench_a: None, bench_b: None, place: None };
         let given = Given {
@@ -307,7 +313,8 @@ impl Passage {
             }
             Ok(())
         };
-        let search = CertificateSearch::new(given, Vec::new(), &mut keep).on_path(self.exact.clone());
+        let search =
+            CertificateSearch::new(given, Vec::new(), &mut keep).on_path(self.exact.clone()).with_clearance(clearance);
         let search = if closely { search.without_boards() } else { search };
         let found = search.run(progress);
         if !found.is_ok_and(|events| events.iter().all(is_none)) {
@@ -316,7 +323,7 @@ impl Passage {
         let Some(mut at) = last.map(|head| GridPoint::at(head, travelled)) else { return false };
         let chain = || Chain::new(&self.path, self.exact.clone(), team);
         let descent = || Descent::new(chain(), travelled, MOST_STEPS, None);
-        if closely && !descent().stays_clear_to(&path_end(&self.exact, &self.path), progress) {
+        if closely && !descent().stays_apart_to(&path_end(&self.exact, &self.path), clearance, progress) {
             return false;
         }
         let chain = chain();

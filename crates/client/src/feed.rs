@@ -99,47 +99,23 @@ pub enum FeedEvent<'a> {
 ///
 /// # Examples
 ///
-/// A publisher and its subscriber, here in one process:
+/// Prints the place of the head until the publisher ends:
 ///
-/// ```
+/// ```no_run
 /// use std::time::Duration;
 ///
-/// use bench_dragon_motion::event::unreported;
-/// use bench_dragon_publisher::live::{Outgoing, Publisher};
-/// use bench_dragon_show::scene::Scene;
-/// use bench_dragon_show::{Playback, Show};
 /// use bench_dragon_client::connection::Wake;
-/// use bench_dragon_client::feed::{Feed, FeedEvent, FeedOptions, Delivery};
-/// use bench_dragon_publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
-/// use bench_dragon_messages::FrameHeader;
-/// use bench_dragon_show::convert::stage;
+/// use bench_dragon_client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 ///
-/// let scene = Scene::paper();
-/// let mut show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene))?;
-/// let config = PublisherConfig {
-///     name: format!("feed_example_{}", std::process::id()),
-///     handles: scene.ensemble.handles(),
-///     single_precision: None,
-///     queue: 4,
-///     subscribers: 1,
-///     alerts: true,
-///     cues: 0,
-///     scene: String::new(),
-///     stage: stage(1, 0, [0; 32], &scene.ensemble, &show),
-/// };
-/// let mut publisher = SharedMemoryPublisher::open(&config)?;
-///
-/// let mut feed = Feed::new(&config.name, FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
-/// let mut received = 0;
-/// while received < 10 {
-///     let header = FrameHeader { run_id: 1, handles: 224, ..FrameHeader::default() };
-///     publisher.publish(Outgoing::new(&header, show.frame(received)))?;
-///     publisher.maintain();
-///     feed.poll(Duration::from_millis(1), &mut |event| {
-///         if let FeedEvent::Frame { handles, .. } = event {
-///             assert_eq!(handles.len(), 224);
-///             received += 1;
+/// let mut feed = Feed::new("bench_dragon", FeedOptions { wake: Wake::OnFrame, frames: Delivery::All })?;
+/// let mut is_gone = false;
+/// while !is_gone {
+///     feed.poll(Duration::from_millis(200), &mut |event| match event {
+///         FeedEvent::Frame { header, handles, .. } => {
+///             println!("{} s: ({}, {}) m", header.sim_time, handles[0].x, handles[0].y);
 ///         }
+///         FeedEvent::Gone => is_gone = true,
+///         _ => (),
 ///     })?;
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())

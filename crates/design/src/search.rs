@@ -145,8 +145,7 @@ impl Search<'_> {
             return;
         }
         let gave_up = timeline.searched_until().is_some()
-            || least.is_stopped
-            || least.of_show.is_some_and(|found| found.searched_until.is_some())
+            || !least.is_complete
             || beside.len() < scene.ensemble.ground().obstacles().len()
             || beside.iter().any(|found| found.searched_until.is_some());
         let searched = Searched { timeline: &timeline, boards: least.of_show, obstacles: &beside, gave_up: "gave up" };

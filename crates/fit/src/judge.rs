@@ -105,16 +105,10 @@ impl Rules {
             });
         }
         let found = ensemble.least_clearances(&timeline, end, &mut |share| progress(0.1 + 0.5 * share));
-        if found.is_stopped {
-            return None;
-        }
-        let dragons = ensemble.dragons();
-        let can_meet = dragons.len() > 1 || dragons.iter().any(|dragon| dragon.motion.team().benches > 2);
-        if can_meet && found.of_show.is_none() {
+        if !found.is_complete {
             return None;
         }
         if let Some(found) = found.of_show {
-            found.searched_until.is_none().then_some(())?;
             let benches = (found.least.bench_a, Some(found.least.bench_b));
             let margin = found.least.value - self.clearance;
             parts.push(Part { what: What::Boards, margin, time: found.time, benches });

@@ -25,13 +25,7 @@ pub enum EventKind {
 impl EventKind {
     /// Returns the name in JSON and on the terminal.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Contact => "contact",
-            Self::Obstacle => "obstacle",
-            Self::Stall => "stall",
-            Self::Lock => "lock",
-            Self::PathEnd => "path_end",
-        }
+        FrameState::from(self).name()
     }
 }
 
@@ -81,38 +75,33 @@ impl FrameState {
     pub const ALL: [Self; 7] =
         [Self::Moving, Self::Approaching, Self::Contact, Self::Stall, Self::Lock, Self::PathEnd, Self::Obstacle];
 
-    /// Returns the event that led to this state; `None` if no event has happened.
-    pub fn event(self) -> Option<EventKind> {
+    /// Returns the name, the severity and the event of each state: the one table of them.
+    fn facts(self) -> (&'static str, Severity, Option<EventKind>) {
         match self {
-            Self::Moving | Self::Approaching => None,
-            Self::Contact => Some(EventKind::Contact),
-            Self::Stall => Some(EventKind::Stall),
-            Self::Lock => Some(EventKind::Lock),
-            Self::PathEnd => Some(EventKind::PathEnd),
-            Self::Obstacle => Some(EventKind::Obstacle),
+            Self::Moving => ("moving", Severity::Ok, None),
+            Self::Approaching => ("approaching", Severity::Warning, None),
+            Self::Contact => ("contact", Severity::Error, Some(EventKind::Contact)),
+            Self::Stall => ("stall", Severity::Error, Some(EventKind::Stall)),
+            Self::Lock => ("lock", Severity::Error, Some(EventKind::Lock)),
+            // The intended end of a show.
+            Self::PathEnd => ("path_end", Severity::Ok, Some(EventKind::PathEnd)),
+            Self::Obstacle => ("obstacle", Severity::Error, Some(EventKind::Obstacle)),
         }
     }
 
-    /// Returns the severity. The end of the path is the intended end of a show.
+    /// Returns the event that led to this state; `None` if no event has happened.
+    pub fn event(self) -> Option<EventKind> {
+        self.facts().2
+    }
+
+    /// Returns the severity.
     pub fn severity(self) -> Severity {
-        match self {
-            Self::Moving | Self::PathEnd => Severity::Ok,
-            Self::Approaching => Severity::Warning,
-            Self::Contact | Self::Stall | Self::Lock | Self::Obstacle => Severity::Error,
-        }
+        self.facts().1
     }
 
     /// Returns the name in JSON and on the terminal.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Moving => "moving",
-            Self::Approaching => "approaching",
-            Self::Contact => EventKind::Contact.name(),
-            Self::Stall => EventKind::Stall.name(),
-            Self::Lock => EventKind::Lock.name(),
-            Self::PathEnd => EventKind::PathEnd.name(),
-            Self::Obstacle => EventKind::Obstacle.name(),
-        }
+        self.facts().0
     }
 }
 
@@ -130,14 +119,8 @@ impl From<EventKind> for FrameState {
 
 impl From<Level> for FrameState {
     fn from(level: Level) -> Self {
-        match level {
-            Level::Clear => Self::Moving,
-            Level::Approaching => Self::Approaching,
-            Level::Contact => Self::Contact,
-            Level::Stall => Self::Stall,
-            Level::Lock => Self::Lock,
-            Level::Obstacle => Self::Obstacle,
-        }
+        // Levels have the numbers of their states.
+        Self::ALL[level as usize]
     }
 }
 
@@ -164,13 +147,7 @@ impl Level {
 
     /// Returns the level that an event raises; `None` for the end of the path, which raises none.
     pub fn of(kind: EventKind) -> Option<Self> {
-        match kind {
-            EventKind::Contact => Some(Self::Contact),
-            EventKind::Obstacle => Some(Self::Obstacle),
-            EventKind::Stall => Some(Self::Stall),
-            EventKind::Lock => Some(Self::Lock),
-            EventKind::PathEnd => None,
-        }
+        Self::ALL.into_iter().find(|level| *level as u32 == FrameState::from(kind) as u32)
     }
 
     /// Returns true if an event has happened.

@@ -12,15 +12,22 @@ use crate::model::Point;
 ///
 /// ```
 /// use bench_dragon_messages::state::EventKind;
+/// use bench_dragon_motion::ensemble::Ensemble;
 /// use bench_dragon_motion::event::unreported;
-/// use bench_dragon_show::scene::Scene;
+/// use bench_dragon_motion::model::description::PathDescription;
+/// use bench_dragon_motion::model::team::{Ends, Team};
+/// use bench_dragon_motion::{Method, Motion};
 ///
-/// let timeline = Scene::paper().ensemble.timeline_without_contact(&mut unreported);
+/// let team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
+/// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
+/// let motion = Motion::new(path, team, 1.0, Method::Newton)?;
+/// let timeline = Ensemble::alone(motion).timeline_without_contact(&mut unreported);
 /// for timed in timeline.events() {
 ///     println!("{}: {} s, after {} m", timed.event.kind.name(), timed.time, timed.event.travelled);
 /// }
 /// let kinds: Vec<_> = timeline.events().iter().map(|timed| timed.event.kind).collect();
 /// assert_eq!(kinds, [EventKind::Stall, EventKind::Lock]);
+/// # Ok::<(), bench_dragon_motion::MotionError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {

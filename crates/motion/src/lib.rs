@@ -145,7 +145,7 @@ const SINGULARITIES_BUDGET: u64 = 50_000_000;
 /// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
 const CONTACT_BUDGET: u64 = 100_000_000;
 
-const NO_TABLE: &str = "there is no table for this team and path";
+const NO_TABLE: &str = "there is no table for this team and path that is as exact";
 
 /// Describes the measured error of a table, for people.
 fn measured(selection: &Selection, requested: f64) -> String {

@@ -138,17 +138,21 @@ pub enum Velocities {
 /// # Examples
 ///
 /// ```
-/// use bench_dragon_show::scene::Scene;
+/// use bench_dragon_motion::model::description::PathDescription;
+/// use bench_dragon_motion::model::team::{Ends, Team};
 /// use bench_dragon_motion::solve::{Chain, Velocities};
+/// use bench_dragon_motion::{Method, Motion};
 ///
-/// let scene = Scene::paper();
-/// let mut solver = scene.ensemble.solver(Velocities::Computed);
-/// let mut chain = Chain::new(scene.ensemble.handles());
+/// let team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
+/// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
+/// let motion = Motion::new(path, team, 1.0, Method::Accuracy(1e-9))?;
+/// let mut solver = motion.solver(Velocities::Computed).solver;
+/// let mut chain = Chain::new(team.handles());
 /// solver.solve(300.0, &mut chain)?;
 /// // The head of the paper's dragon after 300 s of true motion, and its speed.
 /// assert!((chain.x[0] - 4.420_274_064_106).abs() < 1e-9 && (chain.y[0] - 2.320_428_674_331).abs() < 1e-9);
 /// assert!((chain.speed[0] - 1.0).abs() < 1e-12);
-/// # Ok::<(), bench_dragon_motion::linkage::NoFollower>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Solver: Send {
     /// Returns the name by which a scene selects this solver.

@@ -480,13 +480,14 @@ impl Checker {
                 proved.greatest_speed = Some(outcome);
                 Ok(())
             }
-            ParsedLine::Reach { radius, from } if *about == About::LeastPitch && pitch.is_none() => {
-                *pitch = Some(Pitch::new(radius, from)?);
+            ParsedLine::Reach { radius, from, clearance } if *about == About::LeastPitch && pitch.is_none() => {
+                *pitch = Some(Pitch::new(radius, from, clearance)?);
                 Ok(())
             }
             ParsedLine::Reach { .. } => Err("a line `reach` of another question, or a second one".to_owned()),
-            ParsedLine::Overlap { from, to, theta, benches, spans, point } => {
-                begun(pitch)?.add_overlap(scene, [from, to], theta, benches, &spans, point)
+            ParsedLine::Overlap { from, to, theta, benches, spans, point, other } => {
+                let points = [point, other.unwrap_or(point)];
+                begun(pitch)?.add_overlap(scene, [from, to], theta, benches, &spans, points)
             }
             ParsedLine::HeadLocks { from, to } => begun(pitch)?.add_lock(scene, from, to),
             ParsedLine::Far { pitch: free, radius } => begun(pitch)?.add_far(scene, free, radius),

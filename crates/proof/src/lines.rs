@@ -135,6 +135,8 @@ pub(super) enum ParsedLine {
     Reach {
         radius: f64,
         from: f64,
+        #[serde(default)]
+        clearance: f64,
     },
     Overlap {
         from: f64,
@@ -143,6 +145,8 @@ pub(super) enum ParsedLine {
         benches: [usize; 2],
         spans: Vec<Span>,
         point: [f64; 2],
+        #[serde(default)]
+        other: Option<[f64; 2]>,
     },
     HeadLocks {
         from: f64,
@@ -327,11 +331,19 @@ pub struct ProvedPitch {
     pub radius: f64,
     /// The least pitch that is looked at, metres per turn.
     pub from: f64,
-    /// The lower pitch, in metres per turn: with every pitch from `from` to this one, two boards overlap or a link
-    /// locks before.
+    /// The required clearance of boards that share no handle, in metres; 0 if they need only be apart.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub clearance: f64,
+    /// The lower pitch, in metres per turn: with every pitch from `from` to this one, two boards are nearer than
+    /// `clearance` or overlap, or a link locks before.
     #[serde(default)]
     pub value_lo: Option<f64>,
     /// The higher pitch, in metres per turn: with it the head reaches the radius.
     #[serde(default)]
     pub value_hi: Option<f64>,
+}
+
+/// Returns true for the default of a number that is left out.
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }

@@ -24,6 +24,8 @@ pub(super) struct Pitch {
     /// reach the radius.
     from: f64,
     blocked: f64,
+    /// The required clearance of boards, in metres.
+    clearance: f64,
     /// The pitch that is shown to be free.
     free: Option<Free>,
     /// Counts for the report.
@@ -41,16 +43,19 @@ struct Free {
 }
 
 impl Pitch {
-    /// Begins with the radius that is to be reached, and the least pitch.
+    /// Begins with the radius that is to be reached, the least pitch, and the clearance that boards must keep.
     ///
     /// # Errors
-    /// A number that is not positive.
-    pub fn new(radius: f64, from: f64) -> Result<Self, String> {
+    /// A radius or pitch that is not positive, or a negative clearance.
+    pub fn new(radius: f64, from: f64, clearance: f64) -> Result<Self, String> {
         let is_positive = |number: f64| number.is_finite() && number > 0.0;
         if !(is_positive(radius) && is_positive(from)) {
             return Err("the radius and the least pitch are not both positive".to_owned());
         }
-        Ok(Self { radius, from, blocked: from, free: None, intervals: 0, links: 0 })
+        if !(clearance.is_finite() && clearance >= 0.0) {
+            return Err(format!("the clearance is {clearance:?} m, expected 0 or more"));
+        }
+        Ok(Self { radius, from, blocked: from, clearance, free: None, intervals: 0, links: 0 })
     }
 
     /// Returns the polar angle of the radius with all pitches from `from` to `to`.
@@ -68,8 +73,8 @@ impl Pitch {
         Ok(())
     }
 
-    /// Checks and adds an interval of pitches with which two boards overlap, the head at the angle `theta`. Lengths are
-    /// in units of a.
+    /// Checks and adds an interval of pitches with which two boards overlap or are too near, the head at the angle
+    /// `theta`. The first point is in both boards; with a second one, each is in one of them. Lengths are in units of a.
     ///
     /// # Errors
     /// The condition that does not follow.
@@ -80,7 +85,7 @@ impl Pitch {
         theta: f64,
         [a, b]: [usize; 2],
         spans: &[Span],
-        point: [f64; 2],
+        points: [[f64; 2]; 2],
     ) -> Result<(), String> {
         self.next(from, to)?;
         if b < 2 || a > b - 2 || b >= spans.len() {
@@ -89,14 +94,20 @@ impl Pitch {
         if !self.theta(from, to).is_at_most(&Interval::new(theta)) {
             return Err("the head may be inside the radius".to_owned());
         }
-        let scene = scene.in_units(&growth(from, to));
+        let unit = growth(from, to);
+        let [one, other] = points.map(|[x, y]| Vector::new(x, y));
+        let clearance = Interval::new(self.clearance) / unit;
+        if points[0] != points[1] && !one.minus(&other).norm().is_below(&clearance) {
+            return Err("the two points may be as far apart as the clearance".to_owned());
+        }
+        let scene = scene.in_units(&unit);
         let head = Place(0, theta, 0.0);
         let chain = Chain::check(&scene, Span(head, head), spans)?;
         self.links += chain.products.len() as u64;
-        for bench in [a, b] {
+        for (bench, point) in [(a, one), (b, other)] {
             let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
             let board = Board::new(front, rear, scene.team.size(bench));
-            if !covers(&board, &Vector::new(point[0], point[1])) {
+            if !covers(&board, &point) {
                 return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
             }
         }
@@ -138,8 +149,9 @@ impl Pitch {
         if self.free.is_some() || !(is_positive(pitch) && is_positive(far)) {
             return Err("a second pitch, or a number that is not positive".to_owned());
         }
-        if !far::holds(&scene.team, pitch, &Interval::new(far)) {
-            return Err(format!("boards may touch further out than {far:?} m (Lemma 8)"));
+        let half = Interval::new(self.clearance) * Interval::new(0.5);
+        if !far::holds(&scene.team.grown(&half), pitch, &Interval::new(far)) {
+            return Err(format!("boards may touch or be too near further out than {far:?} m (Lemma 8)"));
         }
         self.free = Some(Free { pitch, far, scene: scene.on_spiral(growth(pitch, pitch)), steps: Steps::far_out() });
         Ok(())
@@ -173,9 +185,9 @@ impl Pitch {
     /// # Errors
     /// The condition that does not follow.
     pub fn check(&self, outcome: &ProvedPitch) -> Result<(), String> {
-        let ProvedPitch { radius, from, value_lo, value_hi } = *outcome;
-        if radius != self.radius || from != self.from {
-            return Err("the radius or the least pitch is another".to_owned());
+        let ProvedPitch { radius, from, clearance, value_lo, value_hi } = *outcome;
+        if radius != self.radius || from != self.from || clearance != self.clearance {
+            return Err("the radius, the least pitch or the clearance is another".to_owned());
         }
         if value_lo.is_some_and(|value_lo| !(self.intervals > 0 && value_lo <= self.blocked)) {
             return Err("value_lo does not follow".to_owned());
@@ -186,7 +198,7 @@ impl Pitch {
             let within = |metres: &Interval| metres.is_at_most(&Interval::new(radius));
             within(&Interval::new(free.far))
                 || *all_apart
-                    && *apart >= 0.0
+                    && *apart >= self.clearance
                     && end == apart_end
                     && end.and_then(|end| free.scene.path.spiral_radius(end)).is_some_and(|metres| within(&metres))
         });

@@ -104,6 +104,15 @@ impl Team {
         }
     }
 
+    /// Returns the same team with boards that are larger by `metres` on each side.
+    pub fn grown(&self, metres: &Interval) -> Self {
+        Self {
+            hole_inset: self.hole_inset + metres,
+            widths: self.widths.map(|width| width + metres * Interval::new(2.0)),
+            ..self.clone()
+        }
+    }
+
     /// Returns the metres of the links from bench `first` to bench `last` in one line.
     pub fn links(&self, first: usize, last: usize) -> Interval {
         let number = |links: usize| Interval::new(links as f64);

@@ -24,6 +24,9 @@ use bench_dragon_messages::{
     StageMessage, StageObstacle, StageSegment,
 };
 
+#[cfg(test)]
+mod tests;
+
 /// A stage has room for the most obstacles of a scene and its boundary.
 const _: () = assert!(crate::scene::stage::MOST_OBSTACLES < MOST_OBSTACLES);
 
@@ -230,6 +233,25 @@ pub fn control_response(id: u64, outcome: &Outcome) -> ControlResponse {
 
 /// Returns the stage of the dragons, with the events and cues of their show. `scene_hash` is BLAKE3 of the scene's text,
 /// or zeros without a text.
+///
+/// # Examples
+///
+/// ```
+/// use bench_dragon_messages::state::EventKind;
+/// use bench_dragon_motion::event::unreported;
+/// use bench_dragon_show::convert::stage;
+/// use bench_dragon_show::scene::Scene;
+/// use bench_dragon_show::{Playback, Show};
+///
+/// let scene = Scene::paper();
+/// let show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene)).unwrap();
+/// let message = stage(1, 0, [0; 32], &scene.ensemble, &show);
+/// let stage = &message.stage;
+/// assert_eq!((stage.dragons.len(), stage.first_dragon().benches), (1, 223));
+/// assert_eq!(message.path(stage.first_dragon())[0].kind_name(), "inward_spiral");
+/// assert_eq!(stage.events[0].kind(), Some(EventKind::Contact));
+/// assert!((stage.freeze_time - 412.473_837_682).abs() < 1e-9);
+/// ```
 pub fn stage(
     run_id: u64,
     stamp_ns: u64,
@@ -351,7 +373,7 @@ fn stage_event(timed: &TimedEvent) -> StageEvent {
 }
 
 /// Returns the stage segment of a path segment.
-pub fn stage_segment(outline: &SegmentOutline) -> StageSegment {
+fn stage_segment(outline: &SegmentOutline) -> StageSegment {
     let SegmentOutline { kind, start, heading, length } = *outline;
     let (kind, curvature, theta_first, theta_last, pitch) = match kind {
         OutlineKind::Line => (SEGMENT_LINE, 0.0, f64::NAN, f64::NAN, f64::NAN),
@@ -366,72 +388,4 @@ pub fn stage_segment(outline: &SegmentOutline) -> StageSegment {
     };
     let (x, y) = (start.x, start.y);
     StageSegment { x, y, heading, length, curvature, theta_first, theta_last, pitch, kind, reserved: 0 }
-}
-
-#[cfg(test)]
-mod tests {
-    use bench_dragon_messages::state::{EventKind, Level};
-
-    use super::*;
-
-    const NEAREST: PairClearance = PairClearance {
-        value: 0.25,
-        bench_a: 3,
-        bench_b: 17,
-        point_a: Point::new(1.0, 2.0),
-        point_b: Point::new(2.0, 6.0),
-    };
-
-    #[test]
-    fn a_decimated_frame_has_head_and_tail_and_each_handle_once() {
-        for (handles, every, expected) in [
-            (224, 100, vec![0, 100, 200, 223]),
-            (224, 223, vec![0, 223]),
-            (224, 222, vec![0, 222, 223]),
-            (224, 1_000_000, vec![0, 223]),
-            (15, 7, vec![0, 7, 14]),
-            (2, 1, vec![0, 1]),
-            (4, 1, vec![0, 1, 2, 3]),
-        ] {
-            let decimation = Decimation::new([handles], every);
-            assert_eq!(decimation.handles(), expected, "{decimation:?}");
-        }
-        // Both ends of each of two dragons.
-        assert_eq!(Decimation::new([15, 4], 7).handles(), [0, 7, 14, 15, 18]);
-    }
-
-    fn timed(kind: EventKind, bench_b: Option<u32>) -> TimedEvent {
-        let event = Event { kind, travelled: 412.0, bench_a: Some(0), bench_b, place: Some(Point::new(-1.0, -2.0)) };
-        TimedEvent { event, time: 412.5 }
-    }
-
-    #[test]
-    fn an_alert_has_the_nearest_pair_and_the_event_each_in_its_place() {
-        let header = FrameHeader { run_id: 7, tick: 9, stamp_ns: 11, sim_time: 402.5, ..Default::default() };
-        let event = Some(timed(EventKind::Contact, Some(8)));
-        let message = collision_alert(&header, &Alert { level: Level::Approaching, event, nearest: Some(NEAREST) });
-        assert_eq!((message.run_id, message.tick, message.stamp_ns, message.sim_time), (7, 9, 11, 402.5));
-        assert_eq!((message.level, message.event), (1, 2));
-        assert_eq!((message.event_time, message.time_to_event), (412.5, 10.0));
-        assert_eq!((message.bench_a, message.bench_b, message.clearance), (3, 17, 0.25));
-        assert_eq!((message.x, message.y), (1.5, 4.0));
-        assert_eq!((message.event_bench_a, message.event_bench_b), (0, 8));
-        assert_eq!((message.event_x, message.event_y), (-1.0, -2.0));
-    }
-
-    #[test]
-    fn a_stall_has_one_bench_and_nothing_at_all_has_none() {
-        let header = FrameHeader { sim_time: 420.0, ..Default::default() };
-        let stall = Some(timed(EventKind::Stall, None));
-        let message = collision_alert(&header, &Alert { level: Level::Stall, event: stall, nearest: None });
-        assert_eq!((message.level, message.event, message.event_bench_b), (3, 3, NO_BENCH));
-        assert_eq!(message.event_benches().collect::<Vec<_>>(), [0]);
-        assert!(message.clearance.is_nan() && message.x.is_nan() && message.y.is_nan());
-        let message = collision_alert(&header, &Alert { level: Level::Clear, event: None, nearest: None });
-        assert_eq!((message.event, message.bench_a, message.event_bench_a), (0, NO_BENCH, NO_BENCH));
-        assert!(
-            [message.event_time, message.time_to_event, message.event_x, message.event_y].iter().all(|n| n.is_nan())
-        );
-        assert_eq!(message.nearest_benches().chain(message.event_benches()).count(), 0);
-    }
 }

@@ -6,12 +6,13 @@ use std::path::PathBuf;
 
 use bench_dragon::fit::judge::{Part, What};
 use bench_dragon::fit::search::{FitError, Fitted, Vary, fit};
-use bench_dragon::show::scene::{Accepted, Scene, SceneText, printable};
+use bench_dragon::show::scene::{Scene, SceneText, printable};
 use serde::Serialize;
 
 use super::super::events::bench_name;
 use super::super::signals::{are_searches_stopped, report, unstopped};
 use super::super::{CommandError, Common, Output, figure, progress_bar};
+use super::Spacing;
 
 /// Arguments of `plan fit`.
 #[derive(Debug, clap::Args)]
@@ -20,10 +21,8 @@ pub struct FitArguments {
     /// the number to either side, at least 0.5; may be repeated
     #[arg(long, value_name = "FIELD[=LO..HI]", required = true, value_parser = vary)]
     vary: Vec<Vary>,
-    /// The clearance that is required of any two boards that share no handle, in metres; by default the scene's
-    /// `[require]`, or 0
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
-    clearance: Option<f64>,
+    #[command(flatten)]
+    spacing: Spacing,
     /// Write the scene with these numbers changed to this file, every other byte as it is
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -67,15 +66,11 @@ fn vary(text: &str) -> Result<Vary, String> {
 pub fn plan_fit(common: &Common, arguments: &FitArguments) -> Result<(), CommandError> {
     let text = common.scene_text()?;
     let scene = text.parse()?;
-    if let Some(metres) = arguments.clearance {
-        Accepted::KEEP_OUT.check("--clearance", metres).map_err(CommandError::BadInput)?;
-    }
+    let clearance = arguments.spacing.required(&scene)?;
     if arguments.vary.len() > MOST_FIELDS {
         let sentence = format!("--vary is given {} times, expected at most {MOST_FIELDS}", arguments.vary.len());
         return Err(CommandError::BadInput(sentence));
     }
-    let of_scene = scene.require.and_then(|require| require.clearance);
-    let clearance = arguments.clearance.or(of_scene).unwrap_or(0.0);
     let bar = progress_bar(1000, common).with_message("searching for the numbers");
     let mut progress = |share: f64, margin: f64| -> ControlFlow<()> {
         if margin.is_finite() {

@@ -1,6 +1,6 @@
 //! `plan turn`: the least turn radius.
 
-use bench_dragon::certify::plan::{LeastTurn, TurnLimit, least_turn};
+use bench_dragon::certify::plan::{LeastTurn, Planned, Spaced, TurnLimit, least_turn};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::show::scene::{Accepted, Scene};
 use serde::Serialize;
@@ -8,7 +8,8 @@ use serde::Serialize;
 use super::super::events::bench_name;
 use super::super::signals::{report, unstopped};
 use super::super::{CommandError, Common, Output, progress_bar};
-use super::{given_up, status, warn_of_obstacles};
+use super::stage::Stage;
+use super::{Spacing, are_too_near, given_up, status};
 
 /// The line of `plan turn --json`.
 #[derive(Serialize)]
@@ -23,15 +24,21 @@ struct TurnLine {
     limit: Option<&'static str>,
     bench_a: Option<u32>,
     bench_b: Option<u32>,
+    /// The required clearance, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clearance: Option<f64>,
+    /// The obstacle of the stage that decides, if one does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    obstacle: Option<String>,
 }
 
 /// Plans the turn.
-pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandError> {
+pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> Result<(), CommandError> {
     if let Some(ratio) = arc_ratio {
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
     let (scene, motion) = common.scene_text()?.parse_only()?;
-    warn_of_obstacles(&scene);
+    let clearance = spacing.required(&scene)?;
     let description = motion.description();
     let Some(pitch) = description.pitch().or_else(|| description.pitch_of_turn()) else {
         let sentence = "the scene's path is a route without a turn, or with several: expected path.kind \"spiral\" or \
@@ -40,20 +47,38 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>) -> Result<(), CommandE
     };
     let bar = progress_bar(1000, common).with_message("searching for the turn");
     let mut progress = |share| report(&bar, share);
-    let found = least_turn(motion.team(), pitch, arc_ratio, &mut progress)?;
+    let asked = Spaced { team: motion.team(), clearance };
+    let found = least_turn(asked, pitch, arc_ratio, &mut progress)?;
+    let planned = Planned::Turn { arc_ratio: found.arc_ratio };
+    let stage = Stage::search(&motion, asked, planned, found.value_hi, &mut progress);
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        output.json(&line(&found))?;
+        let on_stage = on_stage(&found, &stage, pitch);
+        output.json(&TurnLine { obstacle: stage.obstacle(&motion), ..line(&on_stage, clearance) })?;
     } else {
-        for sentence in sentences(&scene, pitch, arc_ratio.is_none(), &found) {
+        for sentence in sentences(&scene, (pitch, clearance), arc_ratio.is_none(), &found) {
+            output.line(&sentence)?;
+        }
+        if let Some(sentence) = stage.sentence(&motion, "turn radius", found.value_hi) {
             output.line(&sentence)?;
         }
     }
     output.finish().and(unstopped())
 }
 
-fn line(found: &LeastTurn) -> TurnLine {
+/// Returns the answer with the radius that keeps boards outside the keep-outs, if that is another one.
+fn on_stage(found: &LeastTurn, stage: &Stage, pitch: f64) -> LeastTurn {
+    let value = stage.value(found.value_hi);
+    if value == found.value_hi {
+        return *found;
+    }
+    let a = pitch / std::f64::consts::TAU;
+    let length = value.map(|radius| 2.0 * radius.hypot(a) * (radius / a).atan());
+    LeastTurn { value, value_hi: value, length, proved: false, ..*found }
+}
+
+fn line(found: &LeastTurn, clearance: f64) -> TurnLine {
     let LeastTurn { value_lo, value_hi, value, length, arc_ratio, limit, proved, intervals, .. } = *found;
     TurnLine {
         plan: "turn",
@@ -66,10 +91,12 @@ fn line(found: &LeastTurn) -> TurnLine {
         limit: limit.map(|limit| limit.kind.name()),
         bench_a: limit.map(|limit| limit.bench_a),
         bench_b: limit.and_then(|limit| limit.bench_b),
+        clearance: Some(clearance).filter(|clearance| *clearance > 0.0),
+        obstacle: None,
     }
 }
 
-fn sentences(scene: &Scene, pitch: f64, is_best: bool, found: &LeastTurn) -> Vec<String> {
+fn sentences(scene: &Scene, (pitch, clearance): (f64, f64), is_best: bool, found: &LeastTurn) -> Vec<String> {
     let LeastTurn { value_lo, value_hi, value, length, from, arc_ratio, limit, proved, intervals, leads, .. } = *found;
     let mut sentences = Vec::new();
     if let (Some(radius), Some(length)) = (value, length) {
@@ -80,12 +107,13 @@ fn sentences(scene: &Scene, pitch: f64, is_best: bool, found: &LeastTurn) -> Vec
         ));
     }
     if let Some(limit) = limit {
-        sentences.push(limit_sentence(scene, value_lo, &limit));
+        sentences.push(limit_sentence(scene, (value_lo, clearance), &limit));
     }
+    let too_near = are_too_near(clearance);
     sentences.push(match (value_hi, leads) {
         (Some(value_hi), Some([lead_in, lead_out])) => format!(
             "{} with every radius from {from} m to {value_lo} m a link stalls or locks, a nearer place of the path comes \
-             to its length, or two boards overlap; with {value_hi} m nothing of this happens, from any distance \
+             to its length, or two boards {too_near}; with {value_hi} m nothing of this happens, from any distance \
              ({lead_in:.3} m before the S in steps, further out by Lemma 8) until the head is {lead_out:.3} m past the \
              S and the last bench has turned. Larger radii are not covered.",
             if proved { "Proved:" } else { "Not decided to 1e-8 m. What is proved:" }
@@ -93,7 +121,7 @@ fn sentences(scene: &Scene, pitch: f64, is_best: bool, found: &LeastTurn) -> Vec
         _ if intervals > 0 => format!(
             "Not decided: the search {} after {intervals} intervals of radii. What is proved: with every radius from \
              {from} m to {value_lo} m a link stalls or locks, a nearer place of the path comes to its length, or two boards \
-             overlap.",
+             {too_near}.",
             given_up()
         ),
         _ => format!("Not decided: the search {}, and nothing is proved.", given_up()),
@@ -110,7 +138,7 @@ fn sentences(scene: &Scene, pitch: f64, is_best: bool, found: &LeastTurn) -> Vec
     sentences
 }
 
-fn limit_sentence(scene: &Scene, value_lo: f64, limit: &TurnLimit) -> String {
+fn limit_sentence(scene: &Scene, (value_lo, clearance): (f64, f64), limit: &TurnLimit) -> String {
     let TurnLimit { kind, bench_a, bench_b, past } = *limit;
     let bench = bench_name(scene, bench_a);
     let place = format!("{past:.6} m past the beginning of the S");
@@ -122,8 +150,9 @@ fn limit_sentence(scene: &Scene, value_lo: f64, limit: &TurnLimit) -> String {
             format!("With {value_lo} m {bench} (counting from 1) stalls, its front handle being {place}.")
         }
         (_, other) => format!(
-            "With {value_lo} m {bench} and {} (counting from 1) overlap, the head being {place}.",
-            bench_name(scene, other.unwrap_or(bench_a))
+            "With {value_lo} m {bench} and {} (counting from 1) {}, the head being {place}.",
+            bench_name(scene, other.unwrap_or(bench_a)),
+            are_too_near(clearance)
         ),
     }
 }

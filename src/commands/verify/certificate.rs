@@ -12,6 +12,7 @@ use bench_dragon::show::scene::printable;
 use serde::Serialize;
 use serde_json::json;
 
+use super::super::plan::{are_too_near, come_too_near};
 use super::super::{CommandError, Common, Output};
 
 /// The line of `--json` for a valid certificate.
@@ -189,13 +190,19 @@ fn speed_sentence(outcome: &ProvedSpeed) -> String {
 
 /// Returns a sentence on a proved least pitch.
 fn pitch_sentence(outcome: &ProvedPitch) -> String {
-    let ProvedPitch { radius, from, value_lo, value_hi } = *outcome;
+    let ProvedPitch { radius, from, clearance, value_lo, value_hi } = *outcome;
     // A certificate may claim nothing: then its number is below the first pitch.
     let blocked = value_lo.filter(|value_lo| *value_lo >= from).map(|value_lo| {
-        format!("with every pitch from {from} m to {value_lo} m two boards overlap, or a link locks, before {radius} m")
+        let too_near = are_too_near(clearance);
+        format!(
+            "with every pitch from {from} m to {value_lo} m two boards {too_near}, or a link locks, before {radius} m"
+        )
     });
     let free = value_hi.map(|value_hi| {
-        format!("with {value_hi} m the head reaches {radius} m, and no two boards that share no handle touch before")
+        let too_near = come_too_near(clearance);
+        format!(
+            "with {value_hi} m the head reaches {radius} m, and no two boards that share no handle {too_near} before"
+        )
     });
     let claims: Vec<String> = blocked.into_iter().chain(free).collect();
     match claims.is_empty() {

@@ -37,11 +37,13 @@ fn plan_pitch_has_its_keys_for_every_team_and_the_bits_of_the_library() {
         let line = scene.answer(&[&["--json"], &PLAN_PITCH[..]].concat());
         let plan: Value = serde_json::from_str(&line).unwrap();
         let keys = ["plan", "status", "value", "from", "value_lo", "value_hi", "bench_a", "bench_b", "head_radius"];
-        assert_keys(&plan, &keys);
+        // A clearance that the scene requires is stated.
+        let clearance = scene.load().require.and_then(|require| require.clearance).map(|_| "clearance");
+        assert_keys(&plan, &keys.into_iter().chain(clearance).collect::<Vec<_>>());
         assert_eq!((&plan["plan"], &plan["status"]), (&"pitch".into(), &"proved".into()), "{}", scene.name);
         let [a, b] = ["bench_a", "bench_b"].map(|key| plan[key].as_u64().unwrap() as usize);
         assert!(a + 1 < b && b < scene.benches(), "{}: {plan}", scene.name);
-        let [value, from, value_lo, value_hi, _, _, radius] = numbers(&line)[..] else { panic!("{line}") };
+        let [value, from, value_lo, value_hi, _, _, radius, ..] = numbers(&line)[..] else { panic!("{line}") };
         assert!(same_bits(value, value_hi) && value_lo < value_hi && value_hi - value_lo <= 1e-9, "{plan}");
         assert!(radius >= REACH && from < value_lo, "{}: {plan}", scene.name);
         if scene.name == "school" {

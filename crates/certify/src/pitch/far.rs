@@ -3,8 +3,9 @@
 use crate::boards::Shape;
 use crate::elementary::pi;
 use crate::interval::Interval;
+use crate::spaced::Spaced;
 use crate::step::link_of;
-use bench_dragon_motion::model::team::{Ends, Team};
+use bench_dragon_motion::model::team::Ends;
 
 /// Limit of doublings of the longest link or the radius, the greater of the two, to find a radius for which
 /// the lemma holds.
@@ -13,13 +14,13 @@ const MOST_DOUBLINGS: u32 = 30;
 /// Excess of the radius found over the least one, as a share of the radius.
 const SLACK: f64 = 1e-3;
 
-/// Returns a radius for which the lemma holds, at least `radius` and little more than the least.
-pub(super) fn least_radius(team: &Team, pitch: f64, radius: f64) -> Option<f64> {
-    let holds = |radius: f64| holds(team, pitch, radius);
+/// Returns a radius for which the lemma holds with a clearance, at least `radius` and little more than the least.
+pub(super) fn least_radius(asked: Spaced<'_>, pitch: f64, radius: f64) -> Option<f64> {
+    let holds = |radius: f64| holds(asked, pitch, radius);
     if holds(radius) {
         return Some(radius);
     }
-    let mut outside = 2.0 * radius.max(team.longest_link());
+    let mut outside = 2.0 * radius.max(asked.team.longest_link());
     let mut doublings = 0;
     while !holds(outside) {
         outside *= 2.0;
@@ -36,8 +37,9 @@ pub(super) fn least_radius(team: &Team, pitch: f64, radius: f64) -> Option<f64> 
     Some(outside)
 }
 
-/// Returns true if the lemma holds for all handles at least `radius` metres from the centre.
-fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
+/// Returns true if the lemma holds with a clearance for all handles at least `radius` metres from the centre.
+fn holds(asked: Spaced<'_>, pitch: f64, radius: f64) -> bool {
+    let Spaced { team, clearance } = asked;
     let a = Interval::point(pitch).over(pi() * 2.0);
     let r = Interval::point(radius);
     let [head, body, tail] = team.kinds().map(|bench| link_of(team, bench));
@@ -48,9 +50,10 @@ fn holds(team: &Team, pitch: f64, radius: f64) -> bool {
     if team.benches < 3 {
         return true;
     }
+    let half = Interval::point(clearance) * 0.5;
     let shapes = team.kinds().map(|bench| Shape::new(team, bench));
-    let inset = shapes[1].inset;
-    let [of_head, of_body, of_tail] = shapes.map(|shape| shape.half_width);
+    let inset = shapes[1].inset + half;
+    let [of_head, of_body, of_tail] = shapes.map(|shape| shape.half_width + half);
     let half_width = of_head.max(of_body).max(of_tail);
     // 1. Boards less than a turn apart.
     let growth = |link: Interval| a * pi() * link.over(r * 3.0);

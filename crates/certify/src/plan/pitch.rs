@@ -13,8 +13,8 @@ use crate::clearance::Write;
 use crate::lines::{About, CertificateLine, CertifiedPitch};
 use crate::pitch::{Pitches, Reached, head_locks, reaches};
 use crate::place::Span;
+use crate::spaced::Spaced;
 use bench_dragon_motion::event::Progress;
-use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
 /// The least pitch of an inward spiral with which a team reaches a radius. The head comes in from any distance. Until
@@ -77,25 +77,31 @@ const SHALLOW: f64 = 0.5;
 ///
 /// # Errors
 /// The radius is reached with every pitch from the least one on, or with none.
-pub fn least_pitch(team: &Team, radius: f64, progress: Progress<'_>) -> Result<LeastPitch, PlanError> {
-    let mut propose = |from: f64, to: f64, progress: Progress<'_>| free_from(team, (from, to), radius, progress);
-    Ok(decided(team, radius, &mut propose, false, progress)?.0)
+pub fn least_pitch<'a>(
+    asked: impl Into<Spaced<'a>>,
+    radius: f64,
+    progress: Progress<'_>,
+) -> Result<LeastPitch, PlanError> {
+    let asked = asked.into();
+    let mut propose = |from: f64, to: f64, progress: Progress<'_>| free_from(asked, (from, to), radius, progress);
+    Ok(decided(asked, radius, &mut propose, false, progress)?.0)
 }
 
 /// Encloses the least pitch as [`least_pitch`] does, and writes a certificate. `scene` is the text of the team's scene.
 ///
 /// # Errors
 /// As [`least_pitch`]; a line cannot be written.
-pub fn certify_least_pitch(
-    team: &Team,
+pub fn certify_least_pitch<'a>(
+    asked: impl Into<Spaced<'a>>,
     radius: f64,
     scene: &str,
     write: Write<'_>,
     progress: Progress<'_>,
 ) -> Result<io::Result<LeastPitch>, PlanError> {
-    let mut propose = |from: f64, to: f64, progress: Progress<'_>| free_from(team, (from, to), radius, progress);
-    let (found, proof) = decided(team, radius, &mut propose, true, progress)?;
-    Ok(written(&found, proof, radius, scene, write).map(|()| found))
+    let asked = asked.into();
+    let mut propose = |from: f64, to: f64, progress: Progress<'_>| free_from(asked, (from, to), radius, progress);
+    let (found, proof) = decided(asked, radius, &mut propose, true, progress)?;
+    Ok(written(&found, proof, (radius, asked.clearance), scene, write).map(|()| found))
 }
 
 /// The lines that prove an enclosure.
@@ -107,18 +113,24 @@ struct Proof {
     reached: Option<Reached>,
 }
 
-fn written(found: &LeastPitch, proof: Proof, radius: f64, scene: &str, write: Write<'_>) -> io::Result<()> {
+fn written(
+    found: &LeastPitch,
+    proof: Proof,
+    (radius, clearance): (f64, f64),
+    scene: &str,
+    write: Write<'_>,
+) -> io::Result<()> {
     let (version, about) = (env!("CARGO_PKG_VERSION"), Some(About::LeastPitch));
     let LeastPitch { from, value_hi, intervals, .. } = *found;
     write(&CertificateLine::Certificate { format: crate::FORMAT, version, about, scene })?;
-    write(&CertificateLine::Reach { radius, from })?;
+    write(&CertificateLine::Reach { radius, from, clearance })?;
     proof.intervals.iter().try_for_each(&mut *write)?;
     if let (Some(pitch), Some(Reached { far, steps })) = (value_hi, proof.reached) {
         write(&CertificateLine::Far { pitch, radius: far })?;
         steps.into_iter().try_for_each(|step| write(&CertificateLine::Step(step)))?;
     }
     let value_lo = (intervals > 0).then_some(found.value_lo);
-    write(&CertificateLine::LeastPitch(CertifiedPitch { radius, from, value_lo, value_hi }))
+    write(&CertificateLine::LeastPitch(CertifiedPitch { radius, from, clearance, value_lo, value_hi }))
 }
 
 /// A function that proposes the least pitch between two with which the radius might be reached.
@@ -127,23 +139,20 @@ type Propose<'p> = &'p mut dyn FnMut(f64, f64, Progress<'_>) -> Proposal;
 /// Encloses the least pitch with any proposals; wrong proposals only cost time. `keeps` requests the lines of the
 /// intervals.
 fn decided(
-    team: &Team,
+    asked: Spaced<'_>,
     radius: f64,
     propose: Propose<'_>,
     keeps: bool,
     progress: Progress<'_>,
 ) -> Result<(LeastPitch, Proof), PlanError> {
     let Accepted { least, greatest, .. } = Accepted::LENGTH;
-    let from = least.max(0.5 * team.width);
-    if team.benches >= 3 && 2.0 * team.hole_inset >= team.link(1) {
-        return Err(PlanError(format!(
-            "the team reaches {radius} m with no pitch: a bench is as long as two insets or shorter ({} m between its \
-             holes), so that the boards before and after it overlap even on a straight line",
-            team.link(1)
-        )));
+    let Spaced { team, clearance } = asked;
+    let from = least.max(0.5 * (team.width + clearance));
+    if let Some(reason) = asked.too_near_on_a_line() {
+        return Err(PlanError(format!("the team reaches {radius} m with no pitch: {reason}")));
     }
     let mut blocked = Blocked {
-        team,
+        asked,
         radius,
         pitch: from,
         locks: false,
@@ -154,7 +163,7 @@ fn decided(
         intervals: 0,
         lines: keeps.then(Vec::new),
     };
-    let reaches = |pitch: f64, progress: Progress<'_>| reaches(team, pitch, radius, MOST_STEPS, progress);
+    let reaches = |pitch: f64, progress: Progress<'_>| reaches(asked, pitch, radius, (MOST_STEPS, keeps), progress);
     let (mut value_hi, mut reached) = (None, None);
     let mut next = from;
     for _ in 0..MOST_PROPOSALS {
@@ -216,7 +225,7 @@ struct Deepest {
 
 /// An interval of pitches with which boards are proved to overlap.
 struct Blocked<'a> {
-    team: &'a Team,
+    asked: Spaced<'a>,
     radius: f64,
     /// The greatest pitch that is proved.
     pitch: f64,
@@ -238,7 +247,7 @@ struct Blocked<'a> {
 /// The proof for an interval of pitches.
 enum Shown {
     Lock,
-    Overlap { theta: f64, benches: [usize; 2], spans: Vec<Span>, point: [f64; 2] },
+    Overlap { theta: f64, benches: [usize; 2], spans: Vec<Span>, points: [[f64; 2]; 2] },
 }
 
 impl Blocked<'_> {
@@ -262,8 +271,9 @@ impl Blocked<'_> {
                 let (from, to) = (self.pitch, next);
                 lines.push(match proof {
                     Shown::Lock => CertificateLine::HeadLocks { from, to },
-                    Shown::Overlap { theta, benches, spans, point } => {
-                        CertificateLine::Overlap { from, to, theta, benches, spans, point }
+                    Shown::Overlap { theta, benches, spans, points: [point, other] } => {
+                        let other = (other != point).then_some(other);
+                        CertificateLine::Overlap { from, to, theta, benches, spans, point, other }
                     }
                 });
             }
@@ -299,14 +309,14 @@ impl Blocked<'_> {
     fn holds(&self, width: f64) -> Option<Shown> {
         let (from, to) = (self.pitch, self.pitch + width);
         if self.locks {
-            return head_locks(self.team, (from, to), self.radius).then_some(Shown::Lock);
+            return head_locks(self.asked.team, (from, to), self.radius).then_some(Shown::Lock);
         }
         let deepest = self.deepest?;
         let theta = deepest.head_radius * TAU / from;
         let benches = [deepest.pair.0 as usize, deepest.pair.1 as usize];
-        let pitches = Pitches { team: self.team, from, to, theta, benches };
-        let (spans, point) = pitches.are_outside(self.radius).then(|| pitches.overlap())??;
-        Some(Shown::Overlap { theta, benches, spans, point })
+        let pitches = Pitches { asked: self.asked, from, to, theta, benches };
+        let (spans, points) = pitches.are_outside(self.radius).then(|| pitches.overlap())??;
+        Some(Shown::Overlap { theta, benches, spans, points })
     }
 
     /// Finds the deepest overlap of the same two boards at this pitch. If they have come too nearly free, it finds
@@ -323,7 +333,7 @@ impl Blocked<'_> {
             let (a, b) = pair;
             let behind = [(a, b + 1), (a, b + 2), (a, b.saturating_sub(1).max(a + 2))];
             for (pairs, shallow) in [(&[pair][..], kept), (&behind, self.shallow)] {
-                let nearest = deepest(self.team, self.pitch, self.radius, (pairs, head_radius), progress);
+                let nearest = deepest(self.asked, self.pitch, self.radius, (pairs, head_radius), progress);
                 if nearest.clearance < -shallow * depth {
                     let depth = if nearest.pair == pair { depth } else { -nearest.clearance };
                     self.deepest = Some(Deepest { pair: nearest.pair, depth, head_radius: nearest.head_radius });
@@ -332,11 +342,11 @@ impl Blocked<'_> {
             }
         }
         let first = first.filter(|_| hinted && self.intervals == 0);
-        let found = first.or_else(|| obstacle(self.team, self.pitch, self.radius, progress));
+        let found = first.or_else(|| obstacle(self.asked, self.pitch, self.radius, progress));
         self.locks = matches!(found, Some(Obstacle::Lock));
         let Some(Obstacle::Touch { pair, head_radius }) = found else { return self.locks };
         let Nearest { clearance, head_radius, .. } =
-            deepest(self.team, self.pitch, self.radius, (&[pair], head_radius), progress);
+            deepest(self.asked, self.pitch, self.radius, (&[pair], head_radius), progress);
         let is_same = self.deepest.is_some_and(|deepest| deepest.pair == pair);
         self.shallow = if is_same { self.shallow * self.shallow } else { SHALLOW };
         self.deepest = (clearance < 0.0).then_some(Deepest { pair, depth: -clearance, head_radius });

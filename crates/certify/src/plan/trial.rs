@@ -2,6 +2,7 @@
 //! proofs of [`super::pitch`] where to search.
 
 use crate::pitch::clear_beyond;
+use crate::spaced::Spaced;
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::contact::{ConservativeAdvancement, LeastClearance};
 use bench_dragon_motion::event::{Budget, Progress};
@@ -30,20 +31,20 @@ const TRIAL_BUDGET: u64 = 20_000_000;
 pub(super) enum Obstacle {
     /// A link locks before.
     Lock,
-    /// Two boards overlap, most deeply with the head `head_radius` metres from the centre.
+    /// Two boards overlap or are too near, most with the head `head_radius` metres from the centre.
     Touch { pair: (u32, u32), head_radius: f64 },
 }
 
 /// Returns the obstacle for a head with this pitch and radius, if the search finds one.
-pub(super) fn obstacle(team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Obstacle> {
-    let near = Trial::near(team, pitch, radius, progress);
+pub(super) fn obstacle(asked: Spaced<'_>, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Obstacle> {
+    let near = Trial::near(asked, pitch, radius, progress);
     near.obstacle(progress).or_else(|| {
         if progress(pitch).is_break() {
             return None;
         }
         // Boards with almost no room between them and the next but one touch in a bend that may be anywhere.
-        let outer = clear_beyond(team, pitch, radius)?;
-        let far = Trial::new(team, (pitch, radius), outer, progress);
+        let outer = clear_beyond(asked, pitch, radius)?;
+        let far = Trial::new(asked, (pitch, radius), outer, progress);
         (far.limit > near.limit).then(|| far.obstacle(progress))?
     })
 }
@@ -64,11 +65,11 @@ pub(super) struct Proposal {
 /// At an obstacle, the two boards that overlap most deeply are followed near that place until they come free. Because
 /// the pitch grows in steps of half a percent, a pitch is missed if the two boards come free and meet again within one
 /// step. `progress` receives each pitch.
-pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progress: Progress<'_>) -> Proposal {
+pub(super) fn free_from(asked: Spaced<'_>, (from, to): (f64, f64), radius: f64, progress: Progress<'_>) -> Proposal {
     let (mut pitch, mut proposal) = (from, Proposal::default());
-    while let Some(mut found) = obstacle(team, pitch, radius, &mut |_| progress(pitch)) {
+    while let Some(mut found) = obstacle(asked, pitch, radius, &mut |_| progress(pitch)) {
         proposal.first.get_or_insert(found);
-        while let Some(next) = found.at_pitch(team, pitch * GROWTH, radius, &mut |_| progress(pitch)) {
+        while let Some(next) = found.at_pitch(asked, pitch * GROWTH, radius, &mut |_| progress(pitch)) {
             (found, pitch) = (next, pitch * GROWTH);
             if pitch > to {
                 return Proposal { last: None, ..proposal };
@@ -80,12 +81,12 @@ pub(super) fn free_from(team: &Team, (from, to): (f64, f64), radius: f64, progre
         proposal.last = Some(found);
         let free_at = match found {
             Obstacle::Lock => {
-                let mut is_free = |pitch| found.at_pitch(team, pitch, radius, &mut |_| progress(pitch)).is_none();
+                let mut is_free = |pitch| found.at_pitch(asked, pitch, radius, &mut |_| progress(pitch)).is_none();
                 bisect_predicate(&mut is_free, pitch, pitch * GROWTH)
             }
             Obstacle::Touch { pair, head_radius } => {
                 let clearance = |pitch: f64| {
-                    deepest(team, pitch, radius, (&[pair], head_radius), &mut |_| progress(pitch)).clearance
+                    deepest(asked, pitch, radius, (&[pair], head_radius), &mut |_| progress(pitch)).clearance
                 };
                 sign_change(clearance, pitch, pitch * GROWTH)
             }
@@ -128,12 +129,12 @@ fn sign_change(mut function: impl FnMut(f64) -> f64, mut low: f64, mut high: f64
 
 impl Obstacle {
     /// Returns the obstacle near the same place at another pitch, if there still is one.
-    fn at_pitch(self, team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Self> {
+    fn at_pitch(self, asked: Spaced<'_>, pitch: f64, radius: f64, progress: Progress<'_>) -> Option<Self> {
         match self {
-            Self::Lock => Trial::near(team, pitch, radius, progress).locks().then_some(self),
+            Self::Lock => Trial::near(asked, pitch, radius, progress).locks().then_some(self),
             Self::Touch { pair, head_radius } => {
                 let Nearest { clearance, head_radius, .. } =
-                    deepest(team, pitch, radius, (&[pair], head_radius), progress);
+                    deepest(asked, pitch, radius, (&[pair], head_radius), progress);
                 (clearance <= 0.0).then_some(Self::Touch { pair, head_radius })
             }
         }
@@ -143,7 +144,7 @@ impl Obstacle {
 /// The least clearance of two boards while the head is near a radius.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nearest {
-    /// The clearance in metres, negative for an overlap.
+    /// The metres by which the clearance is more than required, negative for boards that are too near.
     pub clearance: f64,
     /// The two benches, counted from 0.
     pub pair: (u32, u32),
@@ -153,13 +154,13 @@ pub(super) struct Nearest {
 
 /// Returns the least clearance of several pairs of boards, at least one, while the head is near a radius.
 pub(super) fn deepest(
-    team: &Team,
+    asked: Spaced<'_>,
     pitch: f64,
     radius: f64,
     (pairs, head_radius): (&[(u32, u32)], f64),
     progress: Progress<'_>,
 ) -> Nearest {
-    let trial = Trial::new(team, (pitch, radius), head_radius.max(radius) + TURNS_ABOUT * pitch, progress);
+    let trial = Trial::new(asked, (pitch, radius), head_radius.max(radius) + TURNS_ABOUT * pitch, progress);
     let mut budget = Budget::new(u64::MAX, progress);
     let around = WINDOW * trial.team.shortest_link();
     let at = trial.path.length() - Path::spiral(pitch, head_radius / pitch).length();
@@ -169,6 +170,7 @@ pub(super) fn deepest(
     for pair in pairs.iter().filter(|pair| pair.1 < trial.team.benches as u32) {
         for (from, to) in parts {
             let (clearance, travelled) = advancement.minimum_of(*pair, (from, to), &mut budget);
+            let clearance = clearance - asked.clearance;
             if clearance < least.clearance {
                 // Rounding must not move the head inside the radius.
                 let head_radius = trial.head_radius(travelled).max(radius * (1.0 + 1e-12));
@@ -182,6 +184,8 @@ pub(super) fn deepest(
 /// The foremost part of a team that comes in to a radius on a spiral of one pitch.
 struct Trial {
     team: Team,
+    /// The required clearance, in metres.
+    clearance: f64,
     path: Path,
     singularities: Singularities,
     /// The travel at which the radius is reached, in metres.
@@ -189,13 +193,14 @@ struct Trial {
 }
 
 impl Trial {
-    fn near(team: &Team, pitch: f64, radius: f64, progress: Progress<'_>) -> Self {
-        let outer = radius.max(team.longest_link()) + TURNS_BEFORE * pitch;
-        Self::new(team, (pitch, radius), outer, progress)
+    fn near(asked: Spaced<'_>, pitch: f64, radius: f64, progress: Progress<'_>) -> Self {
+        let outer = radius.max(asked.team.longest_link()) + TURNS_BEFORE * pitch;
+        Self::new(asked, (pitch, radius), outer, progress)
     }
 
     /// Creates the trial of a head that comes in from `outer` metres to `radius` metres.
-    fn new(team: &Team, (pitch, radius): (f64, f64), outer: f64, progress: Progress<'_>) -> Self {
+    fn new(asked: Spaced<'_>, (pitch, radius): (f64, f64), outer: f64, progress: Progress<'_>) -> Self {
+        let Spaced { team, clearance } = asked;
         let start = outer / pitch;
         let path = Path::spiral(pitch, start);
         let length = |turns: f64| Path::spiral(pitch, turns).length();
@@ -210,7 +215,7 @@ impl Trial {
         } else {
             Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, progress))
         };
-        Self { team, path, singularities, limit }
+        Self { team, clearance, path, singularities, limit }
     }
 
     fn advancement(&self) -> ConservativeAdvancement<'_> {
@@ -234,7 +239,7 @@ impl Trial {
         }
         let mut budget = Budget::new(TRIAL_BUDGET, progress);
         let least = self.advancement().least_clearance(0.0, self.limit, &mut budget).ok()?;
-        let touch = least.value.filter(|touch: &LeastClearance| touch.value <= 0.0)?;
+        let touch = least.value.filter(|touch: &LeastClearance| touch.value <= self.clearance)?;
         let head_radius = self.head_radius(touch.travelled);
         Some(Obstacle::Touch { pair: (touch.bench_a, touch.bench_b), head_radius })
     }

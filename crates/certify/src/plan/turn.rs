@@ -5,14 +5,15 @@
 //! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
 
 use std::cell::{Cell, RefCell};
+use std::ops::ControlFlow;
 
 use super::PlanError;
 use super::turn_trial::{Family, Witness};
 use crate::place::Place;
+use crate::spaced::Spaced;
 use crate::turn::{Passage, Turns};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Progress;
-use bench_dragon_motion::model::team::Team;
 use bench_dragon_show::scene::Accepted;
 
 /// The least radius of a turnaround with which a team turns round. The head comes in from any distance, and until the
@@ -71,6 +72,15 @@ const FEW: usize = 4;
 /// Limit of intervals of radii.
 const MOST_INTERVALS: u64 = 200_000;
 
+/// Limits of work, in all and for the ratio, in microseconds on a usual machine.
+const MOST_WORK: u64 = 40_000_000;
+const MOST_WORK_ON_RATIO: u64 = 15_000_000;
+
+/// Work on an interval of radii or on a step of the head, and for each bench of a step of the whole team, in
+/// microseconds.
+const STEP_WORK: u64 = 1_000;
+const BENCH_WORK: u64 = 20;
+
 /// The length of an interval in metres, at least and at first; the factors after an interval that is shown and one that
 /// is not.
 const LEAST_INTERVAL: f64 = 1e-12;
@@ -93,23 +103,27 @@ const LEAST_RATIO_STEP: f64 = 2e-3;
 ///
 /// # Errors
 /// The team turns round with the least radius that is tested, or its boards overlap on a straight line.
-pub fn least_turn(
-    team: &Team,
+pub fn least_turn<'a>(
+    asked: impl Into<Spaced<'a>>,
     pitch: f64,
     arc_ratio: Option<f64>,
     progress: Progress<'_>,
 ) -> Result<LeastTurn, PlanError> {
-    if team.benches >= 3 && 2.0 * team.hole_inset >= team.link(1) {
-        return Err(PlanError(format!(
-            "the team turns round with no radius: a bench is as long as two insets or shorter ({} m between its \
-             holes), so that the boards before and after it overlap even on a straight line",
-            team.link(1)
-        )));
+    let asked @ Spaced { team, clearance } = asked.into();
+    if let Some(reason) = asked.too_near_on_a_line() {
+        return Err(PlanError(format!("the team turns round with no radius: {reason}")));
     }
-    let (share, progress) = (Cell::new(0.0), RefCell::new(progress));
-    let ask = || progress.borrow_mut()(share.get());
-    let family = Family { team, pitch, arc_ratio: arc_ratio.unwrap_or(1.0), ask: &ask };
+    let (share, progress) = (Cell::new(0.0_f64), RefCell::new(progress));
+    let (work, most) = (Cell::new(0_u64), Cell::new(MOST_WORK_ON_RATIO));
+    let ask = |microseconds| {
+        work.set(work.get() + microseconds);
+        let of_work = work.get() as f64 / MOST_WORK as f64;
+        let go_on = progress.borrow_mut()(share.get().max(of_work.min(1.0)));
+        if work.get() > most.get() { ControlFlow::Break(()) } else { go_on }
+    };
+    let family = Family { team, clearance, pitch, arc_ratio: arc_ratio.unwrap_or(1.0), ask: &ask };
     let family = if arc_ratio.is_none() { best(family) } else { family };
+    most.set(MOST_WORK);
     let from = Accepted::LENGTH.least;
     let first = family.event(from);
     if family.is_stopped() {
@@ -123,7 +137,7 @@ pub fn least_turn(
     let mut blocked = Blocked { family, radius: from, witness, intervals: 0, shown: None };
     blocked.extend(&mut |done| {
         share.set(0.5 * done);
-        ask()
+        ask(STEP_WORK)
     });
     let Blocked { radius: value_lo, intervals, shown, .. } = blocked;
     let upper = value_lo + WIDTH;
@@ -138,18 +152,19 @@ pub fn least_turn(
     let closely = shown.is_some_and(|witness| matches!(witness, Witness::Overlap { .. }));
     let mut of_passage = |done| {
         share.set(0.5 + 0.5 * done);
-        ask()
+        ask(STEP_WORK + BENCH_WORK * team.benches as u64)
     };
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
-        let passage = |team: &Team| Passage::new(team, (pitch, family.arc_ratio), upper);
+        let passage = |asked: Spaced<'_>| Passage::new(asked, (pitch, family.arc_ratio), upper);
         // The first benches fail as soon as the whole team does, at less cost.
         let few = team.foremost(FEW);
-        if !passage(&few).is_some_and(|passage| passage.is_free(&few, closely, &mut |_| ask())) {
+        let few = Spaced { team: &few, clearance };
+        if !passage(few).is_some_and(|passage| passage.is_free(few, closely, &mut |_| ask(STEP_WORK))) {
             continue;
         }
-        let Some(passage) = passage(team) else { break };
-        if passage.is_free(team, closely, &mut of_passage) {
+        let Some(passage) = passage(asked) else { break };
+        if passage.is_free(asked, closely, &mut of_passage) {
             found.value_hi = Some(upper);
             found.leads = Some([passage.lead_in, passage.lead_out]);
             found.proved = upper - value_lo <= 1e-8;
@@ -186,6 +201,10 @@ fn best(family: Family<'_>) -> Family<'_> {
             let other = Family { arc_ratio: arc_ratio.clamp(least, greatest), ..best };
             other.event(radius * (1.0 - BETTER)).is_none().then_some(other)
         });
+        // A stopped search finds no event.
+        if family.is_stopped() {
+            break;
+        }
         match better {
             Some(other) => (best, radius) = (other, other.radius().min(radius)),
             None => step *= 0.5,
@@ -282,11 +301,11 @@ impl Blocked<'_> {
 
     /// Returns the turnarounds with all radii up to `width` further on, and the middle radius.
     fn turns(&self, width: f64) -> Option<(Turns<'_>, f64)> {
-        let Family { team, pitch, arc_ratio, .. } = self.family;
+        let Family { team, clearance, pitch, arc_ratio, .. } = self.family;
         let radii = [self.radius, self.radius + width];
         let middle = 0.5 * radii[0] + 0.5 * radii[1];
         let path = self.family.path(middle)?;
-        Some((Turns::new(team, (pitch, arc_ratio), radii, path), middle))
+        Some((Turns::new(Spaced { team, clearance }, (pitch, arc_ratio), radii, path), middle))
     }
 
     /// Returns true if the event is proved for all radii up to `width` further on.

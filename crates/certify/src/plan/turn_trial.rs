@@ -30,6 +30,11 @@ const TRIAL_BUDGET: u64 = 20_000_000;
 /// The coordinate of a pivot just behind a junction, in radians.
 const BESIDE_JUNCTION: f64 = 1e-13;
 
+/// Work between two calls of a search for folds, and for a pivot, in microseconds. A step of a search for boards takes
+/// about one for each bench.
+const FOLD_WORK: u64 = 1_000;
+const PIVOT_WORK: u64 = 3_000;
+
 /// The distances from an event, in links, within which a pivot is searched for. For each distance, a number of offsets
 /// is tried. A pivot keeps a share of a fold's depth off the ends of the S.
 const REACHES: [f64; 4] = [0.5, 0.1, 0.01, 1e-3];
@@ -58,10 +63,13 @@ const ROOM: f64 = 4.0;
 #[derive(Clone, Copy)]
 pub(super) struct Family<'a> {
     pub team: &'a Team,
+    /// The required clearance of boards, in metres.
+    pub clearance: f64,
     pub pitch: f64,
     pub arc_ratio: f64,
     /// Asks whether the search is to stop. Then events may be missing.
-    pub ask: &'a dyn Fn() -> ControlFlow<()>,
+    /// In: the work since the last call, about microseconds.
+    pub ask: &'a dyn Fn(u64) -> ControlFlow<()>,
 }
 
 /// An event, as a proof needs it. On a spiral, the coordinate of its places is the polar angle minus the polar angle at
@@ -70,8 +78,8 @@ pub(super) struct Family<'a> {
 pub(super) enum Witness {
     /// One handle of a link at a pivot, the other one before `end` and on the wrong side of the pivot's normal.
     Fold { kind: EventKind, link: usize, pivot: Place, end: Place },
-    /// Two boards that overlap with the head at a place with this radius. The place's coordinate grows by `rate` per
-    /// metre of the radius.
+    /// Two boards that overlap or are too near with the head at a place with this radius. The place's coordinate grows
+    /// by `rate` per metre of the radius.
     Overlap { pair: (u32, u32), head: Place, radius: f64, rate: f64 },
 }
 
@@ -97,7 +105,7 @@ impl Family<'_> {
 
     /// Returns true if the search is to stop.
     pub fn is_stopped(&self) -> bool {
-        (self.ask)().is_break()
+        (self.ask)(0).is_break()
     }
 
     /// Returns the metres of the S.
@@ -171,7 +179,7 @@ impl Family<'_> {
 
     /// Returns the folds of a team, whose first bench has the number `first` in this family's team.
     fn folds_of(&self, radius: f64, team: &Team, first: usize) -> Vec<Witness> {
-        if self.is_stopped() {
+        if (self.ask)(FOLD_WORK).is_break() {
             return Vec::new();
         }
         let longest = team.longest_link();
@@ -179,7 +187,7 @@ impl Family<'_> {
         let Some(path) = self.path_between(radius, lead_in, team.length() + LINKS_AFTER * longest) else {
             return Vec::new();
         };
-        let found = Singularities::search(&path, team, &mut Budget::new(TRIAL_BUDGET, &mut |_| (self.ask)()));
+        let found = Singularities::search(&path, team, &mut Budget::new(TRIAL_BUDGET, &mut |_| (self.ask)(FOLD_WORK)));
         let path = path.with_branches(found.branches.clone());
         let lock = found.end.filter(|end| end.kind == EventKind::Lock);
         let witness = |event: Event| {
@@ -204,7 +212,7 @@ impl Family<'_> {
     /// Returns the fold with the deepest pivot within the distance `reach` of the place `near`. Both are metres along
     /// the path, and the place is counted from the beginning of the S.
     fn pivoted(&self, radius: f64, (kind, link): (EventKind, usize), near: f64, reach: f64) -> Option<Witness> {
-        if self.is_stopped() {
+        if (self.ask)(PIVOT_WORK).is_break() {
             return None;
         }
         let path = self.path(radius)?;
@@ -244,7 +252,7 @@ impl Family<'_> {
         })
     }
 
-    /// Returns two boards that overlap with this radius, at their deepest.
+    /// Returns the two boards that overlap with this radius or are too near, at their nearest.
     fn touch(&self, radius: f64) -> Option<Witness> {
         if self.is_stopped() {
             return None;
@@ -254,12 +262,12 @@ impl Family<'_> {
         let lead_in = self.spiral_between(radius, outer);
         let path = self.path_between(radius, lead_in, team.length())?;
         let advancement = ConservativeAdvancement::new(&path, team, &[], &[]);
-        let mut ask = |_| (self.ask)();
+        let mut ask = |_| (self.ask)(self.team.benches as u64);
         let mut budget = Budget::new(TRIAL_BUDGET, &mut ask);
         let least = advancement.least_clearance(0.0, path.length(), &mut budget).ok()?.value?;
         let head = self.event_place(radius, path.param_at(least.travelled));
         let pair = (least.bench_a, least.bench_b);
-        (least.value <= 0.0).then_some(Witness::Overlap { pair, head, radius, rate: 0.0 })
+        (least.value <= self.clearance).then_some(Witness::Overlap { pair, head, radius, rate: 0.0 })
     }
 
     /// Returns the same event with another radius, with several pivots, each found on request.
@@ -298,12 +306,12 @@ impl Family<'_> {
         let at = (lead_in + past).clamp(0.0, path.length());
         let parts = [((at - window).max(0.0), at), (at, (at + window).min(path.length()))];
         let pairs = pairs.iter().filter(|pair| (pair.1 as usize) < self.team.benches);
-        let mut ask = |_| (self.ask)();
+        let mut ask = |_| (self.ask)(self.team.benches as u64);
         let mut budget = Budget::new(u64::MAX, &mut ask);
         let parts = pairs.flat_map(|pair| parts.map(|part| (*pair, part)));
         let found = parts.map(|(pair, part)| (pair, advancement.minimum_of(pair, part, &mut budget)));
         let (pair, (clearance, travelled)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
-        (clearance < 0.0).then(|| (pair, self.event_place(radius, path.param_at(travelled))))
+        (clearance < self.clearance).then(|| (pair, self.event_place(radius, path.param_at(travelled))))
     }
 }
 

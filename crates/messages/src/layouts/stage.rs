@@ -285,28 +285,6 @@ pub struct StageCue {
 /// of the path, layout 3 gave them their name. Layout 4 added the time line: the end of the show, the events and the
 /// cues. Layout 5 added the hash of the scene's text. Layout 6 added the dragons, the obstacles and a path of any
 /// length.
-///
-/// # Examples
-///
-/// ```
-/// use std::ops::ControlFlow;
-///
-/// use bench_dragon_messages::StageMessage;
-/// use bench_dragon_messages::state::EventKind;
-/// use bench_dragon_show::scene::Scene;
-/// use bench_dragon_show::{Playback, Show};
-/// use bench_dragon_show::convert::stage;
-///
-/// let scene = Scene::paper();
-/// let timeline = scene.ensemble.timeline(&mut |_| ControlFlow::Continue(()));
-/// let show = Show::new(&scene, timeline, Playback::of(&scene)).unwrap();
-/// let message = stage(1, 0, [0; 32], &scene.ensemble, &show);
-/// let StageMessage { stage, .. } = &message;
-/// assert_eq!((stage.dragons.len(), stage.first_dragon().benches), (1, 223));
-/// assert_eq!(message.path(stage.first_dragon())[0].kind_name(), "inward_spiral");
-/// assert_eq!(stage.events[0].kind(), Some(EventKind::Contact));
-/// assert!((stage.freeze_time - 412.473_837_682).abs() < 1e-9);
-/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, ZeroCopySend)]
 #[type_name("bench_dragon/Stage/7")]
 #[repr(C)]

@@ -56,6 +56,28 @@ impl Configuration {
         Ok(())
     }
 
+    /// Solves the team at a lock. Next to it the rear handle, found by its distance, has half of its digits. So a link
+    /// that is all but perpendicular to the path is turned to where it is perpendicular.
+    pub fn at_lock(
+        path: &Path,
+        team: &Team,
+        travelled: f64,
+        benches: usize,
+        budget: &mut Budget,
+    ) -> Result<Self, Halt> {
+        let mut at = Self::new(path, travelled);
+        for bench in 0..benches {
+            at.solve_to(bench + 1, path, team, budget)?;
+            let (front, link) = (at.places[bench], team.link(bench));
+            if let Some(rear) = perpendicular(path, front, at.places[bench + 1], link) {
+                let direction = link_pose(path, front, rear, link).direction;
+                at.boards[bench] = Board::from_front(path.point(front), direction, link, team.hole_inset, team.width);
+                at.places[bench + 1] = rear;
+            }
+        }
+        Ok(at)
+    }
+
     /// Returns the signed distance of two boards, in metres.
     pub fn clearance(&self, (a, b): Pair) -> f64 {
         signed_distance_board_board(&self.boards[a], &self.boards[b])
@@ -76,6 +98,23 @@ impl Configuration {
         let boards = &self.boards[..benches];
         near_pairs(boards, boards, motion, |(a, b)| b >= a + 2)
     }
+}
+
+/// The cosine, in absolute value, below which a link counts as all but perpendicular; and the metres behind its rear
+/// handle within which it is perpendicular then, in links.
+const PERPENDICULAR: f64 = 1e-7;
+const BEHIND: f64 = 1e-5;
+
+/// Returns the place just behind a rear handle at which a link is perpendicular to the path; `None` if there is none.
+fn perpendicular(path: &Path, front: Param, rear: Param, link: f64) -> Option<Param> {
+    let (point, from) = (path.point(front), path.travelled(rear));
+    let product = |back: f64| {
+        let at = path.param_at(from - back);
+        path.tangent(at).dot(&(point - path.point(at)))
+    };
+    let passed = |back: f64| product(back) <= 0.0;
+    let is_near = !passed(0.0) && product(0.0) < PERPENDICULAR * link && passed(BEHIND * link);
+    is_near.then(|| path.param_at(from - bisect_predicate(passed, 0.0, BEHIND * link)))
 }
 
 /// Returns the pairs of boards of two lists that pass `counts` and whose circle bound is at most `motion`. A grid finds

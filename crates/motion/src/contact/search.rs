@@ -107,6 +107,16 @@ impl<'s, 'a, 'b> ChainSearch<'s, 'a, 'b> {
         self.contact.is_some()
     }
 
+    /// Records the clearance of the nearest two boards at the end of the search, which may be a lock: next to one it
+    /// changes with the root of the travel.
+    fn record_at_lock(&mut self, end: f64) -> Result<(), Halt> {
+        let Some(best) = self.best.filter(|_| self.state.goal == Goal::Least) else { return Ok(()) };
+        let pair = (best.bench_a as usize, best.bench_b as usize);
+        let (path, team) = (self.chain.path, self.chain.team);
+        let at = Configuration::at_lock(path, team, end, pair.1 + 1, self.state.budget)?;
+        self.record(&at, &[pair]).map(|_| ())
+    }
+
     /// Guesses the least clearance from places of the head at least the shortest link apart, and refines it.
     fn guess(&mut self, start: &Configuration, to: f64) -> Result<(), Halt> {
         let from = start.travelled;
@@ -190,7 +200,8 @@ impl<'s, 'b: 's> SteppedSearch<'s, 'b> for ChainSearch<'s, '_, 'b> {
             // First a guess, then the proof that no clearance is below it, or a lower clearance.
             self.guess(&start, to)?;
         }
-        self.advance(start, to)
+        self.advance(start, to)?;
+        self.record_at_lock(to)
     }
 
     fn skip(&mut self, before: &Configuration, to: f64) -> Result<Option<Configuration>, Halt> {

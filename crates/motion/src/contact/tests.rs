@@ -42,10 +42,23 @@ fn search(path: &Path, team: &Team, show_end: Option<f64>) -> (Option<Event>, Op
 /// The least clearance of all pairs at one place of the head.
 fn all_pairs(path: &Path, team: &Team, travelled: f64) -> f64 {
     let mut unreported = unreported;
-    let mut at = Configuration::new(path, travelled);
-    at.solve_to(team.benches, path, team, &mut Budget::new(u64::MAX, &mut unreported)).unwrap();
+    let mut budget = Budget::new(u64::MAX, &mut unreported);
+    let at = Configuration::at_lock(path, team, travelled, team.benches, &mut budget).unwrap();
     let pairs = (0..team.benches).flat_map(|a| (a + 2..team.benches).map(move |b| (a, b)));
     at.deepest(&pairs.collect::<Vec<_>>()).unwrap().0
+}
+
+/// The lock and the clearance there with 40 digits: the fold of the chord, and the boards with the head's link
+/// perpendicular to the spiral. The clearance falls with the root of the travel before it.
+#[test]
+fn the_least_clearance_at_a_lock_has_its_digits() {
+    let (head_length, body_length) = (1.911_232_195_148_669_5, 1.776_465_820_425_115);
+    let (width, hole_inset) = (0.265_173_696_612_851, 0.269_790_637_091_093_7);
+    let team = Team { benches: 3, head_length, body_length, width, hole_inset, ends: Ends::NONE };
+    let (_, least, end) = search(&Path::spiral(0.789_491_157_773_502_9, 4.955_663_058_729_437), &team, None);
+    let LeastClearance { value, travelled, .. } = least.unwrap();
+    assert!((value - 0.348_674_460_158_572_3).abs() < 1e-12, "{value}");
+    assert!((travelled - 2.082_175_601_857_538_4 * 28.884_510_050_333_898).abs() < 1e-12 && travelled == end);
 }
 
 /// Checks that equally spaced configurations do not contradict the searches.
@@ -234,6 +247,19 @@ proptest! {
     #[test]
     fn sampling_a_tight_route_shows_nothing_better(team in any_team(), path in any_route()) {
         check(&path, &team, SAMPLES)?;
+    }
+
+    #[test]
+    fn a_tail_as_wide_as_the_body_changes_nothing(team in any_team(), path in any_route()) {
+        let plain = Team { ends: Ends::NONE, ..team };
+        let with_tail = Team { ends: Ends { tail_width: Some(team.width), ..Ends::NONE }, ..team };
+        let [(contact, least, end), (other_contact, other_least, other_end)] =
+            [plain, with_tail].map(|team| search(&path, &team, None));
+        prop_assert_eq!(end, other_end);
+        let travels = [contact, other_contact].map(|contact| contact.map_or(f64::MAX, |event| event.travelled));
+        prop_assert!((travels[0] - travels[1]).abs() < 1e-9, "{:?}", travels);
+        let values = [least, other_least].map(|least| least.map_or(f64::MAX, |least| least.value));
+        prop_assert!((values[0] - values[1]).abs() < 1e-9, "{:?}", values);
     }
 }
 

@@ -22,6 +22,8 @@ pub struct LeastClearances {
     pub of_show: Option<TimedClearance>,
     /// True if the search was stopped by the receiver of its progress.
     pub is_stopped: bool,
+    /// True if the search is complete: of all boards, up to the end of the show.
+    pub is_complete: bool,
 }
 
 impl Ensemble {
@@ -49,8 +51,11 @@ impl Ensemble {
         let begin = contact.map_or(0.0, |contact| contact.time);
         let is_known = |found: &TimedClearance| !is_stopped || found.searched_until.is_none_or(|until| until > begin);
         let (own, between) = (own.map(|own| own.filter(is_known)), between.map(|between| between.filter(is_known)));
-        let of_show = own.into_iter().chain(between).reduce(nearer).flatten();
-        LeastClearances { own: own.flatten(), between: between.flatten(), of_show, is_stopped }
+        let of_show = own.into_iter().chain(between).reduce(nearer);
+        let is_complete =
+            !is_stopped && of_show.is_none_or(|found| found.is_some_and(|found| found.searched_until.is_none()));
+        let of_show = of_show.flatten();
+        LeastClearances { own: own.flatten(), between: between.flatten(), of_show, is_stopped, is_complete }
     }
 
     /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show. Returns

@@ -12,7 +12,7 @@
 use std::time::{Duration, Instant};
 
 use super::newton::Newton;
-use super::table::{Allowed, EXACT_ACCURACY, FollowerTable, Instructions, Tolerance};
+use super::table::{Allowed, FollowerTable, Instructions, Tolerance};
 use super::{Chain, Solver, Velocities};
 use crate::model::elementary::hypot;
 use crate::model::path::Path;
@@ -94,8 +94,8 @@ impl Selection {
     }
 }
 
-/// Returns the cheapest table for `accuracy` metres, or the most exact table if none meets the accuracy, or `None` if
-/// there is no table for this team and path.
+/// Returns the cheapest table for `accuracy` metres, or `None` if there is no table for this team and path, or none
+/// that keeps the promise below.
 ///
 /// Positions are within max(accuracy, 8 eps (r + distance travelled)), headings within 2 accuracy / link, and
 /// velocities within 10 accuracy / link of a handle's speed. So extrapolation over a tenth of a link adds one accuracy.
@@ -141,8 +141,7 @@ pub fn cheapest_with(
     let selection = select(rows);
     let selection =
         if selection.meets() || tolerance == Tolerance::EXACT { selection } else { select(make(Tolerance::EXACT)?) };
-    // A larger error than every table promises means that the table is wrong.
-    (selection.error <= selection.allowed.max(EXACT_ACCURACY)).then_some(selection)
+    (selection.error <= selection.allowed.max(accuracy)).then_some(selection)
 }
 
 /// Returns the tolerance of a table's rows for a requested accuracy.

@@ -118,6 +118,8 @@ pub struct FollowerTable {
     /// The packed rows, if frames are read from them.
     packed: Option<Arc<PackedRows>>,
     head: Arc<HeadTable>,
+    /// The travel, in metres, up to which the table has all handles; below 0 if the tail has a link of its own.
+    plain_until: f64,
     newton: Newton,
     fallbacks: u64,
     /// The greatest error of its frames, in metres.
@@ -126,7 +128,7 @@ pub struct FollowerTable {
 }
 
 /// The greatest error of the frames of the most exact table, metres, on any path but the farthest.
-pub(crate) const EXACT_ACCURACY: f64 = 1e-9;
+const EXACT_ACCURACY: f64 = 1e-9;
 
 impl FollowerTable {
     /// Makes a solver for `team` on `path`, the head moving at `head_speed` metres per second along the curve. The
@@ -164,6 +166,7 @@ impl FollowerTable {
         let newton = Newton::new(path.clone(), team, head_speed, velocities);
         let instructions = Instructions::fastest(team.handles());
         let exact_bytes_per_handle = rows.bytes_per_row(team.benches);
+        let plain_until = if tail.is_none() { head.valid_until() } else { -1.0 };
         let (rows, head) = (Arc::new(rows), Arc::new(head));
         Some(Self {
             head_speed,
@@ -173,6 +176,7 @@ impl FollowerTable {
             tail,
             packed: None,
             head,
+            plain_until,
             newton,
             fallbacks: 0,
             accuracy: EXACT_ACCURACY,
@@ -260,9 +264,8 @@ impl FollowerTable {
         self.fallbacks
     }
 
-    /// Fills the chain for `travelled` metres of the head, within the table. Returns `None` if the tail has a link of its
-    /// own and cannot be found from the table.
-    fn interpolate(&self, travelled: f64, chain: &mut ChainMut) -> Option<()> {
+    /// Fills the chain for `travelled` metres of the head, within the table.
+    fn interpolate(&self, travelled: f64, chain: &mut ChainMut) {
         debug_assert!(self.instructions.is_available(), "{}", self.instructions.name());
         match self.instructions {
             // SAFETY: a solver is only made with instructions that this processor has.
@@ -273,7 +276,14 @@ impl FollowerTable {
             Instructions::Avx2 => unsafe { self.interpolate_with_avx2(travelled, chain) },
             _ => self.interpolate_with::<false>(travelled, chain),
         }
-        let Some(tail) = &self.tail else { return Some(()) };
+    }
+
+    /// Does the same for a team whose tail has a link of its own. Returns `None` if there is no such tail, or it cannot
+    /// be found from the table.
+    #[cold]
+    fn interpolate_with_tail(&self, travelled: f64, chain: &mut ChainMut) -> Option<()> {
+        let tail = self.tail.as_ref().filter(|_| (0.0..=self.head.valid_until()).contains(&travelled))?;
+        self.interpolate(travelled, chain);
         tail.write(&self.rows, self.head.at(travelled).alpha, self.velocities, chain)
     }
 
@@ -325,7 +335,11 @@ impl Solver for FollowerTable {
 
     fn solve_in(&mut self, time: f64, chain: &mut ChainMut) -> Result<(), NoFollower> {
         let travelled = self.head_speed * time;
-        if (0.0..=self.head.valid_until()).contains(&travelled) && self.interpolate(travelled, chain).is_some() {
+        if (0.0..=self.plain_until).contains(&travelled) {
+            self.interpolate(travelled, chain);
+            return Ok(());
+        }
+        if self.interpolate_with_tail(travelled, chain).is_some() {
             return Ok(());
         }
         self.fallbacks += 1;

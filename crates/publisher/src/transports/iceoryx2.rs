@@ -156,6 +156,54 @@ type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
 type Opened<Message> = (Sender<Message, ()>, Service<Message, ()>);
 
 /// Publishes frames, alerts, cues, the stage and the scene.
+///
+/// # Examples
+///
+/// A publisher and its subscriber, here in one process:
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use bench_dragon_motion::event::unreported;
+/// use bench_dragon_publisher::live::{Outgoing, Publisher};
+/// use bench_dragon_show::scene::Scene;
+/// use bench_dragon_show::{Playback, Show};
+/// use bench_dragon_client::connection::Wake;
+/// use bench_dragon_client::feed::{Feed, FeedEvent, FeedOptions, Delivery};
+/// use bench_dragon_publisher::transports::iceoryx2::{PublisherConfig, SharedMemoryPublisher};
+/// use bench_dragon_messages::FrameHeader;
+/// use bench_dragon_show::convert::stage;
+///
+/// let scene = Scene::paper();
+/// let mut show = Show::new(&scene, scene.ensemble.timeline(&mut unreported), Playback::of(&scene))?;
+/// let config = PublisherConfig {
+///     name: format!("feed_example_{}", std::process::id()),
+///     handles: scene.ensemble.handles(),
+///     single_precision: None,
+///     queue: 4,
+///     subscribers: 1,
+///     alerts: true,
+///     cues: 0,
+///     scene: String::new(),
+///     stage: stage(1, 0, [0; 32], &scene.ensemble, &show),
+/// };
+/// let mut publisher = SharedMemoryPublisher::open(&config)?;
+///
+/// let mut feed = Feed::new(&config.name, FeedOptions { wake: Wake::Never, frames: Delivery::All })?;
+/// let mut received = 0;
+/// while received < 10 {
+///     let header = FrameHeader { run_id: 1, handles: 224, ..FrameHeader::default() };
+///     publisher.publish(Outgoing::new(&header, show.frame(received)))?;
+///     publisher.maintain();
+///     feed.poll(Duration::from_millis(1), &mut |event| {
+///         if let FeedEvent::Frame { handles, .. } = event {
+///             assert_eq!(handles.len(), 224);
+///             received += 1;
+///         }
+///     })?;
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct SharedMemoryPublisher {
     poses: FrameSender<HandlePose>,
     poses_32: Option<(FrameSender<HandlePose32>, Decimation)>,

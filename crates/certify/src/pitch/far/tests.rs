@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 use super::{holds, least_radius};
+use crate::spaced::Spaced;
 use bench_dragon_motion::linkage::follower;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::path::Path;
@@ -59,12 +60,18 @@ fn boards_are_apart_wherever_the_lemma_says_so() {
     let counted = std::cell::RefCell::new((&mut tried, &mut sharp));
     let result = runner.run(&teams(), |(team, pitch)| {
         // If the pitch exceeds the width there is such a radius, and the lemma holds further out too.
-        let radius = least_radius(&team, pitch, 1e-3).ok_or_else(|| TestCaseError::fail("no radius"))?;
-        for factor in [1.0, 1.0001, 1.03, 1.3, 4.0] {
-            prop_assert!(holds(&team, pitch, factor * radius), "not {factor} times as far out as {radius}");
-            let least = least_clearance(&team, pitch, factor * radius);
-            prop_assert!(least.is_some_and(|least| least > 0.0), "{least:?} at {factor} times {radius}");
+        let room = (pitch - team.width).min(team.link(1) - 2.0 * team.hole_inset);
+        for clearance in [0.0, 0.5 * room] {
+            let asked = Spaced { team: &team, clearance };
+            let radius = least_radius(asked, pitch, 1e-3).ok_or_else(|| TestCaseError::fail("no radius"))?;
+            for factor in [1.0, 1.0001, 1.03, 1.3, 4.0] {
+                let radius = factor * radius;
+                prop_assert!(holds(asked, pitch, radius), "not at {radius}, {factor} times the least");
+                let least = least_clearance(&team, pitch, radius);
+                prop_assert!(least.is_some_and(|least| least > clearance), "{least:?} at {radius} of {clearance}");
+            }
         }
+        let radius = least_radius((&team).into(), pitch, 1e-3).unwrap();
         let mut counted = counted.borrow_mut();
         *counted.0 += 1;
         let overlaps = |factor: f64| least_clearance(&team, pitch, factor * radius).is_none_or(|least| least < 0.0);
@@ -79,22 +86,22 @@ fn boards_are_apart_wherever_the_lemma_says_so() {
 
 #[test]
 fn the_lemma_holds_for_the_team_of_the_paper_little_further_out_than_boards_touch() {
-    let radius = least_radius(&PAPER, 0.4503373934, 4.5).unwrap();
+    let radius = least_radius((&PAPER).into(), 0.4503373934, 4.5).unwrap();
     println!("{radius}");
     assert!(radius > 4.6 && radius < 5.6, "{radius}");
     // The result is never below the radius that is requested.
-    assert_eq!(least_radius(&PAPER, 0.4503373934, 9.0), Some(9.0));
+    assert_eq!(least_radius((&PAPER).into(), 0.4503373934, 9.0), Some(9.0));
 }
 
 #[test]
 fn what_touches_however_far_out_is_refused() {
     let endless = Team { benches: 1_000_000_000_000, ..PAPER };
-    assert_eq!(least_radius(&endless, 0.2999, 4.5), None);
+    assert_eq!(least_radius((&endless).into(), 0.2999, 4.5), None);
     assert!(least_clearance(&endless, 0.2999, 10.0).unwrap() < 0.0);
     // A short team does not meet itself.
     let short = Team { benches: 5, ..PAPER };
-    assert!(least_radius(&short, 0.2999, 1.0).is_some_and(|radius| radius < 5.0));
+    assert!(least_radius((&short).into(), 0.2999, 1.0).is_some_and(|radius| radius < 5.0));
     let long_insets = Team { hole_inset: 0.75, ..PAPER };
-    assert_eq!(least_radius(&long_insets, 2.0, 4.5), None);
+    assert_eq!(least_radius((&long_insets).into(), 2.0, 4.5), None);
     assert!(least_clearance(&long_insets, 2.0, 1000.0).unwrap() < 0.0);
 }

@@ -12,7 +12,7 @@ const RADIUS: f64 = 0.18;
 fn with_proposals(proposals: &[f64]) -> LeastPitch {
     let mut proposals = proposals.iter().copied();
     let mut propose = |_, _, _: Progress<'_>| Proposal { pitch: proposals.next(), ..Proposal::default() };
-    decided(&TEAM, RADIUS, &mut propose, false, &mut unreported).unwrap().0
+    decided((&TEAM).into(), RADIUS, &mut propose, false, &mut unreported).unwrap().0
 }
 
 #[test]
@@ -46,7 +46,7 @@ fn wrong_obstacles_of_a_proposal_only_cost_time() {
         (None, touch(pair, RADIUS)),
     ] {
         let mut propose = |_, _, _: Progress<'_>| Proposal { pitch: Some(free), first, last };
-        let (found, _) = decided(&TEAM, RADIUS, &mut propose, false, &mut unreported).unwrap();
+        let (found, _) = decided((&TEAM).into(), RADIUS, &mut propose, false, &mut unreported).unwrap();
         assert!(found.proved, "{first:?} {last:?}: {found:?}");
         assert!((found.value_lo - known.value_lo).abs() < 1e-9, "{first:?} {last:?}: {found:?} {known:?}");
     }

@@ -62,6 +62,7 @@ fn a_long_head_has_a_least_turn() {
     let found = least(&team, Some(1.0));
     encloses(&found, of_equal_arcs(29.45), 1e-13);
     assert_eq!(found.limit.unwrap().bench_a, 0);
+    assert_eq!(least(&team, None), found);
 }
 
 /// The other search is `tests/python/least_turn.py PITCH LINK RATIO [BENCHES BODY_LINK INSET WIDTH]`.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::beginning::Beginning;
 use super::last_row::Row;
-use super::layout::{bands, between_kinks, foremost, kinks};
+use super::layout::{bands, between_kinks, foremost, kinks, longest_reach};
 use super::polynomial::{economise, from_slopes, horner};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, Tolerance};
 use super::track::{Node, Track};
@@ -306,12 +306,39 @@ pub(super) fn within_half_turn(angle: f64) -> f64 {
 /// waits for memory, and each piece of a row needs less.
 const FAR_ROW: usize = 512;
 
-/// Makes the table for `team` on `path`; `None` if there is none, or it would be too large.
+/// The number of junctions from which a table that would be too large covers the beginning of the path alone.
+const MANY_JUNCTIONS: usize = 16;
+
+/// The number of times by which a table may seem too large before it is made: bands further back have fewer kinks.
+const ROUGHLY: f64 = 4.0;
+
+/// Makes the table for `team` on `path`; `None` if there is none, or it would be too large. On a path of many junctions
+/// it covers as much of the beginning as its limit allows.
 /// `all_centres`: the places of the pieces' centres are for frames, too, in every row.
 pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance, all_centres: bool) -> Option<Rows> {
+    let junctions = |reach: f64| track.path.junctions().take_while(|at| *at <= reach).count();
+    // Each junction cuts all rows.
+    let bytes = |reach: f64| {
+        let rows = team.benches as f64 + reach / team.link(1);
+        (1 + junctions(reach)) as f64 * rows * (Lengths::NEAR.per_row() * size_of::<f64>()) as f64
+    };
+    let mut reach = longest_reach(track, team);
+    while junctions(reach) > MANY_JUNCTIONS {
+        if bytes(reach) < ROUGHLY * MOST_BYTES as f64
+            && let Some(rows) = rows_up_to(track, team, tolerance, all_centres, reach)
+        {
+            return Some(rows);
+        }
+        reach *= 0.5;
+    }
+    rows_up_to(track, team, tolerance, all_centres, reach)
+}
+
+/// Makes the table for the first `reach` metres of the head's travel.
+fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, all_centres: bool, reach: f64) -> Option<Rows> {
     let beginning = Beginning::new(track, team)?;
     let link = team.link(1);
-    let foremost = foremost(track, team)?;
+    let foremost = foremost(track, team, reach)?;
     let second = track.follower(track.path.param_at(0.0), team.link(0))?;
     // One chain of nodes determines the number of rows, with a margin; it is least if each takes half a turn.
     let mut node = beginning.node(track, 0.0);
@@ -333,7 +360,7 @@ pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance, all_centres
         }
     }
     let end = (steps + 2).next_multiple_of(LANES);
-    let kinks = kinks(track, &beginning, link, end);
+    let kinks = kinks(track, &beginning, link, end, foremost);
     let phases = kinks.iter().map(|kink| kink.fract()).collect();
     let mut table = Rows { tolerance, bands: Vec::new(), kinks: phases, valid_from: 0.0 };
     // So far behind, one piece suffices. It is smoother than the beginning computed for each phase.

@@ -2,7 +2,7 @@
 //! junctions cut it.
 
 use super::beginning::Beginning;
-use super::rows::Piece;
+use super::rows::{LANES, Piece};
 use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::curve::Curve;
@@ -33,9 +33,13 @@ pub(super) fn bands(end: usize) -> Vec<(usize, usize)> {
     bands
 }
 
-/// Returns the foremost place of the second handle.
-pub(super) fn foremost(track: &Track, team: &Team) -> Option<Param> {
-    let reach = track.path.length().min(MOST_ROWS_AHEAD as f64 * team.link(1));
+/// Returns the metres of the head's travel that a table may cover.
+pub(super) fn longest_reach(track: &Track, team: &Team) -> f64 {
+    track.path.length().min(MOST_ROWS_AHEAD as f64 * team.link(1))
+}
+
+/// Returns the foremost place of the second handle while the head travels `reach` metres.
+pub(super) fn foremost(track: &Track, team: &Team, reach: f64) -> Option<Param> {
     let second = |travelled: f64| linkage::follower(track.path, track.path.param_at(travelled), team.link(0)).ok();
     let mut foremost = second(0.0)?;
     let mut farther = |place: Param| {
@@ -68,10 +72,15 @@ pub(super) fn foremost(track: &Track, team: &Team) -> Option<Param> {
     Some(foremost)
 }
 
-/// Returns alpha of every junction at which the path's curvature changes, in order of phase.
-pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize) -> Vec<f64> {
+/// Returns alpha of every junction at which the path's curvature changes, in order of phase. None is further ahead than
+/// `furthest`.
+pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize, furthest: Param) -> Vec<f64> {
     let path = track.path;
+    let margin = 2.0 * (LANES + 4) as f64 * link;
+    let is_covered =
+        |segment: &usize| path.arc_length(furthest, Param { segment: *segment, at: path.first(*segment) }) <= margin;
     let mut kinks: Vec<f64> = (1..path.segments())
+        .take_while(is_covered)
         .filter_map(|segment| {
             let junction = Param { segment, at: path.first(segment) };
             let is_straight = |segment| path.segment_at(segment).constant_curvature() == Some(0.0);

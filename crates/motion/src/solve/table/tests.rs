@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::model::curve::Side;
+use crate::model::path::Route;
 use crate::solve::Chain;
 
 const TEAM: Team =
@@ -161,4 +162,26 @@ fn a_small_table_is_read_as_exactly() {
     }
     // For miri's log.
     println!("{:?}, {} tables", Instructions::available(), tables.len());
+}
+
+#[test]
+fn a_route_of_thousands_of_bends_has_a_table_for_its_beginning() {
+    let bends = |route: Route, _| route.arc(Side::Left, 6.0, 0.11).arc(Side::Right, 5.0, 0.13);
+    let path = (0..2048).fold(Path::route(0.0), bends).build().unwrap();
+    let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
+    let mut table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed).unwrap();
+    let end = table.valid_until();
+    assert!(end > 200.0 && end < 0.9 * path.length() && table.memory_bytes() < 200 << 20, "{end}");
+    let (mut found, mut wanted) = (Chain::new(TEAM.handles()), Chain::new(TEAM.handles()));
+    for k in 0..=100 {
+        let time = end * f64::from(k) / 100.0;
+        table.solve(time, &mut found).unwrap();
+        newton.solve_at(time, &mut wanted).unwrap();
+        let [place, heading, _] = differences(&found, &wanted);
+        assert!(
+            place < 2.0 * 1e-13f64.max(8.0 * f64::EPSILON * time) && heading < 1e-11,
+            "{time}: {place:e} {heading:e}"
+        );
+    }
+    assert_eq!(table.fallbacks(), 0);
 }
