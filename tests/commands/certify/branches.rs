@@ -14,13 +14,19 @@ fn is_branch(line: &Value) -> bool {
 
 #[test]
 fn followers_on_branches_are_proved() {
-    for name in ["lk_25", "jump_nostall_361"] {
+    // The second number is that of the links with branches; 2 is a tail with a size of its own.
+    for (name, link, end) in [
+        ("lk_25", 0, EventKind::PathEnd),
+        ("jump_nostall_361", 0, EventKind::Lock),
+        ("tail_pushed_back", 2, EventKind::PathEnd),
+        ("tail_locks", 2, EventKind::Lock),
+    ] {
         let text = scene_text(name);
         let lines = certificate(&text);
         assert!(lines.iter().any(is_branch), "{name}");
+        assert!(lines.iter().filter(|line| is_branch(line)).all(|line| line["link"] == link), "{name}");
         let proved = check(&lines).unwrap_or_else(|refused| panic!("{name}: {refused}"));
         assert_eq!(Found::new(&text).unwrap().contradiction(&proved), None, "{name}");
-        let end = if name == "lk_25" { EventKind::PathEnd } else { EventKind::Lock };
         let of_end = proved.results.iter().find(|outcome| outcome.event == end).unwrap();
         assert_eq!(of_end.status, Status::Proved, "{name}: {:?}", proved.results);
     }
@@ -35,6 +41,9 @@ fn changed_branches_are_refused() {
     assert!(check(&without).is_err());
     let first = lines.iter().position(is_branch).unwrap();
     let last_branch = lines.iter().rposition(is_branch).unwrap();
+    // The first branch begins before the nearer place has come to the distance.
+    let second = first + 1;
+    assert!(second < last_branch);
     let step = lines.iter().position(|line| line["type"] == "step").unwrap();
     let changed = |change: &dyn Fn(&mut Vec<Value>)| {
         let mut lines = lines.clone();
@@ -43,7 +52,7 @@ fn changed_branches_are_refused() {
     };
     // One branch is missing; two are exchanged; one comes after a step; one is of the other link, or of none.
     assert!(changed(&|lines| drop(lines.remove(last_branch))).is_err());
-    assert!(last_branch == first || changed(&|lines| lines.swap(first, last_branch)).is_err());
+    assert!(changed(&|lines| lines.swap(first, last_branch)).is_err());
     assert!(
         changed(&|lines| {
             let branch = lines.remove(first);
@@ -51,11 +60,15 @@ fn changed_branches_are_refused() {
         })
         .is_err()
     );
-    assert!(changed(&|lines| lines[first]["link"] = json!(1 - lines[first]["link"].as_u64().unwrap())).is_err());
-    assert!(changed(&|lines| lines[first]["link"] = json!(2)).is_err());
+    assert!(changed(&|lines| lines[second]["link"] = json!(1 - lines[second]["link"].as_u64().unwrap())).is_err());
+    assert!(changed(&|lines| lines[second]["link"] = json!(2)).is_err());
+    // The branches of a tail are those of no other link.
+    let mut of_tail = certificate(&scene_text("tail_pushed_back"));
+    of_tail.iter_mut().filter(|line| is_branch(line)).for_each(|line| line["link"] = json!(1));
+    assert!(check(&of_tail).is_err());
     // A place at the front handle, or far behind the follower.
-    assert!(changed(&|lines| lines[first]["behind"] = lines[first]["from"].clone()).is_err());
-    assert!(changed(&|lines| lines[first]["behind"] = json!([0, 1e3])).is_err());
+    assert!(changed(&|lines| lines[second]["behind"] = lines[second]["from"].clone()).is_err());
+    assert!(changed(&|lines| lines[second]["behind"] = json!([0, 1e3])).is_err());
     // On the first segment every follower is the first place.
     assert!(changed(&|lines| lines[first]["from"] = json!([0, 10.0])).is_err());
 }

@@ -11,7 +11,7 @@ fn team(benches: usize, head_length: f64, body_length: f64) -> Team {
 }
 
 fn search(path: &Path, team: &Team) -> Singularities {
-    Singularities::search(path, team, &mut Budget::new(10_000_000, &mut unreported))
+    Singularities::search(path, team, &mut Budget::new(50_000_000, &mut unreported))
 }
 
 /// The whole trace of one link.

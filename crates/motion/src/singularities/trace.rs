@@ -237,10 +237,12 @@ impl<'a> LinkTrace<'a> {
         // search would come to places that are nearer again.
         let (link, at, valley) = (self.link, self.at, self.link.path.travelled(branch.behind));
         let around = (2.0 * (valley - at.rear).abs()).clamp(NARROWEST * link.length, WIDEST * link.length);
-        let is_lost = |front: f64| link.least_distance(front, valley, around) >= link.length;
-        if !is_lost(front) {
+        let excess = |front: f64| link.least_distance(front, valley, around) - link.length;
+        if excess(front) < -link.resolution(&at) {
             return Err(*none);
         }
+        // Within the rounding of the distances, the places on both sides are at the distance up to here.
+        let is_lost = |place: f64| place >= front || excess(place) >= 0.0;
         self.lock(&at, bisect_predicate(is_lost, at.front, front));
         Ok(None)
     }
