@@ -319,13 +319,15 @@ fn check_chain(path: &Path, team: &Team) {
     let end = found.end.unwrap();
     let stall = found.stall.map_or(end.travelled, |stall| stall.travelled);
     let behind = -4.0 * (team.length() + team.longest_link());
-    let links = team.kinds().map(|bench| Continued::new(path, team.link(bench), behind));
+    let mut lengths = team.kinds().map(|bench| team.link(bench)).to_vec();
+    lengths.sort_by(f64::total_cmp);
+    lengths.dedup();
+    let links: Vec<_> = lengths.into_iter().map(|length| Continued::new(path, length, behind)).collect();
     // The front handles' travels and front cosines.
     let chain = |head: f64| {
         let mut front = head;
         let one = |bench: usize| {
-            let kind = if bench > 0 && bench + 1 == team.benches { 2 } else { bench.min(1) };
-            let (rear, cosine) = links[kind].at(front)?;
+            let (rear, cosine) = links.iter().find(|of| of.link == team.link(bench))?.at(front)?;
             Some((std::mem::replace(&mut front, rear), cosine))
         };
         (0..team.benches).map_while(one).collect::<Vec<_>>()
