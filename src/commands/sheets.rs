@@ -52,6 +52,7 @@ pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), Comman
     let clock = arguments.clock()?;
     warn_of_doubts(&scene);
     let timeline = search_timeline(&scene, common);
+    unstopped()?;
     let bar = progress_bar(1000, common).with_message("following every bench");
     let obstacles = scene.ensemble.obstacle_clearances(timeline.end(), &mut |share| report(&bar, 0.1 * share));
     let searched = Searched { boards: find_least_clearance(&scene, &timeline, common).of_show, obstacles: &obstacles };

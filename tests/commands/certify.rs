@@ -5,6 +5,7 @@
 
 use crate::harness;
 
+mod branches;
 mod changes;
 mod second_judge;
 mod tampering;

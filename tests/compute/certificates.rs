@@ -127,8 +127,8 @@ fn enclosures_are_a_nanosecond_wide() {
     ];
     let scenes = changes.iter().map(|(key, value)| (format!("{key} {value}"), paper_with(key, value)));
     let named = ["school", "tight", "wide"].map(|name| (name.to_owned(), load(&format!("config/{name}.toml"))));
-    let found = ["pp_16", "lock_skipped", "jump_uturn"]
-        .map(|name| (name.to_owned(), load(&format!("tests/scenes/{name}.toml"))));
+    let found =
+        ["pp_16", "jump_route", "jump_uturn"].map(|name| (name.to_owned(), load(&format!("tests/scenes/{name}.toml"))));
     // One of each kind; the long run has all.
     let spirals = SPIRALS.into_iter().step_by(if harness::long() { 1 } else { 3 });
     let spirals = spirals.map(|numbers| (format!("{numbers:?}"), spiral(numbers)));

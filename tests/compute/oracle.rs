@@ -284,6 +284,10 @@ fn the_oracle_finds_what_another_oracle_found() {
     let contact = verdict_of(&scene).contact.unwrap().unwrap();
     assert_near(contact.head, 37.145313188924, 1e-11);
     assert_eq!(contact.benches, (1, 8));
-    let skipped = team(20, 3.41, 2.2, 0.3, 0.275) + &route(&[[10.0, 0.0], [1.4299999, 0.5], [40.0, 0.0]]);
-    assert_near(verdict_of(&skipped).lock.unwrap().0, 14.4932334878, 1e-9);
+    // Followers that once jumped, on a turnaround and on a route with spirals.
+    let scene = |name: &str| std::fs::read_to_string(format!("tests/scenes/{name}.toml")).unwrap();
+    let pushed_back = verdict_of(&scene("lk_25"));
+    assert_near(pushed_back.stall.unwrap().0, 7.663892664, 1e-8);
+    assert!(pushed_back.lock.is_none() && pushed_back.doubts.is_empty());
+    assert_near(verdict_of(&scene("jump_nostall_361")).lock.unwrap().0, 51.55012, 1e-5);
 }

@@ -9,6 +9,7 @@ mod certificate;
 use std::io;
 
 use super::CertifyError;
+use super::branch::Branch;
 use super::first_order::When;
 use super::first_order_step::{FirstOrderStep, StepPoints, step_points};
 use super::grid::GridPoint;
@@ -128,6 +129,8 @@ pub(super) fn certify_part(
 ) -> Result<ClearanceEnclosures, CertifyError> {
     let descent = Descent::new(chain_of(motion), show_end.event.travelled, most_steps, Some(write));
     let mut descent = Descent { part, ..descent };
+    let lines: Vec<_> = descent.chain.branches.iter().map(Branch::line).collect();
+    lines.iter().for_each(|line| descent.write(line));
     let nothing = ClearanceEnclosures { boards: None, obstacles: vec![None; motion.ground().obstacles().len()] };
     let has_hints = hints.boards.is_some() || !hints.obstacles.is_empty();
     let enclosures = if has_hints { descent.run(motion, show_end, hints, progress) } else { nothing };

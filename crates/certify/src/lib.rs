@@ -7,6 +7,7 @@
 
 mod between;
 mod boards;
+mod branch;
 mod capsule;
 mod clearance;
 mod elementary;

@@ -39,6 +39,17 @@ pub enum CertificateLine<'a> {
         /// The text of the scene.
         scene: &'a str,
     },
+    /// The follower of a link is not the first place at its distance, but the first one back from another place.
+    Branch {
+        /// 0 for the head's link, 2 for that of a tail with a size of its own, 1 for all others.
+        link: usize,
+        /// The first place of the front handle.
+        from: Place,
+        /// The last place of the front handle.
+        to: Place,
+        /// A place between the follower and all nearer places at the distance.
+        behind: Place,
+    },
     /// A step of the head.
     Step(Step),
     /// Two boards have a point in common.
@@ -112,7 +123,7 @@ pub enum CertificateLine<'a> {
         /// The spans of the handles from 1 to the rear of the link.
         spans: Vec<Span>,
     },
-    /// A link has no continuous follower.
+    /// The follower of a link vanishes.
     Lock {
         /// The link, counted from 0.
         link: usize,
@@ -122,13 +133,13 @@ pub enum CertificateLine<'a> {
         spans: Vec<Span>,
         /// Their spans at the end.
         last: Vec<Span>,
-        /// For a follower that vanishes: places behind and ahead of it that it cannot pass.
+        /// Places behind and ahead of the follower that are nearer than the link; so are all places between in the end.
         #[serde(skip_serializing_if = "Option::is_none")]
         window: Option<Span>,
-        /// For a follower that jumps: two places ahead of it. The follower cannot pass the first place, and the next
-        /// follower is at the second place or ahead of it.
+        /// Places behind and ahead of the follower that are further away than the link; so are all places between in the
+        /// end.
         #[serde(skip_serializing_if = "Option::is_none")]
-        jump: Option<Span>,
+        beyond: Option<Span>,
     },
     /// The last step has reached the path's end.
     PathEnd,

@@ -2,10 +2,11 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use super::branch::{Branch, rules};
 use super::capsule::{Capsule, Spanned};
 use super::interval::{Interval, dot, minus, norm_squared};
 use super::path::ExactPath;
-use super::place::Span;
+use super::place::{Place, Span};
 
 /// Limit of halvings of a stretch whose places must be nearer than the link.
 const MOST_HALVINGS: u32 = 44;
@@ -27,18 +28,43 @@ pub(super) enum Front {
     Unknown,
 }
 
-/// Returns the sign of the front product if the follower of every place of `front` is proved to be in `rear`.
-pub(super) fn follower_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
+/// Returns the sign of the front product if the follower of a link of some kind is proved to be in `rear` for every
+/// place of `front`.
+pub(super) fn follower_within(
+    path: &ExactPath,
+    front: &Spanned,
+    rear: &Spanned,
+    link: Interval,
+    (branches, kind): (&[Branch], usize),
+) -> Option<Front> {
     let sign = one_place_within(path, front, rear, link)?;
-    let near = path.turning(rear.span.0, front.span.1) < QUARTER
-        || nearer(path, front, Span(rear.span.1, front.span.1), link, MOST_HALVINGS);
-    near.then_some(sign)
+    if branches.is_empty() {
+        return is_first(path, front, rear, None, link).then_some(sign);
+    }
+    let mut rules = rules(branches, path, kind, front.span);
+    rules.all(|(part, behind)| is_first(path, &Spanned::new(path, part), rear, behind, link)).then_some(sign)
+}
+
+/// Returns true if the place of `rear` at the distance is proved to be the first one back from `behind`, or from the
+/// front.
+fn is_first(path: &ExactPath, front: &Spanned, rear: &Spanned, behind: Option<Place>, link: Interval) -> bool {
+    let Span(earliest, latest) = rear.span;
+    let is_nearer = |to: Place| {
+        path.turning(earliest, front.span.1) < QUARTER || nearer(path, front, Span(latest, to), link, MOST_HALVINGS)
+    };
+    match behind {
+        None => is_nearer(front.span.1),
+        Some(behind) if path.in_order(behind, latest) => {
+            let square = front.capsule.distance_squared(path.point(behind));
+            path.in_order(earliest, behind) && square.is_below(link.square())
+        }
+        Some(behind) => path.in_order(behind, front.span.0) && is_nearer(behind),
+    }
 }
 
 /// Returns the sign of the front product if, for every place of `front`, exactly one inner place of `rear` is at the
-/// link's distance. That place is the follower unless a nearer place is at the distance. Returns `None` without a
-/// proof.
-pub(super) fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
+/// link's distance. Returns `None` without a proof.
+fn one_place_within(path: &ExactPath, front: &Spanned, rear: &Spanned, link: Interval) -> Option<Front> {
     let (u, x) = (&front.capsule, &rear.capsule);
     let behind = path.in_order(rear.span.1, front.span.0);
     if !behind || !u.product(x, true).is_positive() && !has_sign(path, u, rear.span, 1.0) {
@@ -101,12 +127,19 @@ pub(super) fn nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Int
         && nearer(path, front, Span(middle, last), link, halvings - 1)
 }
 
-/// Returns true if all places of a stretch are proved to be nearer than the link to all of `front`.
-pub(super) fn all_nearer(path: &ExactPath, front: &Spanned, stretch: Span, link: Interval, halvings: u32) -> bool {
-    if front.capsule.distances_squared(&Capsule::new(path, stretch)).is_below(link.square()) {
+/// Returns true if the squared distances of all places of a stretch from all of `front` are proved to satisfy a
+/// condition.
+pub(super) fn all_distances(
+    path: &ExactPath,
+    front: &Spanned,
+    stretch: Span,
+    holds: &dyn Fn(Interval) -> bool,
+    halvings: u32,
+) -> bool {
+    if holds(front.capsule.distances_squared(&Capsule::new(path, stretch))) {
         return true;
     }
     let Some(middle) = path.between(stretch.0, stretch.1).filter(|_| halvings > 0) else { return false };
-    all_nearer(path, front, Span(stretch.0, middle), link, halvings - 1)
-        && all_nearer(path, front, Span(middle, stretch.1), link, halvings - 1)
+    all_distances(path, front, Span(stretch.0, middle), holds, halvings - 1)
+        && all_distances(path, front, Span(middle, stretch.1), holds, halvings - 1)
 }

@@ -4,11 +4,13 @@
 use std::io;
 use std::ops::ControlFlow;
 
+use super::branch::Branch;
 use super::capsule::Spanned;
 use super::grid::{GridPoint, place};
 use super::ground::Barrier;
 use super::interval::Interval;
 use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
+use super::lock::LockWindow;
 use super::path::ExactPath;
 use super::place::{Place, Span};
 use super::step::{Chain, Claim, Obstacle, Shown};
@@ -169,6 +171,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
 
     /// Writes the lines after the first, and returns their results.
     pub fn section(mut self, progress: Progress<'_>) -> Result<Section, CertifyError> {
+        let lines: Vec<_> = self.chain.branches.iter().map(Branch::line).collect();
+        lines.iter().try_for_each(&mut *self.write).map_err(CertifyError::Write)?;
         let stuck = match self.motion(progress) {
             Ok(()) => None,
             Err(Halt::Error(error)) => return Err(error),
@@ -624,14 +628,14 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 let handles = chain.spans(&mut search.at, to, link)?;
                 let last = chain.spans(&mut to.clone(), to, link)?;
                 let fronts = (&handles[link], &last[link]);
-                let window = chain.lock_window(&mut search.at, link, rear, fronts);
-                let jump = match window {
-                    Some(_) => None,
-                    None => Some(chain.lock_jump(&mut search.at, link, rear, fronts)?),
+                let shown = chain.lock_window(&mut search.at, link, rear, fronts)?;
+                let (window, beyond) = match shown {
+                    LockWindow::Nearer(window) => (Some(window), None),
+                    LockWindow::Further(window) => (None, Some(window)),
                 };
                 let spans = |handles: &[Spanned]| handles[1..].iter().map(|handle| handle.span).collect();
                 let (spans, last) = (spans(&handles), spans(&last));
-                Some(CertificateLine::Lock { link, to: to.head, spans, last, window, jump })
+                Some(CertificateLine::Lock { link, to: to.head, spans, last, window, beyond })
             })
         });
         let Some((to, line)) = found else {

@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 
 use super::boards::{MovingBoard, Shape};
+use super::branch::{Branch, branches, link_kind};
 use super::capsule::{Spanned, moved_back};
 use super::grid::{GridPoint, span};
 use super::ground::Barrier;
@@ -73,6 +74,7 @@ pub(super) struct Chain<'a> {
     pub start: Option<Place>,
     /// The obstacles of the stage.
     pub barriers: Vec<Barrier>,
+    pub branches: Vec<Branch>,
     /// The metres that boards must keep from each other to be clear.
     pub clearance: f64,
 }
@@ -95,9 +97,10 @@ pub(super) fn link_of(team: &Team, bench: usize) -> Interval {
 
 impl<'a> Chain<'a> {
     pub fn new(path: &'a Path, exact: ExactPath, team: &'a Team) -> Self {
+        let branches = branches(path, &exact, team);
         let kinds = team.kinds();
         let (links, shapes) = (kinds.map(|bench| link_of(team, bench)), kinds.map(|bench| Shape::new(team, bench)));
-        Self { path, exact, team, links, shapes, start: None, barriers: Vec::new(), clearance: 0.0 }
+        Self { path, exact, team, links, shapes, start: None, barriers: Vec::new(), clearance: 0.0, branches }
     }
 
     /// Returns the metres between the handles of a bench.
@@ -108,6 +111,11 @@ impl<'a> Chain<'a> {
     /// Returns the shape of the board of a bench.
     pub fn shape(&self, bench: usize) -> Shape {
         self.shapes[self.kind(bench)]
+    }
+
+    /// Returns all branches, and the kind of a bench's link.
+    pub fn branches_of(&self, bench: usize) -> (&[Branch], usize) {
+        (&self.branches, link_kind(self.team, bench))
     }
 
     fn kind(&self, bench: usize) -> usize {
@@ -376,7 +384,7 @@ impl<'c, 'a> Listed<'c, 'a> {
         let padded = self.multiples.iter().enumerate().skip(first).find_map(|(too_small, multiple)| {
             let pad = least + multiple * PAD * size / rear_cosine;
             let rear = Spanned::new(exact, span(exact, ends[0].param, ends[1].param, pad, fine));
-            let sign = follower_within(exact, &front, &rear, length)?;
+            let sign = follower_within(exact, &front, &rear, length, self.chain.branches_of(link))?;
             Some((too_small, pad, rear, sign))
         });
         let (too_small, pad, rear, sign) = padded.ok_or(Obstacle::Link(link))?;

@@ -82,7 +82,7 @@ impl Track {
 
     /// Returns the place on the path that is nearest to a point of the stage, within `WINDOW` metres of a place.
     pub fn project(&self, point: Point, near: f64) -> Projection {
-        let (path, placement) = (self.motion.path(), self.motion.placement());
+        let (path, placement) = (self.motion.bare_path(), self.motion.placement());
         let (first, last) = ((near - WINDOW).max(0.0), (near + WINDOW).min(path.length()));
         let offset = |travelled: f64| point - placement.point(path.point(path.param_at(travelled)));
         let count = ((last - first) / STEP).ceil().max(1.0);

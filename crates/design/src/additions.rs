@@ -100,7 +100,7 @@ fn add_piece(scene: &DesignedScene, addition: &Addition) -> Result<String, Fault
     if !matches!(motion.description(), PathDescription::Route { .. }) {
         return Err("only a route has pieces, expected path.kind \"pieces\"".to_owned().into());
     }
-    let path = motion.path();
+    let path = motion.bare_path();
     let last = path.param_at(path.length());
     let (end, along) = (path.point(last), path.tangent(last));
     let to = addition.at.map(|at| motion.placement().own_point(at.into()) - end);

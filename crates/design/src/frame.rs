@@ -89,7 +89,7 @@ pub fn without_tables(scene: &Scene) -> Scene {
 /// Returns the timeline of a motion of which nothing but the length of the path is known.
 fn path_end(scene: &Scene) -> Timeline {
     let ends = scene.ensemble.dragons().iter().map(|dragon| {
-        let travelled = dragon.motion.path().length();
+        let travelled = dragon.motion.bare_path().length();
         (dragon.delay + dragon.motion.time_at(travelled), travelled)
     });
     let (time, travelled) = ends.max_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or_default();

@@ -238,7 +238,7 @@ impl DesignedScene {
 
     /// Returns the simulated time at which the last head reaches the end of its path.
     pub fn path_end(&self) -> f64 {
-        let end = |Dragon { delay, motion, .. }: &Dragon| delay + motion.time_at(motion.path().length());
+        let end = |Dragon { delay, motion, .. }: &Dragon| delay + motion.time_at(motion.bare_path().length());
         self.scene.ensemble.dragons().iter().map(end).fold(0.0, f64::max)
     }
 }

@@ -145,8 +145,10 @@ fn left(ensemble: &Ensemble, time: f64) -> f64 {
 
 /// Returns the seconds until the last head reaches the end of its path.
 fn duration(ensemble: &Ensemble) -> f64 {
-    let ends =
-        ensemble.dragons().iter().map(|dragon| dragon.delay + dragon.motion.time_at(dragon.motion.path().length()));
+    let ends = ensemble
+        .dragons()
+        .iter()
+        .map(|dragon| dragon.delay + dragon.motion.time_at(dragon.motion.bare_path().length()));
     ends.fold(0.0, f64::max)
 }
 
@@ -189,6 +191,11 @@ impl Sampler {
         let end = duration(&self.ensemble);
         let fastest = self.ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).fold(0.0, f64::max);
         let samples = (end * fastest / STEP).clamp(1.0, MOST_SAMPLES).ceil();
+        let mut ask = |_| if is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        self.ensemble.dragons().iter().for_each(|dragon| dragon.motion.search_branches(&mut ask));
+        if is_stopped() {
+            return None;
+        }
         let mut solver = self.ensemble.solver(Velocities::Omitted);
         let mut parts: Vec<Part> = Vec::new();
         for sample in 0..=samples as usize {

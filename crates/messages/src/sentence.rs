@@ -111,7 +111,7 @@ fn happening(alert: &CollisionAlert, kind: EventKind, stage: &Stage) -> String {
             format!("{who} stalled, t = {time:.6} s: from the handle at {place} on, the team was pushed backwards")
         }
         EventKind::Lock => {
-            format!("{who} locked, its rear handle at {place}, t = {time:.6} s: the motion cannot continue")
+            format!("{who} locked, its rear handle at {place}, t = {time:.6} s: that handle would need unbounded speed")
         }
         EventKind::PathEnd if stage.dragons.len() > 1 => {
             format!("all heads reached the ends of their paths, t = {time:.6} s")

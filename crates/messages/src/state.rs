@@ -14,7 +14,7 @@ pub enum EventKind {
     Contact,
     /// A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     Stall,
-    /// A link is in a singular configuration: its rear handle would have to jump, and the motion cannot continue.
+    /// A link is in a singular configuration, square to the path at its rear handle, which would need unbounded speed.
     Lock,
     /// The head reaches the end of the path.
     PathEnd,
@@ -62,7 +62,7 @@ pub enum FrameState {
     Contact,
     /// A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     Stall,
-    /// A link is in a singular configuration: the motion cannot continue.
+    /// A link is in a singular configuration, square to the path at its rear handle, which would need unbounded speed.
     Lock,
     /// The head has reached the end of the path.
     PathEnd,
@@ -135,7 +135,7 @@ pub enum Level {
     Contact,
     /// A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     Stall,
-    /// A link is in a singular configuration: the motion cannot continue.
+    /// A link is in a singular configuration, square to the path at its rear handle, which would need unbounded speed.
     Lock,
     /// A board has reached the keep-out of an obstacle, or has left the boundary by its keep-out.
     Obstacle = 6,

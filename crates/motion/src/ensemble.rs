@@ -43,7 +43,7 @@ impl Dragon {
             return (show_time, true);
         }
         let own = show_time - self.delay;
-        let end = self.motion.time_at(self.motion.path().length());
+        let end = self.motion.time_at(self.motion.bare_path().length());
         if own < 0.0 {
             (0.0, false)
         } else if own >= end {
@@ -316,7 +316,7 @@ impl Ensemble {
         budget: &mut Budget,
     ) -> Result<Vec<MovingDragon<'a>>, NoFollower> {
         let moving = |(Dragon { delay, motion, .. }, found): (&'a Dragon, &'a Singularities)| {
-            let end = found.end.map_or(motion.path().length(), |end| end.travelled);
+            let end = found.end.map_or(motion.bare_path().length(), |end| end.travelled);
             let of_show = (*delay, motion.head_speed(), end);
             MovingDragon::new(motion.advancement(found), *motion.placement(), of_show, budget)
         };

@@ -17,6 +17,8 @@ pub mod solve;
 pub mod sweep;
 pub mod timeline;
 
+use std::sync::{Arc, OnceLock};
+
 use bench_dragon_messages::state::EventKind;
 
 use crate::model::board::Board;
@@ -32,7 +34,7 @@ use crate::solve::{Solver, Velocities};
 
 use clearance::{ClearanceMonitor, Pairs, Precision};
 use contact::{ConservativeAdvancement, Found, LeastClearance, ObstacleClearance, Touch};
-use event::{Budget, Event, Progress};
+use event::{Budget, Event, Progress, unreported};
 use ground::Ground;
 use placement::{Placed, Placement};
 use singularities::Singularities;
@@ -113,6 +115,19 @@ pub struct Motion {
     placement: Placement,
     /// In stage coordinates.
     ground: Ground,
+    followed: Followed,
+}
+
+/// The path with the branches of its followers, and the singular configurations: found when first needed, for all
+/// clones of the motion.
+#[derive(Debug, Clone, Default)]
+struct Followed(Arc<OnceLock<(Path, Singularities)>>);
+
+impl PartialEq for Followed {
+    /// They follow from the path and the team.
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// The events of a motion, in no order.
@@ -166,7 +181,8 @@ impl Motion {
         }
         let instructions = Instructions::fastest(team.handles());
         let (placement, ground) = (Placement::IDENTITY, Ground::default());
-        Ok(Self { description, path, team, head_speed, method, instructions, placement, ground })
+        let followed = Followed::default();
+        Ok(Self { description, path, team, head_speed, method, instructions, placement, ground, followed })
     }
 
     /// Returns the same motion at another place of the stage.
@@ -200,9 +216,28 @@ impl Motion {
         &self.description
     }
 
-    /// Returns the path, in its own coordinates.
+    /// Returns the path, in its own coordinates, with the branches of this team's followers. An inward spiral has none.
     pub fn path(&self) -> &Path {
+        self.search_branches(&mut unreported);
+        self.searched_path()
+    }
+
+    /// Searches for the branches of this team's followers, if they are not known yet. [`Motion::path`] does the same, but
+    /// cannot be stopped.
+    pub fn search_branches(&self, progress: Progress<'_>) {
+        if self.path.as_spiral().is_none() && self.followed.0.get().is_none() {
+            self.singularities(progress);
+        }
+    }
+
+    /// Returns the same path without branches, and without a search for them.
+    pub fn bare_path(&self) -> &Path {
         &self.path
+    }
+
+    /// Returns the same path, without branches before the search of [`Motion::singularities`] or if it was stopped.
+    fn searched_path(&self) -> &Path {
+        self.followed.0.get().map_or(&self.path, |followed| &followed.0)
     }
 
     /// Returns the benches.
@@ -226,8 +261,8 @@ impl Motion {
     /// [`MotionError::PaperElsewhere`]
     pub fn with_method(&self, method: Method) -> Result<Self, MotionError> {
         let other = Self::new(self.description.clone(), self.team, self.head_speed, method)?;
-        let Self { instructions, placement, ref ground, .. } = *self;
-        Ok(Self { instructions, placement, ground: ground.clone(), ..other })
+        let Self { instructions, placement, ref ground, ref followed, .. } = *self;
+        Ok(Self { instructions, placement, ground: ground.clone(), followed: followed.clone(), ..other })
     }
 
     /// Returns the instructions that read a table: the fastest of this processor, unless others were requested.
@@ -280,13 +315,13 @@ impl Motion {
 
     fn solver_in_own_frame(&self, velocities: Velocities) -> Choice {
         let newton = |reason: String| {
-            let newton = Newton::new(self.path.clone(), self.team, self.head_speed, velocities);
+            let newton = Newton::new(self.path().clone(), self.team, self.head_speed, velocities);
             Choice { solver: Box::new(newton), reason, accuracy: 0.0 }
         };
         match (self.method, self.path.as_spiral()) {
             (Method::Accuracy(accuracy), _) => {
                 let (team, head_speed, with) = (self.team, self.head_speed, self.instructions);
-                match selection::cheapest_with(&self.path, team, head_speed, velocities, accuracy, with) {
+                match selection::cheapest_with(self.path(), team, head_speed, velocities, accuracy, with) {
                     Some(selection) => {
                         let why = measured(&selection, accuracy);
                         self.chosen_table(selection.table, &why)
@@ -295,7 +330,7 @@ impl Motion {
                 }
             }
             (Method::FollowerTable, _) => {
-                let table = FollowerTable::new(&self.path, self.team, self.head_speed, velocities);
+                let table = FollowerTable::new(self.path(), self.team, self.head_speed, velocities);
                 match table.and_then(|table| table.with_instructions(self.instructions)) {
                     Some(table) => self.chosen_table(table, "named by the scene"),
                     None => newton(format!("newton: the scene names follower_table, but {NO_TABLE}")),
@@ -427,12 +462,21 @@ impl Motion {
 
     /// Searches for stall, lock and the turns of the handles.
     pub fn singularities(&self, progress: Progress<'_>) -> Singularities {
-        Singularities::search(&self.path, &self.team, &mut Budget::new(SINGULARITIES_BUDGET, progress))
+        if let Some(known) = self.followed.0.get() {
+            return known.1.clone();
+        }
+        let mut budget = Budget::new(SINGULARITIES_BUDGET, progress);
+        let found = Singularities::search(&self.path, &self.team, &mut budget);
+        if !budget.is_stopped() {
+            let path = self.path.clone().with_branches(found.branches.clone());
+            self.followed.0.get_or_init(|| (path, found.clone()));
+        }
+        found
     }
 
     /// Returns the search for contacts and clearances, from the result of [`Motion::singularities`].
     pub fn advancement<'a>(&'a self, found: &'a Singularities) -> ConservativeAdvancement<'a> {
-        ConservativeAdvancement::new(&self.path, &self.team, &found.head_turns, &found.body_turns)
+        ConservativeAdvancement::new(self.searched_path(), &self.team, &found.head_turns, &found.body_turns)
             .with_tail_turns(&found.tail_turns)
     }
 
@@ -443,8 +487,8 @@ impl Motion {
         found.end.unwrap_or(Event { kind: path_end, travelled, bench_a: None, bench_b: None, place: None })
     }
 
-    /// Returns the time of an event. The time of a lock, multiplied by the speed, is never past the lock: there handles
-    /// would have jumped.
+    /// Returns the time of an event. The time of a lock, multiplied by the speed, is never past the lock: there a handle
+    /// has no place.
     pub fn time_of(&self, event: &Event) -> f64 {
         let time = self.time_at(event.travelled);
         let is_past = event.kind == EventKind::Lock && self.travelled_at(time) > event.travelled;

@@ -7,11 +7,36 @@ use crate::model::curve::{Curve, Follower};
 pub use crate::model::curve::{LinkPose, NoFollower};
 use crate::model::path::{Param, Path};
 
-/// Returns the first place behind `front` whose straight-line distance from it is `link` metres.
+/// Returns the place of the rear handle. It is the first place behind `front` whose straight-line distance from it is
+/// `link` metres. Where nearer places have come to that distance since the motion began ([`Path::branch`]), it is the
+/// place that continues it.
 ///
 /// # Errors
 /// [`NoFollower`] if there is none: on an inward spiral, before the distance begins to shrink again.
 pub fn follower(path: &Path, front: Param, link: f64) -> Result<Param, NoFollower> {
+    match path.branch(front, link) {
+        None => first_follower(path, front, link),
+        Some(behind) => march(path, behind, path.point(front), link),
+    }
+}
+
+/// Returns the first place back from `behind` that is `link` metres from `front`.
+///
+/// # Errors
+/// [`NoFollower`] if `behind` is not nearer than that.
+pub(crate) fn follower_behind(path: &Path, behind: Param, front: Param, link: f64) -> Result<Param, NoFollower> {
+    let point = path.point(front);
+    if (path.point(behind) - point).norm_squared() >= link * link {
+        return Err(NoFollower);
+    }
+    march(path, behind, point, link)
+}
+
+/// Returns the first place behind `front` at the distance `link`, whatever the motion before.
+///
+/// # Errors
+/// As [`follower`].
+pub(crate) fn first_follower(path: &Path, front: Param, link: f64) -> Result<Param, NoFollower> {
     let segment = path.segment(front);
     match segment.follower(front.at, remaining_behind(path, front), link)? {
         Follower::Behind(by) => Ok(Param { segment: front.segment, at: segment.back(front.at, by) }),

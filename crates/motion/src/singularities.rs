@@ -4,9 +4,10 @@
 //! steps at the turning points found here.
 //!
 //! **Two links are enough.** Let F be the follower map of a body link, from its front handle's travel to its rear
-//! handle's. Handle k + 1 is behind handle k, so no handle after the first is ever further along the path than handle 1
-//! has been. On the first segment, outside the fold, F is continuous arbitrarily far back. So while F is continuous up
-//! to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
+//! handle's: the continuous map that begins on the first segment, where it leads to the first place behind at the link's
+//! distance. All body links begin there, so all have the same F. Handle k + 1 is behind handle k, so no handle after the
+//! first is ever further along the path than handle 1 has been. On the first segment, outside the fold, F is continuous
+//! arbitrarily far back. So while F exists up to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
 //! is first reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on
 //! the first segment, which is a straight line without singularities, or an inward spiral with singularities near its
 //! centre only (`inward`). Therefore only a start near the centre makes `SingularitySearch::body_stall` consider more
@@ -25,7 +26,7 @@ mod tail;
 mod trace;
 
 use crate::model::Point;
-use crate::model::path::{Param, Path};
+use crate::model::path::{Branch, Param, Path};
 use crate::model::root::bisect_predicate;
 use crate::model::team::Team;
 
@@ -34,14 +35,6 @@ use bench_dragon_messages::state::EventKind;
 use super::event::{Budget, Event};
 use certificate::{Configuration, Link};
 use trace::{LinkTrace, TraceEnd};
-
-/// The margins before a lock, in units in the last place. Rounding can make a handle jump within the last
-/// `JUMP_DIGITS`; `SAFE_DIGITS` more are a margin. Before `UNTOUCHED_DIGITS` no handle jumps.
-const JUMP_DIGITS: u32 = 256;
-const SAFE_DIGITS: u32 = 32;
-const UNTOUCHED_DIGITS: u32 = 1024;
-/// The least displacement of a handle that jumps, in links: towards any other lock it moves less over those digits.
-const JUMP: f64 = 0.05;
 
 /// The singular configurations of a motion, up to the one that ends it.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +51,8 @@ pub struct Singularities {
     pub body_turns: Vec<f64>,
     /// The same of the tail's link, if it has a length of its own.
     pub tail_turns: Vec<f64>,
+    /// The stretches in which followers are not the first places at their distances, for [`Path::with_branches`].
+    pub branches: Vec<Branch>,
 }
 
 impl Singularities {
@@ -75,17 +70,23 @@ impl Singularities {
             Ok((head, body, tail))
         });
         let Ok((head, body, tail)) = traces else {
-            let (stall, end, [head_turns, body_turns, tail_turns]) = (None, None, [const { Vec::new() }; 3]);
-            return Self { stall, end, searched_until: 0.0, head_turns, body_turns, tail_turns };
+            return Self::none(0.0);
         };
-        let mut search = SingularitySearch { path, team, head, body, tail };
+        let mut search = SingularitySearch { path: path.clone(), team, head, body, tail };
         search.run(budget);
         search.conclude(budget)
+    }
+
+    /// Returns the result of a search up to a place without a singular configuration before.
+    pub fn none(searched_until: f64) -> Self {
+        let (branches, [head_turns, body_turns, tail_turns]) = (Vec::new(), [const { Vec::new() }; 3]);
+        Self { stall: None, end: None, searched_until, head_turns, body_turns, tail_turns, branches }
     }
 }
 
 struct SingularitySearch<'a> {
-    path: &'a Path,
+    /// In the end with the branches of both links.
+    path: Path,
     team: &'a Team,
     /// In metres of travel of the head.
     head: LinkTrace<'a>,
@@ -122,22 +123,23 @@ impl SingularitySearch<'_> {
         self.body.as_ref().is_some_and(|body| body.at().front < self.head.furthest_rear())
     }
 
-    fn conclude(self, budget: &mut Budget) -> Singularities {
+    fn conclude(mut self, budget: &mut Budget) -> Singularities {
+        let link = |bench: usize| self.team.link(bench);
+        let of_body = self.body.as_ref().filter(|_| link(0) != link(1));
+        // Links of one length have the same branches, and the head comes furthest.
+        let of_tail = self.tail.as_ref().filter(|_| link(0) != link(self.team.benches - 1));
+        let traces = [Some(&self.head), of_body, of_tail];
+        let branches: Vec<_> = traces.into_iter().flatten().flat_map(LinkTrace::branches).collect();
+        self.path = self.path.with_branches(branches.clone());
         let limit = self.head.at().front.max(0.0);
         let body_limit = self.body.as_ref().filter(|_| self.body_lags()).and_then(|body| {
             let reached = self.handle_1_reaches(body.at().front, limit)?;
             Some((body.end(), reached.next_down().max(0.0)))
         });
         let (mut end, mut searched_until) = match (body_limit, self.head.end()) {
-            (Some((Some(TraceEnd::Lock), at)), _) => {
-                let at = self.before_jump(at, 1);
-                (Some(self.event(EventKind::Lock, at, 1)), at)
-            }
+            (Some((Some(TraceEnd::Lock), at)), _) => (Some(self.event(EventKind::Lock, at, 1)), at),
             (Some((_, at)), _) => (None, at),
-            (None, Some(TraceEnd::Lock)) => {
-                let at = self.before_jump(limit, 0);
-                (Some(self.event(EventKind::Lock, at, 0)), at)
-            }
+            (None, Some(TraceEnd::Lock)) => (Some(self.event(EventKind::Lock, limit, 0)), limit),
             (None, Some(TraceEnd::PathEnd)) => {
                 let kind = EventKind::PathEnd;
                 (Some(Event { kind, travelled: limit, bench_a: None, bench_b: None, place: None }), limit)
@@ -147,7 +149,6 @@ impl SingularitySearch<'_> {
         let tail = self.of_tail(searched_until, budget);
         if let Some(at) = tail.until.filter(|at| *at < searched_until) {
             let link = self.team.benches - 1;
-            let at = if tail.locks { self.before_jump(at, link) } else { at };
             end = tail.locks.then(|| self.event(EventKind::Lock, at, link));
             searched_until = at;
         }
@@ -158,12 +159,12 @@ impl SingularitySearch<'_> {
         let body_turns = self.body.as_ref().map_or(&[][..], LinkTrace::turns);
         let body_turns = body_turns.iter().copied().filter(|at| *at <= furthest).collect();
         let tail_turns = self.tail.as_ref().map_or_else(Vec::new, |tail| tail.turns().to_vec());
-        Singularities { stall, end, searched_until, head_turns, body_turns, tail_turns }
+        Singularities { stall, end, searched_until, head_turns, body_turns, tail_turns, branches }
     }
 
     /// Returns the metres of travel of handle 1.
     fn handle_1(&self, head: f64) -> Option<f64> {
-        self.head.link().configuration(head).ok().map(|configuration| configuration.rear)
+        self.head.configuration(head).ok().map(|configuration| configuration.rear)
     }
 
     /// Returns the head's first travel up to `limit` at which handle 1 reaches `place`.
@@ -185,7 +186,7 @@ impl SingularitySearch<'_> {
 
     /// Returns the first stall up to `limit` metres of travel of the head. `tail` is the first of the tail's link.
     fn stall(&self, limit: f64, tail: Option<f64>) -> Option<Event> {
-        let start = self.head.link().configuration(0.0).ok()?;
+        let start = self.head.configuration(0.0).ok()?;
         if start.is_stalled() {
             return Some(self.event(EventKind::Stall, 0.0, 0));
         }
@@ -208,7 +209,7 @@ impl SingularitySearch<'_> {
         let mut first: Option<(f64, usize)> = None;
         let mut front = head.rear;
         for link in 1..self.team.benches - usize::from(self.tail.is_some()) {
-            let configuration = body.link().configuration(front).ok()?;
+            let configuration = body.configuration(front).ok()?;
             if configuration.is_stalled() {
                 return Some((0.0, link));
             }
@@ -237,22 +238,6 @@ impl SingularitySearch<'_> {
         Event { kind, travelled, bench_a: Some(link as u32), bench_b: None, place }
     }
 
-    /// Returns the place of a lock, or a place some digits before it. At a lock where a nearer place of the path comes
-    /// within the link's reach the rear handle jumps there. Frames round differently from this search and may jump some
-    /// digits earlier.
-    fn before_jump(&self, travelled: f64, link: usize) -> f64 {
-        let length = self.team.link(link);
-        let place = |digits: u32| travelled - f64::from(digits) * f64::EPSILON * (travelled + length);
-        let rear = |digits: u32| self.rear(place(digits), link).map(|rear| self.path.travelled(rear));
-        // With digits that large, frames show only jumps.
-        let is_fine = travelled - place(UNTOUCHED_DIGITS) < 1e-6 * length && place(UNTOUCHED_DIGITS) >= 0.0;
-        let Some(before) = rear(UNTOUCHED_DIGITS).filter(|_| is_fine) else { return travelled };
-        let has_jumped = |digits: &u32| rear(*digits).is_some_and(|rear| rear > before + JUMP * length);
-        // All digits are tested, because rounding is not monotone.
-        let first = (0..JUMP_DIGITS).rev().find(has_jumped);
-        first.map_or(travelled, |digits| place(digits + SAFE_DIGITS))
-    }
-
     /// Returns the rear handle of a link; if rounding leaves none in the last digits, the handle at the last place
     /// before.
     fn rear_point(&self, travelled: f64, link: usize) -> Option<Point> {
@@ -265,7 +250,7 @@ impl SingularitySearch<'_> {
     /// Returns the rear handle of a link as in a frame.
     fn rear(&self, travelled: f64, link: usize) -> Option<Param> {
         let head = self.path.param_at(travelled);
-        let follower = |front, link| crate::linkage::follower(self.path, front, self.team.link(link));
+        let follower = |front, link| crate::linkage::follower(&self.path, front, self.team.link(link));
         (0..=link).try_fold(head, follower).ok()
     }
 }

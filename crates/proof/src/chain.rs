@@ -32,7 +32,10 @@ impl Chain {
             let (capsule, ends) = (Capsule::new(path, *span), [span.0, span.1].map(|place| path.at(place).point));
             if let (Some(front), Some(front_ends)) = (capsules.last(), front_ends) {
                 let index = handle - 1;
-                let product = link::check(path, (front, front_ends), (&capsule, ends), team.link(index))
+                let (one, several) =
+                    ([(front.span, None)], scene.branches.rules(path, team.link_kind(index), front.span));
+                let rules = several.as_deref().unwrap_or(&one);
+                let product = link::check(path, (front, front_ends), (&capsule, ends), team.link(index), rules)
                     .map_err(|problem| format!("link {index}: {problem} (Lemma 1)"))?;
                 products.push(product);
             }

@@ -51,13 +51,12 @@ pub(super) enum Finish {
     PathEnd,
 }
 
-/// The evidence of a lock.
+/// The evidence of a lock: a span around the follower, which cannot be at the ends of the span.
 pub(super) enum LockShown {
-    /// In the end no place of this span around the follower is at the link's length.
-    Vanishes(Span),
-    /// In the end a place ahead of this span's end is at the link's length, and no follower could pass the span's
-    /// beginning.
-    Jumps(Span),
+    /// In the end all places of the span are nearer than the link.
+    Nearer(Span),
+    /// In the end all places of the span are further away than the link.
+    Further(Span),
 }
 
 /// Checks that an event with the head at `to` is inside the motion, from its start to the path's end.
@@ -291,34 +290,23 @@ impl Events {
         let (front, front_at_end) = (&while_going.capsules[link], &at_end.capsules[link]);
         let squared = scene.team.link(link).square();
         let is_before = |a: Place, b: Place| a != b && path.in_order(a, b);
-        let cannot_be_at = |place: Place| link::is_nearer_at(path, front, place, &squared);
-        match shown {
-            LockShown::Vanishes(window) => {
-                span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
-                let Span(w1, w2) = window;
-                if !(is_before(w1, rear.0) && is_before(rear.1, w2) && path.in_order(w2, front.span.0)) {
-                    return Err("the window is not around the rear's span and behind the front's".to_owned());
-                }
-                if !(cannot_be_at(w1) && cannot_be_at(w2)) {
-                    return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
-                }
-                if !link::is_all_nearer(path, front_at_end, window, &squared) {
-                    return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
-                }
-            }
-            LockShown::Jumps(jump) => {
-                span_is_one(scene, jump).map_err(|problem| format!("the jump: {problem}"))?;
-                let Span(w, y) = jump;
-                if !(is_before(rear.1, w) && path.in_order(y, front_at_end.span.0)) {
-                    return Err("the jump is not between the rear's span and the front's".to_owned());
-                }
-                if !cannot_be_at(w) {
-                    return Err("the beginning of the jump may be at the link's length (Lemma 5)".to_owned());
-                }
-                if !link::is_farther(path, front_at_end, y, &squared) {
-                    return Err("the end of the jump may be too near in the end (Lemma 5)".to_owned());
-                }
-            }
+        let (LockShown::Nearer(window) | LockShown::Further(window)) = shown;
+        span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
+        let Span(w1, w2) = window;
+        if !(is_before(w1, rear.0) && is_before(rear.1, w2) && path.in_order(w2, front.span.0)) {
+            return Err("the window is not around the rear's span and behind the front's".to_owned());
+        }
+        let is_nearer = matches!(shown, LockShown::Nearer(_));
+        let cannot_be_at = |place: Place| {
+            let test = if is_nearer { link::is_nearer_at } else { link::is_farther };
+            test(path, front, place, &squared)
+        };
+        if !(cannot_be_at(w1) && cannot_be_at(w2)) {
+            return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
+        }
+        let test = if is_nearer { link::is_all_nearer } else { link::is_all_further };
+        if !test(path, front_at_end, window, &squared) {
+            return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
         }
         self.finish = Some(Finish::Lock(link, to));
         Ok(())

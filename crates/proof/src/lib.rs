@@ -6,6 +6,7 @@
 
 mod apart;
 mod boards;
+mod branch;
 mod capsule;
 mod chain;
 mod curve;
@@ -394,6 +395,13 @@ impl Checker {
             return Ok(());
         }
         let section = self.alone.as_ref().map(Vec::len);
+        if let (ParsedLine::Branch { link, from, to, behind }, true) = (&line, self.about != About::LeastPitch) {
+            if self.steps.end.is_some() || self.greatest.steps > 0 {
+                return Err("a branch has to precede all steps".to_owned());
+            }
+            let Scene { path, team, branches, .. } = &mut self.scenes[section.unwrap_or(0)];
+            return branches.add((path, team), *link, Span(*from, *to), *behind);
+        }
         let so_far = self.results() - self.before;
         let Self { about, scenes, steps, events, greatest, pitch, proved, .. } = self;
         let scene = &scenes[section.unwrap_or(0)];
@@ -423,11 +431,12 @@ impl Checker {
                 events.add_reached(scene, steps, (obstacle, bench), Span(from, to), &spans, point)
             }
             ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
-            ParsedLine::Lock { link, to, spans, last, window, jump } => {
-                let shown = match (window, jump) {
-                    (Some(window), None) => LockShown::Vanishes(window),
-                    (None, Some(jump)) => LockShown::Jumps(jump),
-                    _ => return Err("expected one of `window` and `jump`".to_owned()),
+            ParsedLine::Branch { .. } => Err("a branch in a certificate of another question".to_owned()),
+            ParsedLine::Lock { link, to, spans, last, window, beyond } => {
+                let shown = match (window, beyond) {
+                    (Some(window), None) => LockShown::Nearer(window),
+                    (None, Some(beyond)) => LockShown::Further(beyond),
+                    _ => return Err("expected one of `window` and `beyond`".to_owned()),
                 };
                 events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
             }

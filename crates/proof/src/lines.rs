@@ -31,6 +31,12 @@ pub(super) enum ParsedLine {
         #[serde(default)]
         at: Vec<Place>,
     },
+    Branch {
+        link: usize,
+        from: Place,
+        to: Place,
+        behind: Place,
+    },
     Near {
         benches: [usize; 2],
         from: Place,
@@ -77,7 +83,7 @@ pub(super) enum ParsedLine {
         #[serde(default)]
         window: Option<Span>,
         #[serde(default)]
-        jump: Option<Span>,
+        beyond: Option<Span>,
     },
     PathEnd {},
     Dragon {
@@ -180,7 +186,7 @@ pub enum EventKind {
     Contact,
     /// The front product of a link comes to 0.
     Stall,
-    /// A link's follower ceases to be continuous.
+    /// A link's follower ceases to exist.
     Lock,
     /// The path ends.
     PathEnd,

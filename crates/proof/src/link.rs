@@ -13,7 +13,8 @@ const MOST_STRETCHES: usize = 100_000;
 const MOST_FRONT_STRETCHES: usize = 2_000;
 
 /// Checks Lemma 1: for each place of `front`, the follower lies in `rear` and is continuous. Each capsule comes with
-/// the points at both ends of its span. Returns the front product.
+/// the points at both ends of its span. In each stretch of `rules`, which cover the front's span, the follower is the
+/// first place at the distance back from a place, or from the front. Returns the front product.
 ///
 /// # Errors
 /// The condition that is not proved.
@@ -22,6 +23,7 @@ pub(super) fn check(
     (front, [u1, u2]): (&Capsule, [Vector; 2]),
     (rear, [x1, x2]): (&Capsule, [Vector; 2]),
     link: &Interval,
+    rules: &[(Span, Option<Place>)],
 ) -> Result<Interval, String> {
     if !path.in_order(rear.span.1, front.span.0) {
         return Err("the rear's span is not behind the front's".to_owned());
@@ -47,10 +49,23 @@ pub(super) fn check(
     if !shortest.is_below(&squared) {
         return Err("the latest place of the rear may be too far".to_owned());
     }
-    if is_nearer(path, front, Span(rear.span.1, front.span.1), &squared) {
-        Ok(product)
-    } else {
-        Err("a place between the handles may be at the link's length".to_owned())
+    for (stretch, behind) in rules {
+        let part = (*stretch != front.span).then(|| Capsule::new(path, *stretch));
+        if !is_first(path, part.as_ref().unwrap_or(front), rear.span, *behind, &squared) {
+            return Err("a place between the handles may be at the link's length".to_owned());
+        }
+    }
+    Ok(product)
+}
+
+/// Returns true if the place at the distance in `rear` is the first one back from `behind`, or from the front.
+fn is_first(path: &Path, front: &Capsule, rear: Span, behind: Option<Place>, squared: &Interval) -> bool {
+    match behind {
+        None => is_nearer(path, front, Span(rear.1, front.span.1), squared),
+        Some(behind) if path.in_order(behind, rear.1) => {
+            path.in_order(rear.0, behind) && is_nearer_at(path, front, behind, squared)
+        }
+        Some(behind) => path.in_order(behind, front.span.0) && is_nearer(path, front, Span(rear.1, behind), squared),
     }
 }
 
@@ -112,10 +127,24 @@ fn slack(capsule: &Capsule, slope: &Interval, distance: &Interval) -> Interval {
 /// Returns true if D(u, x) < l^2 for all u of the front and all x of a stretch. Taylor's formula about the middles of
 /// both shows it.
 fn is_stretch_nearer(pair: &Pair, squared: &Interval) -> bool {
+    (over_front(pair.front, &pair.rear.point) + along_rear(pair)).is_below(squared)
+}
+
+/// Returns a bound of |D(u, x) - D(u, m_x)| for all u of the front and all x of the rear.
+fn along_rear(pair: &Pair) -> Interval {
     let Pair { front, rear, distance, .. } = pair;
     // An upper bound of |g(u, m_x)| for all u of the front.
     let slope = rear.tangent.dot(&front.point.minus(&rear.point)).abs() + front.half * pair.along + front.sag;
-    (over_front(front, &rear.point) + slack(rear, &slope, distance)).is_below(squared)
+    slack(rear, &slope, distance)
+}
+
+/// Returns true if D > l^2 for all places of the front and of the span.
+pub(super) fn is_all_further(path: &Path, front: &Capsule, span: Span, squared: &Interval) -> bool {
+    all_stretches(path, span, |stretch| {
+        let capsule = Capsule::new(path, stretch);
+        let pair = Pair::new(front, &capsule);
+        squared.is_below(&(over_front(front, &capsule.point) - along_rear(&pair)))
+    })
 }
 
 /// Returns true if D < l^2 for all places of the front and of the span.

@@ -4,6 +4,7 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use super::branch::Branches;
 use super::curve::Curve;
 use super::elementary;
 use super::ground::{Obstacle, StageText};
@@ -30,6 +31,8 @@ pub(super) struct Scene {
     pub head_speed: Interval,
     /// The obstacles in the path's own coordinates, the boundary last.
     pub obstacles: Vec<Obstacle>,
+    /// The branches that the certificate states.
+    pub branches: Branches,
 }
 
 /// The fields of a scene that a proof needs. The other fields concern the publisher.
@@ -140,7 +143,8 @@ impl Scene {
         let frame = Mapping::new(&text.placement, start)?;
         let obstacles = stage.map_or_else(|| Ok(Vec::new()), |stage| stage.read(&frame))?;
         let (name, delay) = (text.name, Interval::new(text.delay));
-        Ok(Self { name, delay, frame, team, path, head_speed, obstacles })
+        let branches = Branches::default();
+        Ok(Self { name, delay, frame, team, path, head_speed, obstacles, branches })
     }
 
     /// Returns the seconds of the show at which the head has travelled some metres. Up to the path's start they are 0.
@@ -201,6 +205,7 @@ impl Scene {
             path,
             head_speed: self.head_speed,
             obstacles: Vec::new(),
+            branches: Branches::default(),
         }
     }
 }

@@ -47,6 +47,12 @@ impl Team {
         if bench > 0 && bench + 1 == self.benches { 2 } else { bench.min(1) }
     }
 
+    /// Returns the kind of a bench's link: 0 for the head's, 2 for that of a tail with a size of its own, 1 for all
+    /// others.
+    pub fn link_kind(&self, bench: usize) -> usize {
+        if self.own_tail() == Some(bench) { 2 } else { bench.min(1) }
+    }
+
     /// Returns the size of the board of a bench.
     pub fn size(&self, bench: usize) -> Size {
         Size { link: *self.link(bench), hole_inset: self.hole_inset, width: self.widths[self.kind(bench)] }

@@ -121,7 +121,7 @@ pub fn event_sentence(scene: &Scene, timed: &TimedEvent) -> String {
             format!("{first} {how} {obstacle}{}{place}", if time == 0.0 { " from the start," } else { "" })
         }
         EventKind::Stall => format!("{first} stalls: from the handle{place} on, the team is pushed backwards"),
-        EventKind::Lock => format!("{first} locks, its rear handle{place}: the motion cannot continue"),
+        EventKind::Lock => format!("{first} locks: its rear handle{place} would need unbounded speed"),
         EventKind::PathEnd => {
             let dragon = event.bench_a.and_then(|head| scene.ensemble.owner(head as usize));
             let head = dragon.map(|(dragon, _)| scene.ensemble.dragons()[dragon].titled("the head"));

@@ -25,7 +25,7 @@ STATES = (
     "contact",
     # A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     "stall",
-    # A link is in a singular configuration: the motion cannot continue.
+    # A link is in a singular configuration, square to the path at its rear handle, which would need unbounded speed.
     "lock",
     # The head has reached the end of the path.
     "path_end",
@@ -43,7 +43,7 @@ LEVELS = (
     "contact",
     # A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     "stall",
-    # A link is in a singular configuration: the motion cannot continue.
+    # A link is in a singular configuration, square to the path at its rear handle, which would need unbounded speed.
     "lock",
     # No value has this number.
     None,
@@ -59,7 +59,7 @@ EVENTS = {
     2: "contact",
     # A link is at its dead point, square to the path at its front handle: the rest of the chain is pushed backwards.
     3: "stall",
-    # A link is in a singular configuration: its rear handle would have to jump, and the motion cannot continue.
+    # A link is in a singular configuration, square to the path at its rear handle, which would need unbounded speed.
     4: "lock",
     # The head reaches the end of the path.
     5: "path_end",

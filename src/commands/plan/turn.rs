@@ -113,15 +113,16 @@ fn sentences(scene: &Scene, (pitch, clearance): (f64, f64), is_best: bool, found
     let too_near = are_too_near(clearance);
     sentences.push(match (value_hi, leads) {
         (Some(value_hi), Some([lead_in, lead_out])) => format!(
-            "{} with every radius from {from} m to {value_lo} m a link stalls or locks, or two boards {too_near}; with \
-             {value_hi} m nothing of this happens, from any distance ({lead_in:.3} m before the S in steps, further out by \
-             Lemma 8) until the head is {lead_out:.3} m past the S and the last bench has turned. Larger radii are not \
-             covered.",
+            "{} with every radius from {from} m to {value_lo} m a link stalls or locks, a nearer place of the path comes \
+             to its length, or two boards {too_near}; with {value_hi} m nothing of this happens, from any distance \
+             ({lead_in:.3} m before the S in steps, further out by Lemma 8) until the head is {lead_out:.3} m past the \
+             S and the last bench has turned. Larger radii are not covered.",
             if proved { "Proved:" } else { "Not decided to 1e-8 m. What is proved:" }
         ),
         _ if intervals > 0 => format!(
             "Not decided: the search {} after {intervals} intervals of radii. What is proved: with every radius from \
-             {from} m to {value_lo} m a link stalls or locks, or two boards {too_near}.",
+             {from} m to {value_lo} m a link stalls or locks, a nearer place of the path comes to its length, or two boards \
+             {too_near}.",
             given_up()
         ),
         _ => format!("Not decided: the search {}, and nothing is proved.", given_up()),

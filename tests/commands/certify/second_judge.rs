@@ -11,6 +11,7 @@ use std::sync::Mutex;
 use fastrand::Rng;
 use serde_json::{Value, json};
 
+use super::scene_text;
 use crate::harness::{Process, all, aloud, can_run, cases, json_lines, python, python_modules, text};
 
 /// Random times and steps of each certificate.
@@ -296,10 +297,11 @@ fn a_second_judge_agrees_and_refuses_what_was_changed() {
     // `long` is proved for minutes, and `ros2` is the paper's scene.
     let config: &[&str] =
         if all() { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] } else { &["school"] };
-    let all = cases(8, 50, 500);
+    let all = cases(10, 50, 500);
     let read = |name: &&str| (name.to_string(), std::fs::read_to_string(format!("config/{name}.toml")).unwrap());
     let mut scenes: Vec<_> = config.iter().map(read).collect();
     scenes.push(("turn".to_owned(), TURN.to_owned()));
+    scenes.extend(["tail_locks", "lk_25"].map(|name| (name.to_owned(), scene_text(name))));
     let random = (0..).map(|number| (format!("random{number}"), scene(number)));
     let left = Mutex::new(scenes.into_iter().chain(random).enumerate());
     let found = Mutex::new(Vec::new());

@@ -137,7 +137,7 @@ impl<'a> Chain<'a> {
     /// Returns the stretch that the handle behind covers.
     fn image(&self, bench: usize, span: Span) -> Span {
         let link = self.link(bench);
-        let ends = [span.low, span.high].into_iter().map(|place| self.path.follower(place, link.length));
+        let ends = [span.low, span.high].into_iter().map(|place| link.configuration(place).rear);
         Span::around(ends.chain(link.stalls_between(span.low.s, span.high.s).map(|configuration| configuration.rear)))
     }
 

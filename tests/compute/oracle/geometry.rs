@@ -341,10 +341,9 @@ impl Path {
         (at(ahead) - at(behind)).abs()
     }
 
-    /// Returns the first place backward from `from` that is not nearer to it than `reach`: the follower, for a link's
-    /// length.
-    pub fn follower(&self, from: Param, reach: f64) -> Param {
-        let centre = self.point(from);
+    /// Returns the first place backward from `from` that is not nearer to `front` than `reach`.
+    pub fn first_back(&self, from: Param, front: Param, reach: f64) -> Param {
+        let centre = self.point(front);
         let (mut index, mut q) = (from.piece, from.q);
         loop {
             let piece = &self.pieces[index];

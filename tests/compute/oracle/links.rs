@@ -1,7 +1,9 @@
-//! The stalls and jumps of one link anywhere on a path, by the place of its front handle.
+//! The stalls and locks of one link anywhere on a path, by the place of its front handle.
 //!
 //! Both depend on the place of the front handle alone, so a path is searched once for each length of link. The search
-//! halves a stretch until it is certain to hold neither.
+//! halves a stretch until it is certain to hold neither. Where the first place at the link's distance jumps forward, a
+//! nearer place has come to the distance: from there on the follower is the first place back from another one, the
+//! place of least distance between the follower and the nearer places.
 
 use super::geometry::{Param, Path};
 
@@ -31,9 +33,11 @@ pub struct Link<'a> {
     pub length: f64,
     /// Places of the front handle at which the front cosine changes its sign, and the followers there: they turn round.
     pub stalls: Vec<Configuration>,
-    /// Metres of travel of the front handle at which the follower jumps, and true if the jump is too small to be sure.
-    /// No handle goes past the first sure jump, so nothing is searched there.
+    /// Metres of travel of the front handle at which the follower vanishes or jumps, and true if the jump is too small
+    /// to be sure. No handle goes past the first sure one, so nothing is searched there.
     pub jumps: Vec<(f64, bool)>,
+    /// From a front handle's travel on, the follower is the first place back from the given one, or from the front.
+    rules: Vec<(f64, Option<Param>)>,
     /// True if the search was complete.
     pub complete: bool,
     locked: bool,
@@ -43,7 +47,8 @@ pub struct Link<'a> {
 impl<'a> Link<'a> {
     pub fn new(path: &'a Path, length: f64) -> Self {
         let (stalls, jumps) = (Vec::new(), Vec::new());
-        let mut link = Self { path, length, stalls, jumps, complete: true, locked: false, configurations: 0 };
+        let rules = Vec::new();
+        let mut link = Self { path, length, stalls, jumps, rules, complete: true, locked: false, configurations: 0 };
         // On the first curve, a line or a spiral that grows ever straighter, the stretch without events has no end.
         let mut from = -length;
         while !link.is_regular(path.place_at(from), path.place_at(from)) {
@@ -53,7 +58,8 @@ impl<'a> Link<'a> {
         let at = |cell: usize| path.place_at(from + (path.end - from) * cell as f64 / cells as f64);
         for cell in 0..cells {
             let (one, other) = (at(cell), at(cell + 1));
-            if !link.is_regular(one, other) {
+            link.drop_rule(one);
+            if link.rule(one).is_some() || !link.is_regular(one, other) {
                 let (one, other) = (link.configuration(one), link.configuration(other));
                 link.search(one, other);
             }
@@ -62,11 +68,64 @@ impl<'a> Link<'a> {
     }
 
     pub fn configuration(&self, front: Param) -> Configuration {
-        let rear = self.path.follower(front, self.length);
+        let rear = self.path.first_back(self.rule(front).unwrap_or(front), front, self.length);
         let ((point, tangent), (rear_point, rear_tangent)) =
             (self.path.point_and_tangent(front), self.path.point_and_tangent(rear));
         let bench = (point - rear_point) / self.length;
         Configuration { front, rear, front_cosine: bench.dot(&tangent), rear_cosine: bench.dot(&rear_tangent) }
+    }
+
+    /// Returns the place from which the follower is the first one back; `None` for the front handle.
+    fn rule(&self, front: Param) -> Option<Param> {
+        let next = self.rules.partition_point(|(begin, _)| *begin <= front.s);
+        self.rules[..next].last().and_then(|(_, from)| *from)
+    }
+
+    /// Ends the rule where the follower is the first place again.
+    fn drop_rule(&mut self, front: Param) {
+        let first = self.path.first_back(front, front, self.length);
+        if self.rule(front).is_some() && (first.s - self.configuration(front).rear.s).abs() < 1e-9 * self.length {
+            self.rules.push((front.s, None));
+        }
+    }
+
+    /// Returns the place of least distance from the front handle that comes next ahead of the rear one.
+    fn valley(&self, front: Param, rear: Param) -> Param {
+        let point = self.path.point(front);
+        let distance = |s: f64| (self.path.point(self.path.place_at(s)) - point).norm();
+        let (mut s, mut step) = (rear.s, 1e-7 * self.length);
+        while s + step < front.s && distance(s + step) < distance(s) {
+            s += step;
+            step = (1.1 * step).min(2e-3 * self.length);
+        }
+        let (mut low, mut high) = ((s - step).max(rear.s), (s + step).min(front.s));
+        for _ in 0..100 {
+            let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if distance(left) < distance(right) { high = right } else { low = left }
+        }
+        self.path.place_at(0.5 * (low + high))
+    }
+
+    /// Begins another rule at a configuration beyond which the follower is not continuous, if there is a better one.
+    fn renews(&mut self, one: &Configuration, other: &Configuration) -> bool {
+        let rule = self.rule(one.front);
+        if rule.is_none() && other.rear.s - one.rear.s <= DOUBTFUL_JUMP * self.length {
+            return false;
+        }
+        let valley = self.valley(one.front, one.rear);
+        let same = rule.is_some_and(|rule| (rule.s - valley.s).abs() < 1e-6 * self.length);
+        let is_near = (self.path.point(valley) - self.path.point(one.front)).norm() < self.length;
+        let renews = is_near && !same && self.rules.last().is_none_or(|(begin, _)| *begin < one.front.s);
+        if renews {
+            self.rules.push((one.front.s, Some(valley)));
+        }
+        renews
+    }
+
+    /// Returns true if no place near the last rule's is at the link's distance any more.
+    fn is_apart(&self, front: Param, rear: Param) -> bool {
+        let valley = self.valley(front, rear);
+        self.rule(front).is_some() && (self.path.point(valley) - self.path.point(front)).norm() >= self.length
     }
 
     /// Returns true for a path that turns by less than `MOST` in the 1.4 links behind every front handle. Its chord is
@@ -88,9 +147,23 @@ impl<'a> Link<'a> {
         }
         let middle = self.path.place_at(0.5 * (one.front.s + other.front.s));
         if other.front.s - one.front.s > 4.0 * f64::EPSILON * (one.front.s.abs() + self.length) {
-            let middle = self.configuration(middle);
-            self.search(one, middle);
-            self.search(middle, other);
+            let (between, rules) = (self.configuration(middle), self.rules.len());
+            self.search(one, between);
+            if self.rules.len() > rules {
+                let (between, other) = (self.configuration(middle), self.configuration(other.front));
+                self.search(between, other);
+            } else {
+                self.search(between, other);
+            }
+            return;
+        }
+        if range.is_none() && self.renews(&one, &other) {
+            let (one, other) = (self.configuration(one.front), self.configuration(other.front));
+            return self.search(one, other);
+        }
+        if range.is_none() && self.is_apart(other.front, one.rear) {
+            self.locked = true;
+            self.jumps.push((middle.s, false));
             return;
         }
         let jump = (other.rear.s - one.rear.s).abs() / self.length;
@@ -119,7 +192,11 @@ impl<'a> Link<'a> {
         if rest <= 0.0 || configuration.rear_cosine <= 0.0 {
             return None;
         }
-        let nearest = self.path.follower(configuration.front, self.length - h);
+        let from = self.rule(configuration.front).unwrap_or(configuration.front);
+        if (self.path.point(from) - self.path.point(configuration.front)).norm() >= self.length - h {
+            return None;
+        }
+        let nearest = self.path.first_back(from, configuration.front, self.length - h);
         let furthest = self.path.place_at(configuration.rear.s - 2.0 * h / configuration.rear_cosine);
         let range = nearest.s - furthest.s;
         let across = (range + h) / rest;

@@ -209,7 +209,6 @@ pub fn random_scene(family: usize, random: &mut Random) -> String {
                     share if share < 0.65 => {
                         arc(random.magnitude(0.3, 4.0), random.between(0.1, 1.1), random.chance(0.5))
                     }
-                    // Half a turn as tight as this always locks.
                     _ => arc(random.magnitude(0.005, 0.3), random.between(0.02, 0.35), random.chance(0.5)),
                 };
             }
@@ -222,7 +221,9 @@ pub fn random_scene(family: usize, random: &mut Random) -> String {
         "U-turn" => {
             let near = 0.5 * if random.chance(0.5) { head } else { body };
             let radius = match random.chance(0.4) {
-                true => near * (1.0 + random.magnitude(1e-9, 1e-3) * if random.chance(0.5) { 1.0 } else { -1.0 }),
+                // In an arc that is hardly narrower than the link the checker's steps are as short as that little.
+                true if random.chance(0.5) => near * (1.0 + random.magnitude(1e-9, 1e-3)),
+                true => near * (1.0 - random.magnitude(1e-4, 1e-2)),
                 false => random.magnitude(0.005, 3.0),
             };
             let team = team_text(random, 20.0, head, body);

@@ -99,7 +99,7 @@ fn rearrange(lines: &mut Vec<Value>, random: &mut Rng) {
                 }
             }
             if let Some(fields) = line.as_object_mut() {
-                let (one, other) = if random.bool() { ("window", "jump") } else { ("jump", "window") };
+                let (one, other) = if random.bool() { ("window", "beyond") } else { ("beyond", "window") };
                 if let Some(evidence) = fields.remove(one) {
                     fields.insert(other.to_owned(), evidence);
                 }
@@ -152,7 +152,7 @@ fn conjured(line: &Value, random: &mut Rng) -> Value {
         1 => json!({"type": "contact", "benches": benches, "from": from, "to": to, "spans": spans, "point": point}),
         2 => json!({"type": "stall", "link": number, "from": from, "to": to, "spans": spans}),
         3 => json!({"type": "lock", "link": 0, "to": to, "spans": [], "last": [], "window": [from, to]}),
-        4 => json!({"type": "lock", "link": 0, "to": to, "spans": [], "last": [], "jump": [from, to]}),
+        4 => json!({"type": "lock", "link": 0, "to": to, "spans": [], "last": [], "beyond": [from, to]}),
         5 => {
             json!({"type": "near", "benches": benches, "from": from, "to": to, "spans": spans, "at": at, "most": length})
         }

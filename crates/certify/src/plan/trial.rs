@@ -211,14 +211,7 @@ impl Trial {
         let team = if team.own_tail().is_some() { *team } else { team.foremost(benches) };
         // A link turns round or locks only where the spiral is narrower than the link is long.
         let singularities = if radius > team.longest_link() {
-            Singularities {
-                stall: None,
-                end: None,
-                searched_until: limit,
-                head_turns: vec![],
-                body_turns: vec![],
-                tail_turns: vec![],
-            }
+            Singularities::none(limit)
         } else {
             Singularities::search(&path, &team, &mut Budget::new(TRIAL_BUDGET, progress))
         };

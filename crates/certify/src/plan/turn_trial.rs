@@ -189,6 +189,7 @@ impl Family<'_> {
             return Vec::new();
         };
         let found = Singularities::search(&path, team, &mut Budget::new(TRIAL_BUDGET, &mut |_| (self.ask)(FOLD_WORK)));
+        let path = path.with_branches(found.branches.clone());
         let lock = found.end.filter(|end| end.kind == EventKind::Lock);
         let witness = |event: Event| {
             let link = event.bench_a? as usize;

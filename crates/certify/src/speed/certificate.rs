@@ -36,6 +36,7 @@ pub fn certify_greatest_ratio(
     let (version, about) = (env!("CARGO_PKG_VERSION"), Some(About::GreatestSpeed));
     write(&CertificateLine::Certificate { format: crate::FORMAT, version, about, scene })?;
     let search = RatioSearch::new(motion, travelled, most_handles);
+    search.speeds.chain.branches.iter().try_for_each(|branch| write(&branch.line()))?;
     let mut steps: Vec<Stretch> = Vec::new();
     let found = search.run(SHARE * tolerance, Some(&mut steps), progress);
     steps.sort_by(|a, b| a.0.total_cmp(&b.0));

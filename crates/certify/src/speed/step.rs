@@ -122,7 +122,7 @@ impl Speeds<'_> {
         PADS.iter().find_map(|pad| {
             let rear =
                 Spanned::new(exact, span(exact, rear, rear, pad * f64::EPSILON * size / rear_cosine.max(1e-12), false));
-            follower_within(exact, &front, &rear, length)?;
+            follower_within(exact, &front, &rear, length, self.chain.branches_of(link))?;
             Some(product_ratio(&front.capsule, &rear.capsule))
         })
     }

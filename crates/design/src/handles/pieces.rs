@@ -47,7 +47,7 @@ impl Begin {
 /// Adds the handles of the pieces of a dragon's route.
 pub(super) fn add(found: &mut Found<'_>, prefix: &str, motion: &Motion) {
     let outlines = motion.outline();
-    let path = motion.path();
+    let path = motion.bare_path();
     let last = motion.placement().point(path.point(path.param_at(path.length())));
     let route = format!("{prefix}path.pieces");
     let mut rest = outlines.as_slice();

@@ -17,14 +17,21 @@ mod ground;
 const PAPER: Team =
     Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 
+/// Returns the path with the branches of the followers, and the singular configurations.
+fn followed(path: &Path, team: &Team) -> (Path, Singularities) {
+    let mut unreported = unreported;
+    let singular = Singularities::search(path, team, &mut Budget::new(20_000_000, &mut unreported));
+    (path.clone().with_branches(singular.branches.clone()), singular)
+}
+
 /// Returns the results of the searches for a whole motion: the contact, the least clearance up to `show_end`, the
 /// motion's end.
 fn search(path: &Path, team: &Team, show_end: Option<f64>) -> (Option<Event>, Option<LeastClearance>, f64) {
     let mut unreported = unreported;
     let mut budget = Budget::new(200_000_000, &mut unreported);
-    let singular = Singularities::search(path, team, &mut budget);
+    let (path, singular) = followed(path, team);
     let end = singular.end.map_or(singular.searched_until, |end| end.travelled);
-    let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns)
+    let searches = ConservativeAdvancement::new(&path, team, &singular.head_turns, &singular.body_turns)
         .with_tail_turns(&singular.tail_turns);
     let contact = searches.first_contact(0.0, end, &mut budget).unwrap();
     let least = searches.least_clearance(0.0, show_end.unwrap_or(end), &mut budget).unwrap();
@@ -57,7 +64,7 @@ fn the_least_clearance_at_a_lock_has_its_digits() {
 /// Checks that equally spaced configurations do not contradict the searches.
 fn check(path: &Path, team: &Team, samples: usize) -> Result<(), TestCaseError> {
     let (contact, least, end) = search(path, team, None);
-    let least = least.unwrap();
+    let (path, least) = (&followed(path, team).0, least.unwrap());
     let close = |one: f64, other: f64| (one - other).abs() <= 1e-11 * (1.0 + team.longest_link());
     if let Some(contact) = contact {
         let there = all_pairs(path, team, contact.travelled);

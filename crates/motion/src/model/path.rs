@@ -86,12 +86,30 @@ impl Placed {
     }
 }
 
+/// A stretch in which the follower of a link is not the first place at the link's distance, because nearer places have
+/// come to that distance since the motion began. There the follower is the first such place back from `behind`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Branch {
+    /// The length of the link, in metres.
+    pub link: f64,
+    /// The travel of the front handle at which the stretch begins, in metres.
+    pub begin: f64,
+    /// The travel of the front handle at which it ends; infinite where the link locks.
+    pub end: f64,
+    /// A place between the follower and all nearer places at the link's distance, with the front handle at `begin`.
+    pub behind: Param,
+    /// The metres by which that place goes on per metre of the front handle: 0, or 1 or -1 on parallel lines.
+    pub drift: f64,
+}
+
 /// A smooth path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     segments: Vec<Placed>,
     /// By segment: the centre and the radius of a circle that holds it; none for a path of one segment.
     circles: Vec<(Point, f64)>,
+    /// In order of the link, then of the beginning; nearly always empty.
+    branches: Vec<Branch>,
 }
 
 impl Path {
@@ -111,6 +129,7 @@ impl Path {
                 last: Coordinate::ZERO,
             }],
             circles: Vec::new(),
+            branches: Vec::new(),
         }
     }
 
@@ -154,7 +173,7 @@ impl Path {
             anchor_travelled: lead_in,
             last: anchor,
         };
-        let mut path = Self { segments: vec![approach], circles: Vec::new() };
+        let mut path = Self { segments: vec![approach], circles: Vec::new(), branches: Vec::new() };
         path.push(Segment::Arc(first), Coordinate::ZERO, last, first_radius * angle);
         path.push(Segment::Arc(second), Coordinate::ZERO, last, second_radius * angle);
         let outward = Spiral::new(pitch, Direction::Outward);
@@ -171,7 +190,7 @@ impl Path {
         let zero = Coordinate::ZERO;
         let behind =
             Placed { segment, begin: f64::NEG_INFINITY, end: 0.0, anchor: zero, anchor_travelled: 0.0, last: zero };
-        let path = Self { segments: vec![behind], circles: Vec::new() };
+        let path = Self { segments: vec![behind], circles: Vec::new(), branches: Vec::new() };
         Route { path, end: start, heading_turns, remainders: None }
     }
 
@@ -198,6 +217,38 @@ impl Path {
         }
         self.circles = self.segments.iter().map(Placed::circle).collect();
         Ok(self)
+    }
+
+    /// Returns the same path with the stretches in which followers are not the first places at their distances. The
+    /// stretches of a link do not overlap, and none begins on the first segment.
+    pub fn with_branches(self, mut branches: Vec<Branch>) -> Self {
+        branches.sort_by(|one, other| one.link.total_cmp(&other.link).then(one.begin.total_cmp(&other.begin)));
+        Self { branches, ..self }
+    }
+
+    /// Returns the stretches in which followers are not the first places at their distances.
+    pub fn branches(&self) -> &[Branch] {
+        &self.branches
+    }
+
+    /// Returns the place from which the follower of a link is the first one back; `None` for the front handle itself.
+    #[inline]
+    pub fn branch(&self, front: Param, link: f64) -> Option<Param> {
+        if front.segment == 0 || self.branches.is_empty() {
+            return None;
+        }
+        let travelled = self.travelled(front);
+        let next = self.branches.partition_point(|branch| (branch.link, branch.begin) <= (link, travelled));
+        let branch = self.branches.get(next.checked_sub(1)?)?;
+        (branch.link == link && travelled <= branch.end).then(|| self.place_behind(branch, travelled))
+    }
+
+    /// Returns the place from which the follower is the first one back, with the front handle on a branch.
+    pub(crate) fn place_behind(&self, branch: &Branch, front: f64) -> Param {
+        if branch.drift == 0.0 {
+            return branch.behind;
+        }
+        self.param_at(self.travelled(branch.behind) + branch.drift * (front - branch.begin))
     }
 
     /// Returns the metres that the head can travel.

@@ -10,16 +10,19 @@
 //! step D^2 <= max(ends) + max(0, k D - 1) h^2 / 4 and D^2 >= min(ends) - (1 + k D) h^2 / 4.
 //! 1. By the first bound, every place from the front handle back to a place `near` is nearer than L throughout the
 //!    step. D <= s - u proves this as far as s - u is less than L. From there the proof goes back in steps within which
-//!    D^2 cannot grow to L^2 ([`Link::nearer_throughout`]), so no nearer point comes to be at the link's distance.
+//!    D^2 cannot grow to L^2 ([`Link::nearer_throughout`]). Where nearer places have come to the distance before, the
+//!    proof begins at a place `behind` between the follower and these places.
 //! 2. By the second bound, a place `far` is further away than L throughout.
 //! 3. Between the two the distance grows backward, that is, q(s, u) = T(u) . (P(s) - P(u)) > 0. This follows from its
 //!    values at the corners, because |q_u| <= 1 + k D and |q_ss| <= k.
 //!
-//! Hence there is exactly one root between `far` and `near`. This root is the follower, and because of 3 it moves
-//! continuously. Its cosine is at least min q / L.
+//! Hence there is exactly one root between `far` and `near`, and it is the first one back from `behind`, or from the
+//! front handle. This root is the follower, and because of 3 it moves continuously. Its cosine is at least min q / L.
 //!
-//! **Jump.** If a place strictly between the two followers is nearer than L throughout, by the first bound, then no
-//! follower passes this place, so the follower map has a discontinuity in the step.
+//! **Jump.** Let two places be the first ones at the distance, at the two ends of a step. If a place strictly between
+//! them is nearer than L throughout, by the first bound, then no follower passes this place. If the second place is
+//! behind, the follower vanishes in the step. If it is ahead, a nearer place comes to the distance, and the follower
+//! stays behind the place that it cannot pass.
 //!
 //! **Turns.** Let f be the front cosine, let the rear cosine be at least c, and let m = max |f| over the step. The rear
 //! handle is at most m / c times as fast as the front handle, so the link turns by at most (1 + m / c) / L per metre.
@@ -31,9 +34,10 @@
 //! configuration, even where all of them vanish at once. Therefore the steps shrink in geometric progression towards
 //! it.
 
-use crate::linkage::{NoFollower, follower, link_pose};
+use crate::linkage::{NoFollower, first_follower, follower_behind, link_pose};
 use crate::model::curve::Curve;
 use crate::model::path::{Param, Path};
+use crate::model::root::{bisect_predicate, golden_section_min};
 use crate::model::{Point, Vector};
 
 /// A link of one length, anywhere on the path.
@@ -94,17 +98,26 @@ struct Distances {
 }
 
 impl Link<'_> {
-    /// Returns the link with its front handle after `front` metres of travel.
+    /// Returns the link with its front handle after `front` metres of travel, and its rear handle at the first place
+    /// back from `behind`, or from the front handle.
     ///
     /// # Errors
-    /// [`NoFollower`] at or inside the fold of an inward spiral.
-    pub fn configuration(&self, front: f64) -> Result<Configuration, NoFollower> {
-        self.configuration_at(front, self.path.param_at(front))
+    /// [`NoFollower`] at or inside the fold of an inward spiral, and if `behind` is too far from the front handle.
+    pub fn configuration(&self, front: f64, behind: Option<Param>) -> Result<Configuration, NoFollower> {
+        self.configuration_at(front, self.path.param_at(front), behind)
     }
 
     /// Does the same for a front handle whose place is known.
-    pub fn configuration_at(&self, front: f64, front_param: Param) -> Result<Configuration, NoFollower> {
-        let rear_param = follower(self.path, front_param, self.length)?;
+    pub fn configuration_at(
+        &self,
+        front: f64,
+        front_param: Param,
+        behind: Option<Param>,
+    ) -> Result<Configuration, NoFollower> {
+        let rear_param = match behind {
+            None => first_follower(self.path, front_param, self.length)?,
+            Some(behind) => follower_behind(self.path, behind, front_param, self.length)?,
+        };
         let pose = link_pose(self.path, front_param, rear_param, self.length);
         Ok(Configuration {
             front,
@@ -141,12 +154,35 @@ impl Link<'_> {
         Some(self.segment_end(at)).filter(|end| is_steady && *end > at.front)
     }
 
+    /// Returns the front handle's travel up to which both handles are on two parallel lines, and the metres that the
+    /// rear one goes per metre of the front one. The rear handle's line must reach to `behind`, ahead of it.
+    pub fn parallel_until(&self, at: &Configuration, behind: Param) -> Option<(f64, f64)> {
+        let (front, rear) = (at.front_param, at.rear_param);
+        let is_straight = |param| self.path.segment(param).constant_curvature() == Some(0.0);
+        if front.segment == rear.segment || behind.segment != rear.segment || !is_straight(front) || !is_straight(rear)
+        {
+            return None;
+        }
+        let along = self.path.tangent(front).dot(&self.path.tangent(rear));
+        let room = if along > 0.0 {
+            self.path.end_of(rear.segment) - self.path.travelled(behind)
+        } else if rear.segment > 0 {
+            at.rear - self.path.end_of(rear.segment - 1)
+        } else {
+            f64::INFINITY
+        };
+        let end = self.segment_end(at).min(at.front + (1.0 - 1e-9) * room);
+        let is_long = end - at.front > LEAST_PARALLEL * self.length;
+        (along.abs() > 1.0 - 1e-12 && is_long).then_some((end, along.signum()))
+    }
+
     /// Returns true if a step is proven to be continuous with a known number of turns of the rear handle. The front
     /// handle is on one segment during the step. The rear handle turns round once if the front cosines at the ends
-    /// differ in sign, else not at all.
-    pub fn is_certain(&self, before: &Configuration, after: &Configuration) -> bool {
+    /// differ in sign, else not at all. During the step it is the first place back from `behind`, metres of travel, or
+    /// from the front handle.
+    pub fn is_certain(&self, before: &Configuration, after: &Configuration, behind: Option<f64>) -> bool {
         let curvature = self.front_curvature(before, after);
-        self.least_rear_cosine(before, after, curvature.most)
+        self.least_rear_cosine(before, after, curvature.most, behind)
             .is_some_and(|rear_cosine| self.turns_are_certain(before, after, &curvature, rear_cosine))
     }
 
@@ -160,7 +196,13 @@ impl Link<'_> {
 
     /// Returns the least rear cosine over a step that is proven to be continuous; `curvature` is that at the front
     /// handle.
-    fn least_rear_cosine(&self, before: &Configuration, after: &Configuration, curvature: f64) -> Option<f64> {
+    fn least_rear_cosine(
+        &self,
+        before: &Configuration,
+        after: &Configuration,
+        curvature: f64,
+        behind: Option<f64>,
+    ) -> Option<f64> {
         let (link, step) = (self.length, after.front - before.front);
         let (rear_far, rear_near) = (before.rear.min(after.rear), before.rear.max(after.rear));
         let slope = before.rear_cosine.min(after.rear_cosine) * link;
@@ -176,6 +218,7 @@ impl Link<'_> {
         let reach = link + step + (rear_near - rear_far) + 2.0 * slack;
         let least_change = 0.25 * (1.0 + curvature * reach) * step * step;
         let (far, near) = (rear_far - slack - least_change / slope, rear_near + slack);
+        let near = behind.map_or(near, |behind| near.min(behind));
         let reach = reach + least_change / slope;
         let (at_far, at_near) = (self.distances(before, after, far), self.distances(before, after, near));
         if at_far.square - least_change <= link * link {
@@ -183,7 +226,15 @@ impl Link<'_> {
         }
         let bound = self.largest_second_derivative([&at_far, &at_near], near - far, step, reach);
         let slope = 0.5 * (at_far.slope + at_near.slope - bound * (near - far)) - 0.125 * curvature * step * step;
-        (slope > 0.0 && self.nearer_throughout(before, after, curvature, near)).then_some(slope / link)
+        // No place is further than the path to it is long.
+        let from = behind.unwrap_or(after.front - link);
+        let is_near = behind.is_none() || {
+            let limit = link * link - largest_excess(curvature, link + step, step);
+            let point = self.path.point(at_near.param);
+            [before, after].iter().all(|end| (end.front_point - point).norm_squared() < limit)
+        };
+        (slope > 0.0 && is_near && self.nearer_throughout((before, after), curvature, from, near))
+            .then_some(slope / link)
     }
 
     fn distances(&self, before: &Configuration, after: &Configuration, travelled: f64) -> Distances {
@@ -220,14 +271,20 @@ impl Link<'_> {
         1.0 + reach * self.path.max_curvature_between(place(far), place(near))
     }
 
-    /// Returns true if every place from the front handle back to `to` is nearer than the link throughout a step.
+    /// Returns true if every place from `from` back to `to` is nearer than the link throughout a step.
     ///
     /// The square of the distance grows over the next x metres back by at most 2 slope x + bound x^2.
-    fn nearer_throughout(&self, before: &Configuration, after: &Configuration, curvature: f64, to: f64) -> bool {
+    fn nearer_throughout(
+        &self,
+        (before, after): (&Configuration, &Configuration),
+        curvature: f64,
+        from: f64,
+        to: f64,
+    ) -> bool {
         let step = after.front - before.front;
         let reach = self.length + step;
         let limit = self.length * self.length - largest_excess(curvature, reach, step);
-        let mut place = after.front - self.length;
+        let mut place = from;
         let mut segment = self.path.param_at(place).segment;
         while place > to {
             let begin = if segment == 0 { f64::NEG_INFINITY } else { self.path.end_of(segment - 1) };
@@ -296,7 +353,39 @@ impl Link<'_> {
         most < 1.0 && (least > 0.0 || largest < 0.0)
     }
 
-    /// Returns a place that the rear handle is proven to jump over in a step.
+    /// Returns the place ahead of the rear handle from which on the distance to the front handle grows again, in metres
+    /// of travel, and the number of places tested. `None` if no such place is found.
+    pub fn valley(&self, at: &Configuration) -> (Option<f64>, u64) {
+        let falls = |travelled: f64| {
+            let param = self.path.param_at(travelled);
+            self.path.tangent(param).dot(&(at.front_point - self.path.point(param))) > 0.0
+        };
+        let steps = std::iter::successors(Some(FIRST_VALLEY_STEP * self.length), |step| {
+            Some((VALLEY_GROWTH * step).min(VALLEY_STEP * self.length))
+        });
+        let (mut place, mut tested) = (at.rear, 0);
+        for step in steps {
+            let next = place + step;
+            tested += 1;
+            if next >= at.front {
+                break;
+            }
+            if !falls(next) {
+                return (Some(bisect_predicate(|place| !falls(place), place, next)), tested);
+            }
+            place = next;
+        }
+        (None, tested)
+    }
+
+    /// Returns the least distance of the front handle, after `front` metres of travel, from the places around a valley.
+    pub fn least_distance(&self, front: f64, valley: f64, around: f64) -> f64 {
+        let origin = self.path.point(self.path.param_at(front));
+        let distance = |travelled: f64| (self.path.point(self.path.param_at(travelled)) - origin).norm();
+        golden_section_min(distance, valley - around, valley + around).0
+    }
+
+    /// Returns a place between the rear handles that none passes in a step.
     pub fn jump(&self, before: &Configuration, after: &Configuration) -> Option<f64> {
         let step = after.front - before.front;
         let curvature = self.path.max_curvature_between(before.front, after.front);
@@ -313,6 +402,15 @@ impl Link<'_> {
 /// The places between two followers at which a proof of a jump is tried. Nearly all of them succeed: up to the further
 /// follower every place is nearer than the link, in one of the two configurations at least.
 const JUMP_SAMPLES: i32 = 32;
+
+/// The least way along parallel lines that is gone in one step, in links.
+const LEAST_PARALLEL: f64 = 1e-3;
+
+/// The steps in which the place of least distance ahead of the rear handle is searched for, in links: the first, the
+/// longest, and the growth between them.
+const FIRST_VALLEY_STEP: f64 = 1e-9;
+const VALLEY_STEP: f64 = 1.0 / 64.0;
+const VALLEY_GROWTH: f64 = 1.25;
 
 /// Returns the greatest excess of the square of a distance over its values at both ends of a step of the front handle.
 /// The distance is at most `reach`.

@@ -89,7 +89,7 @@ impl Inward<'_> {
         if self.fold.is_some_and(|fold| front.at.high <= fold) {
             return None;
         }
-        let configuration = self.link.configuration_at(travelled, front).ok()?;
+        let configuration = self.link.configuration_at(travelled, front, None).ok()?;
         Some((configuration, configuration.rear_param.at.minus(front.at)))
     }
 

@@ -56,7 +56,7 @@ impl SingularitySearch<'_> {
             let reached = |head: f64| front(head).is_none_or(|at| at >= place);
             cuts.windows(2).find(|cut| reached(cut[1])).map(|cut| bisect_predicate(reached, cut[0], cut[1]))
         };
-        if tail.link().configuration(first).is_ok_and(|start: Configuration| start.is_stalled()) {
+        if tail.configuration(first).is_ok_and(|start: Configuration| start.is_stalled()) {
             found.stall = Some(0.0);
         } else {
             found.stall = tail.turns().iter().copied().find(|turn| *turn > first).and_then(comes_to);
@@ -97,7 +97,7 @@ impl SingularitySearch<'_> {
             }
             budget.spend(cuts.len() as u64).ok()?;
             for place in &mut places {
-                *place = body.link().configuration(*place).ok()?.rear;
+                *place = body.configuration(*place).ok()?.rear;
             }
         }
         Some(cuts)
@@ -105,7 +105,7 @@ impl SingularitySearch<'_> {
 
     /// Returns the metres of travel of a handle from 1 on that only body links lead to.
     pub(super) fn handle(&self, handle: usize, head: f64) -> Option<f64> {
-        let body = self.body.as_ref().unwrap_or(&self.head).link();
+        let body = self.body.as_ref().unwrap_or(&self.head);
         (1..handle).try_fold(self.handle_1(head)?, |front, _| {
             body.configuration(front).ok().map(|configuration| configuration.rear)
         })

@@ -9,6 +9,7 @@
 mod curve;
 mod path;
 mod real;
+mod trace;
 mod walk;
 
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod tests;
 use self::curve::RealParam;
 use self::path::RealPath;
 use self::real::Real;
+use self::trace::{Trace, place_behind};
 use self::walk::Walk;
 use crate::linkage::NoFollower;
 use crate::model::description::PathDescription;
@@ -92,6 +94,8 @@ pub struct Reference {
     team: Team,
     path: RealPath,
     head_speed: f64,
+    /// By length of a link; `None` where the follower is the first place everywhere.
+    traces: Vec<(f64, Option<Trace>)>,
 }
 
 /// A handle on the path.
@@ -109,7 +113,7 @@ impl Reference {
     /// # Errors
     /// A sentence if there is no memory for the constants pi and ln 2.
     pub fn new(team: Team, description: &PathDescription, head_speed: f64) -> Result<Self, String> {
-        Ok(Self { team, path: RealPath::new(description)?, head_speed })
+        Ok(Self { team, path: RealPath::new(description)?, head_speed, traces: Vec::new() })
     }
 
     /// Returns all handles at `time` simulated seconds, the head first.
@@ -145,9 +149,9 @@ impl Reference {
         Ok(seats)
     }
 
-    /// Returns the first place behind at the link's distance: a guess by a walk back in doubles, then Newton's method.
+    /// Returns the follower: a guess by a walk back in doubles, then Newton's method.
     ///
-    /// The guess is the first place up to the rounding of doubles. The result of Newton's method counts as the same
+    /// The guess is the first place at the distance, or the one that continues it, up to the rounding of doubles. The result of Newton's method counts as the same
     /// place if it is within a millionth of the link and the distance grows backward there.
     fn follower(&mut self, segment: usize, front: &RealParam, link: f64) -> Result<(usize, RealParam), NoFollower> {
         let (mut segment, guess) = self.guess(segment, front, link)?;
@@ -164,9 +168,18 @@ impl Reference {
     }
 
     fn guess(&mut self, segment: usize, front: &RealParam, link: f64) -> Result<(usize, RealParam), NoFollower> {
+        let known = self.traces.iter().position(|(length, _)| *length == link);
+        let trace = known.unwrap_or_else(|| {
+            self.traces.push((link, Trace::new(&self.path, link)));
+            self.traces.len() - 1
+        });
+        let trace = self.traces[trace].1.as_ref();
+        let ahead = trace.map_or(Ok(None), |trace| trace.ahead(&self.path, segment, front))?;
+        let ahead = ahead.map(|(segment, back)| (segment, place_behind(&mut self.path, segment, back)));
+        let (segment, place) = ahead.as_ref().map_or((segment, front), |(segment, place)| (*segment, place));
         for index in (0..=segment).rev() {
             let on = self.path.segment(index);
-            let from = if index == segment { front } else { &on.last };
+            let from = if index == segment { place } else { &on.last };
             if let Some(back) = Walk::new(on, index == 0, from, front).first_at(link)? {
                 let by = Real::from(-on.curve.forward() * back);
                 let from = from.clone();

@@ -133,7 +133,7 @@ fn a_link_on_a_circle() {
             (Capsule::new(&scene.path, Span(lo, hi)), [lo, hi].map(|place| scene.path.at(place).point))
         };
         let ((front, front_ends), (rear, rear_ends)) = (capsule(u), capsule(x));
-        link::check(&scene.path, (&front, front_ends), (&rear, rear_ends), &link)
+        link::check(&scene.path, (&front, front_ends), (&rear, rear_ends), &link, &[(front.span, None)])
     };
     let around = |lo: f64, hi: f64| [2.0 - behind + lo, 2.0 - behind + hi];
     assert!(check([2.0, 2.0], around(-1e-12, 1e-12)).unwrap().is_positive());

@@ -13,9 +13,8 @@ fn ground(shapes: Vec<(Shape, f64)>) -> Ground {
 /// Returns the first touches and the least clearances up to `to` or the motion's end, and that place.
 fn touches(path: &Path, team: &Team, ground: &Ground, to: f64) -> (Vec<Option<Touch>>, Vec<ObstacleClearance>, f64) {
     let mut unreported = unreported;
-    let mut budget = Budget::new(20_000_000, &mut unreported);
-    let singular = Singularities::search(path, team, &mut budget);
-    let searches = ConservativeAdvancement::new(path, team, &singular.head_turns, &singular.body_turns)
+    let (path, singular) = followed(path, team);
+    let searches = ConservativeAdvancement::new(&path, team, &singular.head_turns, &singular.body_turns)
         .with_tail_turns(&singular.tail_turns);
     let to = to.min(singular.end.map_or(singular.searched_until, |end| end.travelled));
     let mut budget = Budget::new(20_000_000, &mut unreported);
@@ -36,6 +35,7 @@ fn nearest(path: &Path, team: &Team, obstacle: &Obstacle, travelled: f64) -> Opt
 
 fn check_ground(path: &Path, team: &Team, ground: &Ground) -> Result<(), TestCaseError> {
     let (touches, least, end) = touches(path, team, ground, path.length());
+    let path = &followed(path, team).0;
     for ((obstacle, touch), least) in ground.obstacles().iter().zip(touches).zip(least) {
         let at = |travelled: f64| nearest(path, team, obstacle, travelled);
         if let Some(touch) = touch {

@@ -253,11 +253,11 @@ impl BandBuilder<'_> {
         let worst = ((miss + dropped_place) / allowed)
             .max((turn + dropped[2]) / allowed_heading)
             .max(truncated / (half * middle.spacing) / self.tolerance.speed);
-        if worst <= 1.0 && !self.is_first_follower(chain, index) { f64::INFINITY } else { worst }
+        if worst <= 1.0 && !self.is_follower_of_next(chain, index) { f64::INFINITY } else { worst }
     }
 
     /// Returns true if the previous node of a node chain is the follower that the linkage finds.
-    fn is_first_follower(&self, chain: &NodeChain, index: usize) -> bool {
+    fn is_follower_of_next(&self, chain: &NodeChain, index: usize) -> bool {
         let Some(before) = index.checked_sub(1) else { return true };
         is_follower(self.track, chain[before].at, chain[index].at, self.link)
     }
@@ -265,7 +265,8 @@ impl BandBuilder<'_> {
 
 /// Returns true if a place at a link's distance is the follower of `front` that the linkage finds.
 fn is_follower(track: &Track, place: Param, front: Param, link: f64) -> bool {
-    if place.segment == front.segment && track.path.segment(front).distance_grows(front.at, place.at) {
+    let may_be_first = place.segment == front.segment && track.path.branch(front, link).is_none();
+    if may_be_first && track.path.segment(front).distance_grows(front.at, place.at) {
         return true;
     }
     let Ok(found) = linkage::follower(track.path, front, link) else { return false };

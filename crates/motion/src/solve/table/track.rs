@@ -120,11 +120,12 @@ impl<'a> Track<'a> {
         (by.is_finite() && segment.contains(at.at) && is_on_segment).then_some(at)
     }
 
-    /// Returns the first place behind `front` at a link's distance.
+    /// Returns the follower of `front`.
     pub(super) fn follower(&self, front: Param, link: f64) -> Option<Param> {
         let rear = linkage::follower(self.path, front, link).ok()?;
-        // On one segment it was found in the segment's own coordinate, with all its digits.
-        if rear.segment == front.segment { Some(rear) } else { self.settled(rear, front, link) }
+        // On one segment the first place was found in the segment's own coordinate, with all its digits.
+        let is_exact = rear.segment == front.segment && self.path.branch(front, link).is_none();
+        if is_exact { Some(rear) } else { self.settled(rear, front, link) }
     }
 
     /// Returns the node one link ahead of `rear`. `gap` is a guess of the travel between them in metres; the guess is
