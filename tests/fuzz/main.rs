@@ -185,6 +185,11 @@ fn timecode() {
 }
 
 #[test]
+fn design_page() {
+    fuzz("design_page");
+}
+
+#[test]
 fn environment() {
     fuzz("environment");
 }
