@@ -2,6 +2,7 @@
 
     cargo build --release
     .venv/bin/python benches/design.py              # the table of docs/design-page.md
+    .venv/bin/python benches/design.py storm        # the server alone, with 300 changes
     .venv/bin/python benches/design.py picture      # makes docs/design-page.jpg
 
 Uses the release build, Debian's Chromium without a graphics card, and Playwright, which tests/run installs. Everything
@@ -19,6 +20,7 @@ import sys
 import time
 
 from playwright.sync_api import sync_playwright
+from websockets.sync.client import connect
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PROGRAM = next(path for kind in ("release", "debug") if (path := ROOT / "target" / kind / "bench-dragon").exists())
@@ -137,6 +139,38 @@ def table():
     print(f"Load average: {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores.")
 
 
+def storm(changes=300):
+    """Sends changes at an even rate, whatever the server answers; prints the times from the last one to its results."""
+    for scene, name, _, _ in SCENES:
+        # 60 a second, and faster than any picture.
+        for seconds in (5, 0.15):
+            with design(scene) as (url, _):
+                ended = stormed(url.replace("http", "ws") + "design/session", name, changes, seconds)
+            print(f"{scene}: {changes} changes in {seconds} s, exact events after {ended[0]:.2f} s, clearances {ended[1]:.2f} s", flush=True)
+
+
+def stormed(url, name, changes, seconds):
+    with connect(url, max_size=None, max_queue=None) as socket:
+        def until(is_it):
+            while True:
+                message = socket.recv(timeout=120)
+                if isinstance(message, str) and is_it(answer := json.loads(message)):
+                    return answer
+        fields = until(lambda answer: answer.get("scene"))["scene"]["fields"]
+        until(lambda answer: answer.get("facts"))
+        ends = (name,) if name else ("pitch", "radius", "length")
+        name, value = next((one["name"], one["value"]) for one in fields if one["name"].endswith(ends))
+        begin = time.monotonic()
+        for number in range(1, changes + 1):
+            time.sleep(max(0, begin + number * seconds / changes - time.monotonic()))
+            socket.send(json.dumps({"id": number, "set": {name: value * (1 + 1e-6 * number)}}))
+        ended, times = time.monotonic(), []
+        for kind in ("events", "facts"):
+            until(lambda answer: answer.get("id") == changes and answer.get(kind, {}).get("state") == "exact")
+            times.append(time.monotonic() - ended)
+        return times
+
+
 def picture():
     with design("village.toml") as (url, _), opened(url, width=1440, height=810) as page:
         page.evaluate("document.getElementById('when').value = 95; document.getElementById('when').oninput()")
@@ -145,4 +179,4 @@ def picture():
         page.screenshot(path=ROOT / "docs" / "design-page.jpg", type="jpeg", quality=80)
 
 
-picture() if sys.argv[1:] == ["picture"] else table()
+{"picture": picture, "storm": storm}.get((sys.argv[1:] or [""])[0], table)()

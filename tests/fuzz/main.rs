@@ -197,6 +197,11 @@ fn timecode() {
 }
 
 #[test]
+fn design_page() {
+    fuzz("design_page");
+}
+
+#[test]
 fn environment() {
     fuzz("environment");
 }

@@ -12,7 +12,7 @@ use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::model::shape::ShapeKind;
 use bench_dragon_show::scene::cue::CueMoment;
 use bench_dragon_show::scene::values::{Found, Lines, Value, Values};
-use bench_dragon_show::scene::{CheckedNumber, Scene};
+use bench_dragon_show::scene::{CheckedNumber, Scene, printable};
 
 /// The greatest length of a text, in bytes.
 pub const MOST_BYTES: usize = 256 * 1024;
@@ -34,8 +34,9 @@ pub struct Fault {
 }
 
 impl From<String> for Fault {
+    /// Creates the fault of a request, whose words may be in the sentence.
     fn from(sentence: String) -> Self {
-        Self { sentence, line: None, field: None }
+        Self { sentence: printable(&sentence), line: None, field: None }
     }
 }
 

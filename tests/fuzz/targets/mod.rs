@@ -10,6 +10,7 @@ pub mod certificate;
 mod certificate_changes;
 pub mod command_line;
 pub mod control;
+pub mod design_page;
 pub mod environment;
 pub mod log;
 mod mcap_records;
@@ -40,7 +41,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [Target; 10] = [
     scene::TARGET,
     control::TARGET,
     page::TARGET,
@@ -50,4 +51,5 @@ pub const TARGETS: [Target; 9] = [
     environment::TARGET,
     command_line::TARGET,
     timecode::TARGET,
+    design_page::TARGET,
 ];

@@ -149,6 +149,7 @@ export class Fields {
       const value = valueOf();
       if (value === row.sent || Number.isNaN(value)) return;
       row.sent = value;
+      row.shown = undefined;
       this.acts.set(row.field.name, value, `field ${row.field.name} ${this.gestures}`);
     };
     input.onfocus = () => this.acts.focus(row.field);
@@ -187,7 +188,11 @@ export class Fields {
     const row = this.rows.get(field.name);
     if (!row) return;
     const { input, slider } = row, { value, min, max, integer, unit } = field;
+    const isShown = value === row.shown && !row.isRefused;
     row.field = field;
+    if (isShown && !row.isTyped && !row.isHeld) return;
+    row.shown = row.isTyped || row.isHeld ? undefined : value;
+    row.isRefused = false;
     row.node.classList.remove("refused");
     input.removeAttribute("aria-invalid");
     if (input.type === "number") Object.assign(input, { step: integer ? 1 : "any",
@@ -208,6 +213,7 @@ export class Fields {
   refuse(name, sentence) {
     const row = this.rows.get(name);
     if (!row) return;
+    row.isRefused = true;
     row.node.classList.add("refused");
     row.input.setAttribute("aria-invalid", "true");
     row.input.title = sentence;

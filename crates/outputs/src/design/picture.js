@@ -4,6 +4,7 @@
 import { benchAt } from "../boards.js";
 import { Camera } from "../camera.js";
 import { Ground, draw } from "../drawing.js";
+import { STRIDE } from "../hermite.js";
 import { Labels } from "../labels.js";
 import { identitiesOf, paletteOf } from "../palette.js";
 import { Publisher } from "../publisher.js";
@@ -22,6 +23,11 @@ class Still {
 
 /** The share of the picture that stays free around the places in sight. */
 const MARGIN = 0.12;
+/**
+ * The nearest boards of another scene, or of many benches, take long to find. So they are looked for in a picture that
+ * has not changed for a time (ms).
+ */
+const MANY = 500, REST = 300;
 /** The identity of the ghost: grey, in short dashes. */
 const GHOST = { colour: "#757980", dashes: [3, 6], light: [0, 0, 0] };
 
@@ -33,7 +39,7 @@ export class Picture {
     this.camera = new Camera();
     this.camera.still = true;
     // A picture of the ground lies below.
-    this.ground = new Ground(true);
+    this.ground = new Ground(true, 0);
     this.labels = new Labels(matchMedia("(prefers-reduced-motion: reduce)").matches);
     this.live = new Publisher("", {}, new Still());
     this.ghost = null;
@@ -44,7 +50,7 @@ export class Picture {
     this.event = null;
     this.chosen = { dragon: null, bench: -1 };
     this.look = null;
-    this.drawn = 0;
+    this.drawn = this.restsAt = 0;
     this.dress();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.dress());
   }
@@ -62,8 +68,10 @@ export class Picture {
   /** Takes a frame; returns true if it can be shown. */
   frame(frame) {
     const { stream } = this.live;
-    if (this.coming?.run_id === frame.run) [stream.stage, this.coming] = [this.coming, null];
+    const isOther = this.coming?.run_id === frame.run;
+    if (isOther) [stream.stage, this.coming] = [this.coming, null];
     if (stream.stage?.run_id !== frame.run) return false;
+    if (isOther || frame.handles.length / STRIDE > MANY) this.restsAt = performance.now() + REST;
     stream.playback.newest = frame;
     return true;
   }
@@ -117,7 +125,7 @@ export class Picture {
     this.size();
     const { live, ghost, camera } = this;
     if (!live.isThere) return;
-    this.judge(live.newest);
+    this.judge(live.newest, now >= this.restsAt);
     for (const one of ghost ? [live, ghost] : [live]) {
       one.newest.at = now;
       one.stream.alert = one === live ? this.alert() : null;
@@ -128,7 +136,7 @@ export class Picture {
     camera.update(live.dragons, Infinity);
     camera.reach = Math.max(...live.dragons.map(({ path }) => path.reach));
     const hasFocus = document.activeElement === this.canvas, { measure, palette } = this;
-    const look = [live.newest.sequence, live.dragons.map((dragon) => dragon.lookKey(0)), camera.x, camera.y,
+    const look = [live.newest.sequence, now >= this.restsAt, live.dragons.map((dragon) => dragon.lookKey(0)), camera.x, camera.y,
       camera.scale, this.chosen.bench, measure.key, hasFocus && measure.on, ghost?.newest.run].join();
     if (look === this.look && !this.labels.isDue(now)) return;
     this.look = look;
@@ -148,11 +156,15 @@ export class Picture {
       chosenName: dragon.benchName(chosen), endNames: dragon.endNames() };
   }
 
-  /** Sets the state of a frame to the latest event before it. Boards that may overlap are searched from then on. */
-  judge(frame) {
+  /**
+   * Sets the state of a frame to the latest event before it. Boards that may overlap are searched from then on; the
+   * nearest boards before. Neither is searched without a clearance.
+   */
+  judge(frame, isAtRest) {
     const passed = this.events.findLast(({ time }) => time <= frame.time)?.event;
     frame.state = Math.max(0, this.stage.states.findIndex(({ name }) => name === passed));
-    frame.clearance = this.events.some(({ event, time }) => event === "contact" && time <= frame.time) ? -1 : 1;
+    const isTouching = this.events.some(({ event, time }) => event === "contact" && time <= frame.time);
+    frame.clearance = !isAtRest ? NaN : isTouching ? -1 : 1;
   }
 
   /** Returns the marked event as the alert of a publisher. */

@@ -175,9 +175,9 @@ function inMetres(context, camera, right = 0, down = 0) {
  * until the camera moves beyond the margin, or the path changes.
  */
 export class Ground {
-  /** A transparent ground is only the path. */
-  constructor(transparent) {
-    this.transparent = transparent;
+  /** A transparent ground is only the path. `margin` is a share of the picture; 0 suits paths that often change. */
+  constructor(transparent, margin = 0.25) {
+    Object.assign(this, { transparent, margin });
     this.canvas = document.createElement("canvas");
     this.context = this.canvas.getContext("2d", { alpha: transparent });
     this.paths = [];
@@ -191,7 +191,7 @@ export class Ground {
    */
   cover(other, camera, palette, paths) {
     const { width, height } = other.canvas, { c, s, unit } = camera, scale = camera.scale * camera.ratio,
-        right = width >> 2, down = height >> 2;
+        [right, down] = [width, height].map((pixels) => Math.floor(pixels * this.margin));
     const look = [width, height, camera.scale, camera.ratio, c, s, palette.ground, palette.faint].join();
     const moved = () => {
       const dx = (this.x - camera.x) * scale, dy = (this.y - camera.y) * scale;

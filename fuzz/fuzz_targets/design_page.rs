@@ -1,0 +1,3 @@
+#![no_main]
+
+bench_dragon_fuzz::fuzz!(design_page);
