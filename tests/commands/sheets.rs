@@ -88,6 +88,61 @@ fn the_nearest_of_all_is_what_check_says() {
     assert!(said.len() > 80 && said.iter().all(|one| *one >= centimetres), "{said:?}");
 }
 
+/// Returns points on the outlines of both boards, the head's sizes and those of the village's other benches.
+fn outline(line: &Value, bench: usize) -> Vec<[f64; 2]> {
+    let handle = |number: usize, k: usize| line["handles"][number][k].as_f64().unwrap();
+    let (front, rear) = ([handle(bench, 0), handle(bench, 1)], [handle(bench + 1, 0), handle(bench + 1, 1)]);
+    let long = (front[0] - rear[0]).hypot(front[1] - rear[1]);
+    let axis = [(front[0] - rear[0]) / long, (front[1] - rear[1]) / long];
+    // The default of `hole_inset` beyond each hole, and half the width to either side.
+    let (inset, half) = (0.275, 0.175);
+    let point = |along: f64, left: f64| {
+        [rear[0] + axis[0] * along - axis[1] * left, rear[1] + axis[1] * along + axis[0] * left]
+    };
+    let along = |share: f64| -inset + share * (long + 2.0 * inset);
+    let shares = || (0..=200).map(|step| f64::from(step) / 200.0);
+    let sides = shares().flat_map(|share| [point(along(share), half), point(along(share), -half)]);
+    let ends = shares().flat_map(|share| [0.0, 1.0].map(|end| point(along(end), half * (2.0 * share - 1.0))));
+    sides.chain(ends).collect()
+}
+
+#[test]
+fn a_bench_is_near_within_its_span_and_not_before_or_after_it() {
+    let rows = rows("config/village.toml");
+    let seconds = |time: &str| {
+        let (minutes, seconds) = time.split_once(':').unwrap();
+        60.0 * minutes.parse::<f64>().unwrap() + seconds.parse::<f64>().unwrap()
+    };
+    let mut compared = 0;
+    for row in rows.iter().filter(|row| row.bench % 17 == 1) {
+        let Some((who, rest)) = row.what.split_once(", ") else { continue };
+        let (Some(other), Some((_, span))) = (who.strip_prefix("bench "), rest.split_once(" (")) else { continue };
+        let other: usize = other.parse().unwrap();
+        let (from, until) = span.strip_suffix(')').unwrap().split_once('\u{2013}').unwrap();
+        let (from, until) = (seconds(from), seconds(until));
+        if from < 1.0 {
+            continue;
+        }
+        assert!((from - 0.5..until + 0.5).contains(&row.numbers[0]), "{}", row.what);
+        // Times on sheets are whole seconds.
+        let times = [from - 1.0, from + 1.0, until - 1.0, until + 1.0];
+        let at: Vec<String> = times.iter().map(f64::to_string).collect();
+        let solved = json(&["solve", "config/village.toml", &format!("--at={}", at.join(","))]);
+        // Not at the end of the show.
+        if solved.len() < times.len() {
+            continue;
+        }
+        for (line, is_near) in solved.iter().zip([false, true, true, false]) {
+            let [one, two] = [row.bench - 1, other - 1].map(|bench| outline(line, bench));
+            let apart = |a: &[f64; 2]| two.iter().map(|b| (a[0] - b[0]).hypot(a[1] - b[1])).fold(f64::MAX, f64::min);
+            let distance = one.iter().map(apart).fold(f64::MAX, f64::min);
+            assert_eq!(distance < 1.0, is_near, "{distance} m at {} s: bench {}, {}", line["t"], row.bench, row.what);
+        }
+        compared += 1;
+    }
+    assert!(compared >= 4, "{compared} spans");
+}
+
 #[test]
 fn bad_input_is_refused_in_a_sentence() {
     let refused = |arguments: &[&str], words: &str| {

@@ -66,7 +66,7 @@ CONTRAST = """() => {
 # ten benches a page.
 SHEETS = [
     ("village", [], 11, ["cue: the head turns round", "bench 11, left, 21 cm, 1:18", "1.4 m south of the northern spectators"]),
-    ("village", ["--lang", "zh"], 11, ["提示： the head turns round", "11 号凳，左，21 厘米，1:18"]),
+    ("village", ["--lang", "zh"], 11, ["提示：the head turns round", "11 号凳，左，21 厘米，1:18"]),
     ("square", [], 4, ["right, quarter circle, 9.4 s", "2.5 m west of the well"]),
     ("paper", ["--benches", "1-20", "--offset", "01:00:00:00"], 4, ["STOP: bench 1 and bench 9 touch", "01:06:52:12"]),
     ("crossing", [], None, ["gold"]),

@@ -33,10 +33,13 @@ const BELOW_MAP: f64 = 2.5;
 const NAMES: f64 = 5.9;
 /// The size of letters, in millimetres: 8.3 points.
 const EM: f64 = 2.93;
+/// The size of letters and the height of a line in the table of the benches, which has its rows in one line.
+const SMALL: f64 = 0.85;
+const SMALL_LINE: f64 = 2.7;
 /// The widths of the columns of the two tables, in millimetres.
 const WAY: [f64; 4] = [22.0, 6.0, 51.0, 53.0];
 const CALLS: [f64; 4] = [22.0, 6.0, 66.0, 38.0];
-const TEAM: [f64; 4] = [11.0, 30.0, 43.0, 48.0];
+const TEAM: [f64; 4] = [11.0, 27.0, 50.0, 44.0];
 /// The digits of a scene's hash on a page.
 const DIGITS: usize = 8;
 
@@ -177,15 +180,15 @@ impl Tables<'_, '_> {
 
     /// Returns the rows for the crew: all cues, holds and calls, and the ways of heads and tails.
     fn calls(&self) -> Vec<Block> {
-        let mut rows = self.teller.calls();
+        let (mut rows, language) = (self.teller.calls(), self.wishes.language);
         for (number, dragon) in self.walk.dragons.iter().enumerate() {
             let name = &self.walk.ensemble().dragons()[number].name;
             let ends = [(0, ["head", "龙头"]), (dragon.benches.len() - 1, ["tail", "龙尾"])];
             for (bench, words) in ends.into_iter().take(dragon.benches.len()) {
                 let words = self.of(words);
-                let end = if name.is_empty() { words.to_owned() } else { format!("{name}: {words}") };
+                let end = if name.is_empty() { words.to_owned() } else { language.labelled(name, words) };
                 let own = self.teller.rows(number, (bench, bench)).into_iter().filter(|row| !row.place.is_empty());
-                rows.extend(own.map(|row| Row { what: format!("{end}: {}", row.what), ..row }));
+                rows.extend(own.map(|row| Row { what: language.labelled(&end, &row.what), ..row }));
             }
         }
         rows.sort_by(|one, other| one.time.total_cmp(&other.time));
@@ -199,8 +202,9 @@ impl Tables<'_, '_> {
     }
 
     fn row(&self, table: &'static str, cells: Vec<String>, widths: &[f64], least: f64) -> Block {
-        let lines = cells.iter().zip(widths).map(|(cell, width)| lines(cell, width - 1.1)).fold(1.0, f64::max);
-        Block::Row(table, cells, least.max(lines * LINE + ROW))
+        let (size, line) = if table == "team" { (SMALL, SMALL_LINE) } else { (1.0, LINE) };
+        let lines = cells.iter().zip(widths).map(|(cell, width)| lines(cell, (width - 1.1) / size)).fold(1.0, f64::max);
+        Block::Row(table, cells, least.max(lines * line + ROW))
     }
 
     /// Returns the least distance of the show in words.
@@ -217,7 +221,8 @@ impl Tables<'_, '_> {
             self.wishes.language.distance(near.distance),
             self.time(near.time),
         ];
-        format!("{} {}", self.of(["Nearest of all:", "全场最近："]), self.wishes.language.join(&nearest))
+        let language = self.wishes.language;
+        language.labelled(self.of(["Nearest of all", "全场最近"]), &language.join(&nearest))
     }
 }
 
@@ -232,7 +237,7 @@ impl Writer<'_, '_> {
     fn leader(&self, number: usize) -> Vec<String> {
         let name = &self.tables.walk.ensemble().dragons()[number].name;
         let title = self.tables.of(["Leader: the way of the head", "领队：龙头路线"]);
-        let title = if name.is_empty() { title.to_owned() } else { format!("{name}: {title}") };
+        let title = if name.is_empty() { title.to_owned() } else { self.tables.wishes.language.labelled(name, title) };
         let blocks = [self.picture(number, 0)].into_iter().chain(self.tables.way(number, (0, 0)));
         self.laid_out(&title, &self.tables.least(), blocks.collect())
     }
@@ -247,7 +252,7 @@ impl Writer<'_, '_> {
             Language::English => {
                 format!("The map has the trail of {drawn}. Two times: of the first and the last bench here.")
             }
-            Language::Chinese => format!("图中为{drawn}的路线。两个时刻：本页首尾两条板凳。"),
+            Language::Chinese => format!("图中为 {drawn}的路线。两个时刻：本页首尾两条板凳。"),
         };
         let tables = self.tables.way(number, (page.start, page.end - 1)).into_iter();
         let tables = tables.chain(self.tables.team(number, page));
@@ -309,7 +314,12 @@ impl Writer<'_, '_> {
             "calls" => (CALLS, [["Time", "时间"], ["", ""], ["What happens", "事项"], ["Notes", "备注"]]),
             _ => (
                 TEAM,
-                [["Bench", "板凳"], ["Names", "姓名"], ["Nearest bench", "最近的板凳"], ["Nearest thing", "最近的物"]],
+                [
+                    ["Bench", "板凳"],
+                    ["Names", "姓名"],
+                    ["Nearest bench (within 1 m)", "最近的板凳（1 米内）"],
+                    ["Nearest thing", "最近的物"],
+                ],
             ),
         };
         let columns: Vec<String> = widths.iter().map(|width| format!("<col style=\"width:{width}mm\">")).collect();

@@ -98,7 +98,7 @@ impl<'w, 'a> Teller<'w, 'a> {
                 told = Some(if is_steady { least } else { greatest });
             }
             let same = rear.stretches.iter().find(|other| other.piece == stretch.piece && other.time > 0.0);
-            let place = if at == 0 { format!("{} {place}", self.language.of(["stand", "站在"])) } else { place };
+            let place = if at == 0 { self.language.stand(&place) } else { place };
             rows.push(Row {
                 time: stretch.time,
                 last: same.map(|other| other.time).filter(|_| first != last && at > 0),
@@ -116,8 +116,8 @@ impl<'w, 'a> Teller<'w, 'a> {
     pub fn calls(&self) -> Vec<Row> {
         let row = |time, what, place| Row { time, last: None, mark: None, what, place };
         let cue = |cue: &bench_dragon_show::ReachedCue| {
-            let call = if cue.pauses { ["HOLD until go:", "停候口令："] } else { ["cue:", "提示："] };
-            row(cue.time, format!("{} {}", self.language.of(call), cue.name), String::new())
+            let call = self.language.of(if cue.pauses { ["HOLD until go", "停候口令"] } else { ["cue", "提示"] });
+            row(cue.time, self.language.labelled(call, &cue.name), String::new())
         };
         let cues = self.walk.cues.iter().map(cue);
         let event = |event: &crate::walk::Happening| {
@@ -133,7 +133,7 @@ impl<'w, 'a> Teller<'w, 'a> {
         cues.chain(self.walk.events.iter().map(event)).collect()
     }
 
-    /// Returns who comes nearest to a bench.
+    /// Returns who comes nearest to a bench, when, and the span in which it is near.
     pub fn near(&self, near: &Near, clock: &dyn Fn(f64) -> String) -> String {
         let side = match near.side {
             Side::Left => ["left", "左"],
@@ -141,12 +141,10 @@ impl<'w, 'a> Teller<'w, 'a> {
             Side::Ahead => ["ahead", "前"],
             Side::Behind => ["behind", "后"],
         };
-        let parts = [
-            self.bench(near.other),
-            self.language.of(side).to_owned(),
-            self.language.distance(near.distance),
-            clock(near.time),
-        ];
+        let [time, from, until] = [near.time, near.span.0, near.span.1].map(clock);
+        let when = if from == until { time } else { self.language.within(&time, &from, &until) };
+        let (who, side) = (self.bench(near.other), self.language.of(side).to_owned());
+        let parts = [who, side, self.language.distance(near.distance), when];
         self.language.join(&parts)
     }
 

@@ -60,6 +60,24 @@ impl Language {
         parts.join(self.of([", ", "，"]))
     }
 
+    /// Returns a text behind a label.
+    pub(crate) fn labelled(self, label: &str, text: &str) -> String {
+        self.pick(format!("{label}: {text}"), format!("{label}：{text}"))
+    }
+
+    /// Returns the place at which benches stand at the start.
+    pub(crate) fn stand(self, place: &str) -> String {
+        let chinese =
+            if place.starts_with('在') { format!("站{place}") } else { format!("站在{}", Self::set_off(place)) };
+        self.pick(format!("stand {place}"), chinese.trim_end().to_owned())
+    }
+
+    /// Returns a text within Chinese: a space stands between its Latin letters or numbers and Chinese ones.
+    fn set_off(text: &str) -> String {
+        let space = |letter: Option<char>| letter.filter(char::is_ascii).map_or("", |_| " ");
+        format!("{}{text}{}", space(text.chars().next()), space(text.chars().next_back()))
+    }
+
     /// Returns benches of a dragon, whose name may be empty.
     pub(crate) fn benches(self, dragon: &str, first: usize, last: usize) -> String {
         match (first == last, dragon.is_empty()) {
@@ -117,12 +135,15 @@ impl Language {
     pub(crate) fn beside(self, landmark: &str, away: Vector) -> String {
         let distance = away.norm();
         if distance < 0.05 {
-            return self.pick(format!("at the {landmark}"), format!("在{landmark}"));
+            return self.pick(format!("at the {landmark}"), format!("在{}", Self::set_off(landmark).trim_end()));
         }
         let eighth = (away.y.atan2(away.x) / std::f64::consts::FRAC_PI_4).round() as i64;
         let compass = self.of(COMPASS[eighth.rem_euclid(8) as usize]);
         let metres = rounded(distance, 1);
-        self.pick(format!("{metres} m {compass} of the {landmark}"), format!("{landmark}以{compass} {metres} 米"))
+        self.pick(
+            format!("{metres} m {compass} of the {landmark}"),
+            format!("{}以{compass} {metres} 米", Self::set_off(landmark).trim_start()),
+        )
     }
 
     /// Returns a distance that is never said longer than it is: centimetres below a metre.
@@ -139,6 +160,11 @@ impl Language {
                 self.pick(format!("{count} m"), format!("{count} 米"))
             }
         }
+    }
+
+    /// Returns a time and the span about it.
+    pub(crate) fn within(self, time: &str, from: &str, until: &str) -> String {
+        self.pick(format!("{time} ({from}\u{2013}{until})"), format!("{time}（{from}\u{2013}{until}）"))
     }
 
     /// Returns an event of the show.
@@ -170,6 +196,15 @@ mod tests {
         assert_eq!(feet(-0.125, None), "right, an eighth of a circle");
         assert_eq!(feet(0.4, Some(12.4)), "left, 144 degrees, 12 s");
         assert_eq!(Language::Chinese.feet(Feet::Circle, 10.0, 0.4, Some(12.4)), "向左转 144 度，12 秒");
+    }
+
+    #[test]
+    fn latin_letters_are_set_off_from_chinese_ones() {
+        let chinese = Language::Chinese;
+        assert_eq!(chinese.beside("well", Vector::new(0.0, 3.2)), "well 以北 3.2 米");
+        assert_eq!(chinese.beside("水井", Vector::new(0.0, 3.2)), "水井以北 3.2 米");
+        assert_eq!(chinese.stand(&chinese.beside("well", Vector::zeros())), "站在 well");
+        assert_eq!(chinese.labelled("提示", "lamps"), "提示：lamps");
     }
 
     #[test]

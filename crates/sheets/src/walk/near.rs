@@ -11,10 +11,11 @@ use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::{circle_bound_board_board, signed_distance_board_board};
 use bench_dragon_motion::solve::{Chain, Positions, Solver};
+use bench_dragon_show::solve_at_or_just_before;
 
 use super::Searched;
 
-/// The distance in metres within which another board is near.
+/// The distance within which another board is near, in metres.
 const NEAR: f64 = 1.0;
 /// The golden sections of a search between two samples: they narrow it to a thousandth.
 const SECTIONS: usize = 15;
@@ -44,6 +45,9 @@ pub struct Near {
     pub time: f64,
     /// The side on which the other bench is.
     pub side: Side,
+    /// The seconds from which, and until which, the other bench is within a metre without a break; of an obstacle the
+    /// time alone.
+    pub span: (f64, f64),
 }
 
 /// The least distances so far.
@@ -103,7 +107,8 @@ impl<'a> Nearest<'a> {
                     let clearance = obstacle.clearance_below(board, least);
                     if clearance < least {
                         let distance = clearance + obstacle.keep_out;
-                        self.obstacles[bench] = Some(Near { other: number, distance, time, side: Side::Ahead });
+                        let (side, span) = (Side::Ahead, (time, time));
+                        self.obstacles[bench] = Some(Near { other: number, distance, time, side, span });
                     }
                 }
             }
@@ -128,7 +133,8 @@ impl<'a> Nearest<'a> {
         for (k, (own, far)) in [(one, other), (other, one)].into_iter().enumerate() {
             if distance < least[k] {
                 let side = side(&boards[own], &boards[far]);
-                self.boards[self.benches[own].0] = Some(Near { other: self.benches[far].0, distance, time, side });
+                let (other, span) = (self.benches[far].0, (time, time));
+                self.boards[self.benches[own].0] = Some(Near { other, distance, time, side, span });
             }
         }
     }
@@ -145,7 +151,7 @@ impl<'a> Nearest<'a> {
         let mut chain = Chain::new(self.ensemble.handles());
         let mut known: HashMap<(usize, usize, u64), (f64, f64)> = HashMap::new();
         for (index, (bench, dragon)) in self.benches.clone().into_iter().enumerate() {
-            if progress(index as f64 / self.benches.len() as f64).is_break() {
+            if progress(0.5 * index as f64 / self.benches.len() as f64).is_break() {
                 break;
             }
             if let Some(near) = self.boards[bench] {
@@ -172,6 +178,7 @@ impl<'a> Nearest<'a> {
             }
         }
         self.take(searched, end, solver, &mut chain);
+        self.find_spans((step, end), solver, &mut chain, &mut |share| progress(0.5 + 0.5 * share));
         self.boards.into_iter().zip(self.obstacles).collect()
     }
 
@@ -187,7 +194,7 @@ impl<'a> Nearest<'a> {
                     if is_less {
                         let side = side(&boards[k], &boards[1 - k]);
                         let (other, distance, time) = (benches[1 - k], found.least.value, found.time);
-                        self.boards[benches[k]] = Some(Near { other, distance, time, side });
+                        self.boards[benches[k]] = Some(Near { other, distance, time, side, span: (time, time) });
                     }
                 }
             }
@@ -196,8 +203,42 @@ impl<'a> Nearest<'a> {
             let bench = found.least.bench as usize;
             if self.obstacles[bench].is_none_or(|near| found.least.value <= self.beyond(&near)) {
                 let distance = found.least.value + self.ensemble.ground().obstacles()[found.obstacle].keep_out;
-                let near = Near { other: found.obstacle, distance, time: found.time, side: Side::Ahead };
+                let (time, side) = (found.time, Side::Ahead);
+                let near = Near { other: found.obstacle, distance, time, side, span: (time, time) };
                 self.obstacles[bench] = Some(near);
+            }
+        }
+    }
+
+    /// Finds of each bench the span about its least distance in which the other bench is near, true to a sample.
+    fn find_spans(
+        &mut self,
+        (step, end): (f64, f64),
+        solver: &mut dyn Solver,
+        chain: &mut Chain,
+        progress: Progress<'_>,
+    ) {
+        let mut began: Vec<Option<f64>> = vec![None; self.benches.len()];
+        let samples = (end / step).ceil() as usize;
+        for sample in 0..=samples {
+            let time = (sample as f64 * step).min(end);
+            let share = sample as f64 / (samples + 1) as f64;
+            if progress(share).is_break() || solve_at_or_just_before(solver, time, chain).is_err() {
+                return;
+            }
+            let boards: Vec<Board> = self.benches.iter().map(|bench| self.board(chain, *bench)).collect();
+            for (index, (bench, _)) in self.benches.iter().enumerate() {
+                let Some(near) = &mut self.boards[*bench] else { continue };
+                // A dragon has one handle more than benches.
+                let dragon = self.ensemble.owner(near.other).map_or(0, |(dragon, _)| dragon);
+                let (own, other) = (&boards[index], &boards[near.other - dragon]);
+                let is_near =
+                    circle_bound_board_board(own, other) < NEAR && signed_distance_board_board(own, other) < NEAR;
+                began[index] = is_near.then(|| began[index].unwrap_or(time));
+                // The last span that has begun by the time of the least distance.
+                if let Some(from) = began[index].filter(|from| *from <= near.time + step) {
+                    near.span = (from.min(near.time), time.max(near.time));
+                }
             }
         }
     }
