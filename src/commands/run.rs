@@ -12,7 +12,7 @@ use bench_dragon::publisher::live::show_source::ShowSource;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
 use bench_dragon::publisher::log::lines::ShowLine;
 use bench_dragon::publisher::log::{self as recording_log, LogOutcome};
-use bench_dragon::publisher::run::{Hooks, Publishing};
+use bench_dragon::publisher::run::{Hooks, Publishing, open_transports};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
 use bench_dragon::show::convert;
 use bench_dragon::show::results::event_sentence;
@@ -21,7 +21,7 @@ use bench_dragon::show::{Playback, ReachedCue, Show};
 use bench_dragon::soak::histograms::HistogramLog;
 
 use super::parent::Parent;
-use super::publishing::{new_run_id, open_transports, print_summary, publish};
+use super::publishing::{new_run_id, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};

@@ -94,14 +94,16 @@ impl PublisherConfig {
 /// The services of a run.
 struct Iceoryx2 {
     config: PublisherConfig,
-    control: Option<control::ControlThread>,
+    _control: control::ControlThread,
 }
 
-/// Creates the transport, for every scene, and starts the thread that removes [`stale_files`]. Opens no service yet.
+/// Creates the transport, and starts the thread that removes [`stale_files`] and the thread that serves commands. Opens
+/// no other service yet: the service of commands is the claim of the name.
 ///
 /// # Errors
-/// [`TransportError::IllegalName`] for a name that iceoryx2 cannot take.
-pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
+/// [`TransportError::IllegalName`] for a name that iceoryx2 cannot take, [`TransportError::NameInUse`] for one that
+/// another show has.
+pub fn open(config: &TransportConfig, commands: CommandSender) -> Result<Box<dyn Transport>, TransportError> {
     let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, scene, stage } = *config;
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
@@ -117,7 +119,8 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
         stage: stage.clone(),
     };
     config.queue = queue.unwrap_or_else(|| default_queue(&config));
-    Ok(Some(Box::new(Iceoryx2 { config, control: None })))
+    let control = control::ControlThread::start(name, commands)?;
+    Ok(Box::new(Iceoryx2 { config, _control: control }))
 }
 
 impl Transport for Iceoryx2 {
@@ -136,13 +139,8 @@ impl Transport for Iceoryx2 {
         Ok(Box::new(SharedMemoryPublisher::open(&self.config)?))
     }
 
-    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
-        Ok(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?))
-    }
-
-    fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
-        self.control = Some(control::ControlThread::start(&self.config.name, commands)?);
-        Ok(None)
+    fn status(&mut self) -> Result<Option<Box<dyn StatusPublisher>>, TransportError> {
+        Ok(Some(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?)))
     }
 
     fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
@@ -219,7 +217,7 @@ pub struct SharedMemoryPublisher {
 
 impl SharedMemoryPublisher {
     /// Opens the services and sends the stage and the scene. Must be called on the thread that publishes. The caller
-    /// ensures that no other show has the name: a run calls [`Transport::control`] first.
+    /// ensures that no other show has the name: a run calls [`open`] first.
     ///
     /// # Errors
     /// [`OpenError`]: each names the cause and the remedy.
