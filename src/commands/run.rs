@@ -9,6 +9,7 @@ use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::publisher::live::show_source::ShowSource;
+use bench_dragon::publisher::live::statistics::histogram_log::HistogramLog;
 use bench_dragon::publisher::log::arithmetic::Arithmetic;
 use bench_dragon::publisher::log::lines::ShowLine;
 use bench_dragon::publisher::log::{self as recording_log, LogOutcome};
@@ -18,7 +19,6 @@ use bench_dragon::show::convert;
 use bench_dragon::show::results::event_sentence;
 use bench_dragon::show::scene::{Accepted, AtEnd, Scene, SceneText};
 use bench_dragon::show::{Playback, ReachedCue, Show};
-use bench_dragon::soak::histograms::HistogramLog;
 
 use super::parent::Parent;
 use super::publishing::{new_run_id, print_summary, publish};
