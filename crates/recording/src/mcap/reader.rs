@@ -19,10 +19,10 @@ use mcap::{Channel, parse_record};
 use serde::de::DeserializeOwned;
 
 use super::bag::recordings_of;
+use super::chunk::records_of_chunk;
 use super::error::ReadError;
 use super::index::{Index, index, told};
 use super::layout_history::layouts;
-use super::recover::records_of_chunk;
 use super::run::SCENE_ATTACHMENT;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::settings::Topic;
