@@ -13,6 +13,7 @@ use bench_dragon::chase::live::{Chase, ChaseError, Leader, Notice, TimecodeLeade
 use bench_dragon::chase::psn::USUAL_GROUP;
 use bench_dragon::chase::schedule::Schedule;
 use bench_dragon::chase::sources::{self, Input, SourceError};
+use bench_dragon::chase::status::ChaseStatusError;
 use bench_dragon::chase::timecode::{FrameRate, Label};
 use bench_dragon::chase::track::Track;
 use bench_dragon::client::connection::Wake;
@@ -25,7 +26,6 @@ use bench_dragon::messages::sentence::chase_sentence;
 use bench_dragon::motion::Motion;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::proof::scene_hash;
-use bench_dragon::publisher::transports::iceoryx2::chase_status::ChaseStatusError;
 use bench_dragon::show::scene::{Scene, SceneText};
 
 use super::scene_argument::scene_argument;

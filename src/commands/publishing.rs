@@ -1,4 +1,4 @@
-//! The part that `run` and `replay` share: the list of transports, the lines for alerts and cues, the summary.
+//! The part that `run` and `replay` share: the lines for alerts and cues, the summary.
 
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
@@ -12,8 +12,8 @@ use bench_dragon::messages::sentence::{Figures, alert_sentence, cue_sentence};
 use bench_dragon::publisher::live::control::CommandQueues;
 use bench_dragon::publisher::live::statistics::{RunSummary, Sample, Summary};
 use bench_dragon::publisher::live::{Announcement, End, FrameSource, LoopCounts, TransportCounters};
-use bench_dragon::publisher::run::{self, Hooks, Published, Publishing, RunError};
-use bench_dragon::publisher::transports::{self, Transport, TransportConfig, TransportError};
+use bench_dragon::publisher::run::{Hooks, Published, Publishing, RunError};
+use bench_dragon::publisher::transports::{Transport, TransportError};
 
 use super::lines::Lines;
 use super::service_manager::{self, ServiceManager};
@@ -22,14 +22,6 @@ use super::{CommandError, Common, Output, severity_colour, shows_colour};
 /// Returns a new run number.
 pub fn new_run_id() -> u64 {
     RandomState::new().hash_one(realtime_ns())
-}
-
-/// All transports of this program.
-const TRANSPORTS: [transports::Open; 1] = [transports::iceoryx2::open];
-
-/// Opens the transports that `config` requests. Returns them with the loop's ends of their command queues.
-pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transport>>, CommandQueues), CommandError> {
-    Ok(run::open_transports(config, &TRANSPORTS)?)
 }
 
 /// Publishes, and prints alerts and cues with the names of `stage` on standard error.

@@ -7,7 +7,7 @@ use bench_dragon::client::shared_memory::service_name;
 use bench_dragon::messages::sentence::rounded;
 use bench_dragon::messages::{Stage, StageMessage};
 use bench_dragon::publisher::live::End;
-use bench_dragon::publisher::run::{Hooks, Publishing};
+use bench_dragon::publisher::run::{Hooks, Publishing, open_transports};
 use bench_dragon::publisher::transports::{Transport, TransportConfig};
 use bench_dragon::recording::mcap::ReadError;
 use bench_dragon::recording::replay::{Pace, Prepared, ReplayOptions};
@@ -15,7 +15,7 @@ use bench_dragon::ros2_messages::settings::Topic;
 use bench_dragon::show::scene::{Accepted, Scene};
 use jiff::{Timestamp, Unit};
 
-use super::publishing::{new_run_id, open_transports, print_summary, publish};
+use super::publishing::{new_run_id, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};

@@ -3,7 +3,7 @@
 //! [`artnet`], [`mtc`], [`ltc`] and [`psn`] decode bytes from outside, and [`timecode`] counts labels. [`synchronizer`]
 //! and [`filter`] turn readings into a position that runs evenly, [`schedule`] turns that into a simulated time, and
 //! [`steering`] turns it into commands. All of these are pure. [`track`] projects a tracked performer on the path.
-//! [`sources`] has the sockets and streams, and [`live`] the chase itself, which publishes its status.
+//! [`sources`] has the sockets and streams, and [`live`] the chase itself, which publishes its [`status`].
 //!
 //! In the other direction a show is the [`master`]: its frames become timecode.
 
@@ -16,6 +16,7 @@ pub mod mtc;
 pub mod psn;
 pub mod schedule;
 pub mod sources;
+pub mod status;
 pub mod steering;
 pub mod synchronizer;
 pub mod timecode;

@@ -13,10 +13,10 @@ use bench_dragon_messages::chase::{ChaseSource, ChaseState};
 use bench_dragon_messages::control::Command;
 use bench_dragon_messages::{ChaseStatus, FrameHeader};
 use bench_dragon_motion::model::Point;
-use bench_dragon_publisher::transports::iceoryx2::chase_status::{ChaseStatusError, ChaseStatusSender};
 
 use crate::schedule::Schedule;
 use crate::sources::Input;
+use crate::status::{ChaseStatusError, ChaseStatusSender};
 use crate::steering::{Goal, Limits, Steering, Waiting};
 use crate::synchronizer::{Motion, Options, Reading, Synchronizer};
 use crate::timecode::{FrameRate, Label};

@@ -3,6 +3,7 @@
 mod error;
 mod memory;
 mod own_files;
+pub mod sender;
 pub mod stale_files;
 
 use std::io::ErrorKind;

@@ -23,11 +23,11 @@ use std::time::{Duration, Instant};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::live::{LoopCounts, Outgoing, PublishError, Publisher, StatusPublisher, TransportCounters};
+use crate::live::{LoopCounts, Outgoing, PublishError, Publisher, TransportCounters};
 use crate::transports::{Transport, TransportError};
+use bench_dragon_messages::QUEUE_BYTES;
 use bench_dragon_messages::control::{Code, Command, CommandRecord};
 use bench_dragon_messages::sentence::not_writable;
-use bench_dragon_messages::{LoopStatus, QUEUE_BYTES};
 use hash::{HANDLE_WORDS, HEADER_WORDS, columns, header_words};
 use lines::ShowLine;
 use writer::LogWriter;
@@ -97,9 +97,6 @@ struct Log {
     shared: Arc<LogState>,
     thread: JoinHandle<()>,
 }
-
-/// A destination that ignores the status: a log has none.
-struct NoStatus;
 
 /// Creates the file and starts its thread.
 ///
@@ -224,10 +221,6 @@ impl Publisher for LogPublisher {
     }
 }
 
-impl StatusPublisher for NoStatus {
-    fn publish_status(&mut self, _: &LoopStatus) {}
-}
-
 impl Transport for Log {
     fn describe(&self) -> String {
         format!("Log of commands and of a hash a second: {}", self.file.display())
@@ -238,10 +231,6 @@ impl Transport for Log {
             Some(publisher) => Ok(Box::new(publisher)),
             None => Err(TransportError::Failed("the log's publisher is taken".to_owned())),
         }
-    }
-
-    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
-        Ok(Box::new(NoStatus))
     }
 
     fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {

@@ -18,7 +18,7 @@ use crate::live::{
     Announcement, FrameSource, LoopCounts, LoopOptions, PublishError, Publisher, StatusPublisher, TransportCounters,
     run_loop,
 };
-use crate::transports::{self, Transport, TransportConfig, TransportError};
+use crate::transports::{Transport, TransportConfig, TransportError, iceoryx2};
 
 /// The time between two calls of [`Publisher::maintain`] before the first frame, in nanoseconds.
 const LEAD_INTERVAL_NS: u64 = 10_000_000;
@@ -40,23 +40,14 @@ pub enum RunError {
     Thread(&'static str),
 }
 
-/// Opens the transports that `config` requests. Returns them with the loop's ends of their command queues.
+/// Opens the transport that every show has, with its service of commands. Returns it with the loop's end of the command
+/// queue.
 ///
 /// # Errors
-/// The first [`TransportError`]
-pub fn open_transports(
-    config: &TransportConfig,
-    known: &[transports::Open],
-) -> Result<(Vec<Box<dyn Transport>>, CommandQueues), TransportError> {
-    let mut transports = transports::open(config, known)?;
-    let mut ports = Vec::new();
-    for transport in &mut transports {
-        let (port, outer) = command_queue();
-        if transport.control(outer)?.is_none() {
-            ports.push(port);
-        }
-    }
-    Ok((transports, CommandQueues::new(ports)))
+/// [`TransportError`]
+pub fn open_transports(config: &TransportConfig) -> Result<(Vec<Box<dyn Transport>>, CommandQueues), TransportError> {
+    let (port, commands) = command_queue();
+    Ok((vec![iceoryx2::open(config, commands)?], CommandQueues::new(vec![port])))
 }
 
 /// The settings of a publisher's run.
@@ -220,7 +211,7 @@ impl Publishing<'_> {
         done: &AtomicBool,
     ) -> Result<(Summary, Vec<Box<dyn Transport>>), RunError> {
         let sinks: Vec<Box<dyn StatusPublisher>> =
-            transports.iter_mut().map(|transport| transport.status()).collect::<Result<_, _>>()?;
+            transports.iter_mut().filter_map(|transport| transport.status().transpose()).collect::<Result<_, _>>()?;
         let Self { run_id, rate, scene, .. } = *self;
         let run = statistics::Run { run_id, rate, scene, sinks, announce, record, alive };
         Ok((statistics::collect(clock, inbox, run, done), transports))
@@ -294,11 +285,11 @@ mod tests {
             Ok(Box::new(Ends(self.log.clone())))
         }
 
-        fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
+        fn status(&mut self) -> Result<Option<Box<dyn StatusPublisher>>, TransportError> {
             if !self.has_status {
                 return Err(TransportError::Failed("no status".to_owned()));
             }
-            Ok(Box::new(Ends(self.log.clone())))
+            Ok(Some(Box::new(Ends(self.log.clone()))))
         }
 
         fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {

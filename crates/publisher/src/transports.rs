@@ -1,11 +1,10 @@
 //! The transports.
 //!
-//! In: a [`TransportConfig`]. Out: for each requested transport, a [`Publisher`] for the loop's thread and a
-//! [`StatusPublisher`] for the statistics thread. Transports know messages, but no solver and not each other.
+//! In: a [`TransportConfig`]. Out: for each transport, a [`Publisher`] for the loop's thread and a [`StatusPublisher`]
+//! for the statistics thread. Transports know messages, but no solver and not each other.
 
 pub mod iceoryx2;
 
-use crate::live::control::CommandSender;
 use crate::live::{Publisher, StatusPublisher, TransportCounters};
 use bench_dragon_client::shared_memory::OpenError;
 use bench_dragon_messages::StageMessage;
@@ -100,31 +99,14 @@ pub trait Transport: Send {
     fn publisher(&mut self) -> Result<Box<dyn Publisher>, TransportError>;
 
     /// Opens the end of the statistics, on the statistics thread, after [`publisher`](Self::publisher). Called once.
+    /// Returns `None` if the transport does not publish the status.
     ///
     /// # Errors
     /// [`TransportError`]
-    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError>;
-
-    /// Serves commands on a thread of this transport and returns `None`. Returns `commands` if the transport has no
-    /// commands. Called once, before the loop's thread starts.
-    ///
-    /// # Errors
-    /// [`TransportError`]
-    fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
-        Ok(Some(commands))
+    fn status(&mut self) -> Result<Option<Box<dyn StatusPublisher>>, TransportError> {
+        Ok(None)
     }
 
     /// Shuts down after both ends are dropped. Returns its name and its counters, if it has a queue.
     fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)>;
-}
-
-/// Creates a transport. Returns `None` if the scene does not request it.
-pub type Open = fn(&TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError>;
-
-/// Opens the transports that the scene requests.
-///
-/// # Errors
-/// The first [`TransportError`]
-pub fn open(config: &TransportConfig, transports: &[Open]) -> Result<Vec<Box<dyn Transport>>, TransportError> {
-    transports.iter().filter_map(|open| open(config).transpose()).collect()
 }

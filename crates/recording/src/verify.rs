@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use crate::mcap::ReadError;
 use crate::mcap::reader::{Item, Recording, frame_of};
-use bench_dragon_publisher::log::verify::reference::Reference;
 use bench_dragon_show::scene::Scene;
+use bench_dragon_show::second_solver::SecondSolver;
 
 /// The result of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,7 +49,7 @@ pub fn compare(
     scene: &Scene,
     progress: &mut dyn FnMut(u64),
 ) -> Result<RecordingVerdict, ReadError> {
-    let mut reference = Reference::of(scene);
+    let mut reference = SecondSolver::of(scene);
     let (mut frames, mut difference) = (0, None);
     for chunk in 0..recording.chunks() {
         let mut read = Vec::new();

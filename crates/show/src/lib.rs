@@ -14,6 +14,7 @@ mod playback;
 pub mod requirements;
 pub mod results;
 pub mod scene;
+pub mod second_solver;
 pub mod table;
 #[cfg(test)]
 mod tests;

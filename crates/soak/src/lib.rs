@@ -11,7 +11,6 @@ pub mod conducting;
 mod conformance;
 pub mod figures;
 pub mod fleet;
-pub mod histograms;
 pub mod history;
 mod junit;
 pub mod limits;

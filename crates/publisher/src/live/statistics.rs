@@ -2,9 +2,11 @@
 //!
 //! In: samples, alerts and cues from queues. Out: [`LoopStatus`] to every [`StatusPublisher`], alerts and cues to the
 //! caller, a [`Summary`]. All this runs on a thread of its own, so that the loop's thread computes no percentile, reads
-//! no file and prints no line. [`accumulator`] does the arithmetic.
+//! no file and prints no line. [`accumulator`] does the arithmetic, [`histogram_log`] writes the distributions to a
+//! file.
 
 pub mod accumulator;
+pub mod histogram_log;
 #[cfg(test)]
 mod tests;
 

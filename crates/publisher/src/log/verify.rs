@@ -3,10 +3,9 @@
 //! In: the lines of a log. Out: a [`Verdict`], or a [`VerifyError`] that names the line. The code of `run` computes the
 //! show, with the instructions that the log names. If this machine lacks these instructions, or has another
 //! architecture or other elementary functions, different bits prove nothing. Then the handles in the line of each
-//! second with other bits are compared with those of a second solver ([`mod@reference`]).
+//! second with other bits are compared with those of a [second solver](bench_dragon_show::second_solver).
 
 mod player;
-pub mod reference;
 
 use std::io::{BufRead, Read};
 
@@ -14,7 +13,6 @@ use serde::Serialize;
 
 use super::lines::{FORMAT, HashChain, Line, ShowLine};
 use bench_dragon_motion::solve::table::Instructions;
-use bench_dragon_motion::{Method, Motion};
 use bench_dragon_show::scene::{Accepted, Scene, printable};
 use player::Player;
 
@@ -158,19 +156,6 @@ fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, Ve
 /// Returns the scene computed with these instructions, one set for each dragon.
 fn with_instructions(scene: Scene, sets: &[Instructions]) -> Scene {
     Scene { ensemble: scene.ensemble.with_instructions(sets).unwrap_or(scene.ensemble), ..scene }
-}
-
-/// Returns the distance in metres that two exact solutions may have besides their rounding.
-fn accuracy_of(motion: &Motion) -> f64 {
-    /// The least tolerance.
-    const LEAST: f64 = 1e-12;
-    /// The error that rounding causes in the bisection of the paper's rules.
-    const PAPER: f64 = 1e-9;
-    match motion.method() {
-        Method::Accuracy(accuracy) => accuracy.max(LEAST),
-        Method::Paper(_) => PAPER,
-        Method::Newton | Method::FollowerTable => LEAST,
-    }
 }
 
 /// The lines of a file.

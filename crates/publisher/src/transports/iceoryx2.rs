@@ -11,7 +11,6 @@
 //! killed process does not block the name, while a stopped process keeps it. A claim without a file keeps it too where
 //! another program removes the show's files. The other services admit a second publisher, for a tunnel to other machines.
 
-pub mod chase_status;
 mod claim;
 mod control;
 mod frames;
@@ -22,16 +21,14 @@ use std::time::{Duration, Instant};
 
 use ::iceoryx2::port::SendError;
 use ::iceoryx2::port::notifier::Notifier;
-use ::iceoryx2::port::publisher::Publisher as Port;
 use ::iceoryx2::port::update_connections::UpdateConnections;
 use ::iceoryx2::prelude::*;
 use ::iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
-use ::iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
-use ::iceoryx2::service::port_factory::{event, publish_subscribe};
+use ::iceoryx2::service::port_factory::event;
 
+use bench_dragon_client::shared_memory::sender::{SMALL_QUEUE, SPARE_NODES, Sender, Service, sender};
 use bench_dragon_client::shared_memory::{
-    MOST_PUBLISHERS, OpenError, failed, incomplete, node, port_error, reserve_pages, service_error, service_name,
-    stale_files,
+    OpenError, failed, incomplete, node, reserve_pages, service_name, stale_files,
 };
 
 use super::{Transport, TransportConfig, TransportError};
@@ -50,11 +47,6 @@ use queues::{check_room, default_queue};
 /// The interval at which the stage, the scene, the latest alert and the latest cue are retransmitted to a tunnel. A
 /// tunnel keeps no history for machines that join later.
 const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
-/// The nodes that may have a service open besides one for each subscriber: the publisher's, and dead nodes that are not
-/// removed yet.
-const SPARE_NODES: usize = 32;
-/// Alerts and statuses that a subscriber may fall behind.
-const SMALL_QUEUE: usize = 16;
 /// The time for which an incomplete service may block a publisher; [`stale_files`] removes it earlier.
 const PATIENCE: Duration = Duration::from_secs(6);
 
@@ -94,14 +86,16 @@ impl PublisherConfig {
 /// The services of a run.
 struct Iceoryx2 {
     config: PublisherConfig,
-    control: Option<control::ControlThread>,
+    _control: control::ControlThread,
 }
 
-/// Creates the transport, for every scene, and starts the thread that removes [`stale_files`]. Opens no service yet.
+/// Creates the transport, and starts the thread that removes [`stale_files`] and the thread that serves commands. Opens
+/// no other service yet: the service of commands is the claim of the name.
 ///
 /// # Errors
-/// [`TransportError::IllegalName`] for a name that iceoryx2 cannot take.
-pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, TransportError> {
+/// [`TransportError::IllegalName`] for a name that iceoryx2 cannot take, [`TransportError::NameInUse`] for one that
+/// another show has.
+pub fn open(config: &TransportConfig, commands: CommandSender) -> Result<Box<dyn Transport>, TransportError> {
     let TransportConfig { name, handles, alerts, cues, single_precision, queue, subscribers, scene, stage } = *config;
     service_name(name, "poses")?;
     stale_files::spawn_reaper();
@@ -117,7 +111,8 @@ pub fn open(config: &TransportConfig) -> Result<Option<Box<dyn Transport>>, Tran
         stage: stage.clone(),
     };
     config.queue = queue.unwrap_or_else(|| default_queue(&config));
-    Ok(Some(Box::new(Iceoryx2 { config, control: None })))
+    let control = control::ControlThread::start(name, commands)?;
+    Ok(Box::new(Iceoryx2 { config, _control: control }))
 }
 
 impl Transport for Iceoryx2 {
@@ -136,24 +131,14 @@ impl Transport for Iceoryx2 {
         Ok(Box::new(SharedMemoryPublisher::open(&self.config)?))
     }
 
-    fn status(&mut self) -> Result<Box<dyn StatusPublisher>, TransportError> {
-        Ok(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?))
-    }
-
-    fn control(&mut self, commands: CommandSender) -> Result<Option<CommandSender>, TransportError> {
-        self.control = Some(control::ControlThread::start(&self.config.name, commands)?);
-        Ok(None)
+    fn status(&mut self) -> Result<Option<Box<dyn StatusPublisher>>, TransportError> {
+        Ok(Some(Box::new(StatusSender::open(&self.config.name, self.config.subscribers)?)))
     }
 
     fn finish(self: Box<Self>) -> Option<(&'static str, TransportCounters)> {
         None
     }
 }
-
-type Service<Payload, Header> = publish_subscribe::PortFactory<ipc::Service, Payload, Header>;
-type Sender<Payload, Header> = Port<ipc::Service, Payload, Header>;
-/// A port, and its service.
-type Opened<Message> = (Sender<Message, ()>, Service<Message, ()>);
 
 /// Publishes frames, alerts, cues, the stage and the scene.
 ///
@@ -219,7 +204,7 @@ pub struct SharedMemoryPublisher {
 
 impl SharedMemoryPublisher {
     /// Opens the services and sends the stage and the scene. Must be called on the thread that publishes. The caller
-    /// ensures that no other show has the name: a run calls [`Transport::control`] first.
+    /// ensures that no other show has the name: a run calls [`open`] first.
     ///
     /// # Errors
     /// [`OpenError`]: each names the cause and the remedy.
@@ -390,45 +375,6 @@ impl StatusPublisher for StatusSender {
             log::warn!("the status could not be sent: {error}");
         }
     }
-}
-
-/// Opens a service of single messages, and a port to it. The last message is kept for late subscribers.
-fn sender<Message: ZeroCopySend + std::fmt::Debug + Copy>(
-    node: &Node<ipc::Service>,
-    name: &str,
-    service: &str,
-    subscribers: usize,
-    queue: usize,
-) -> Result<Opened<Message>, OpenError> {
-    let full_name = service_name(name, service)?;
-    let open = |queue| {
-        node.service_builder(&full_name)
-            .publish_subscribe::<Message>()
-            .max_publishers(MOST_PUBLISHERS)
-            .max_subscribers(subscribers)
-            .max_nodes(subscribers + SPARE_NODES)
-            .subscriber_max_buffer_size(queue)
-            .history_size(1)
-            .enable_safe_overflow(true)
-            .open_or_create()
-    };
-    let opened = match open(queue) {
-        // A subscriber of a scene with fewer cues keeps its service open.
-        Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
-            PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize,
-        )) if queue > SMALL_QUEUE => {
-            log::warn!("a subscriber keeps \"{full_name}\" open with shorter queues than {queue}: those are used");
-            open(SMALL_QUEUE)
-        }
-        made => made,
-    };
-    let opened = opened.map_err(|error| service_error(&full_name, error))?;
-    let port = opened
-        .publisher_builder()
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create()
-        .map_err(|error| port_error(name, service, error))?;
-    Ok((port, opened))
 }
 
 /// Retries while a service is incomplete. Its creator either completes it or was killed; then [`stale_files`] removes

@@ -1,4 +1,8 @@
 //! The index at the end of a recording: its channels and chunks.
+//!
+//! The `SummaryReader` of mcap 0.26.0 reads the same records. It does not compare them with their check, so that a
+//! recording would be played without a chunk that a damaged index does not list. It also reads chunks and attachments
+//! here, whose parsers panic where damaged lengths do not agree.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;

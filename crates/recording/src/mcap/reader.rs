@@ -19,10 +19,11 @@ use mcap::{Channel, parse_record};
 use serde::de::DeserializeOwned;
 
 use super::bag::recordings_of;
+use super::chunk::records_of_chunk;
 use super::error::ReadError;
 use super::index::{Index, index, told};
 use super::layout_history::layouts;
-use super::recover::records_of_chunk;
+use super::lengths::is_attachment;
 use super::run::SCENE_ATTACHMENT;
 use bench_dragon_messages::{CollisionAlert, Cue, FrameHeader, LoopStatus, StageMessage};
 use bench_dragon_ros2_messages::settings::Topic;
@@ -340,6 +341,9 @@ fn scene_text(file: &mut File, length: u64, attachments: &[AttachmentIndex]) -> 
     let Some(([op::ATTACHMENT, _, _, _, _, _, _, _, _], body)) = record.split_first_chunk() else {
         return Err(damaged("no attachment is where the index has one"));
     };
+    if !is_attachment(body) {
+        return Err(damaged("the lengths of an attachment do not agree"));
+    }
     match parse_record(op::ATTACHMENT, body) {
         Ok(Record::Attachment { data, .. }) => match String::from_utf8(data.into_owned()) {
             Ok(text) => Ok(Some(text)),
@@ -443,4 +447,36 @@ fn check_type(channel: &Channel<'_>, topic: Topic) -> Result<(), ReadError> {
     }
     let (found, own) = layouts(topic, found.values().flatten());
     Err(ReadError::Fields { topic: channel.topic.clone(), found, own })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::borrow::Cow;
+    use std::io::Cursor;
+
+    use mcap::{Attachment, Summary, Writer};
+
+    use super::*;
+
+    /// The index has a check, but a file may have an index without one.
+    #[test]
+    fn an_attachment_that_is_shorter_than_its_lengths_is_damaged() {
+        let mut writer = Writer::new(Cursor::new(Vec::new())).unwrap();
+        let (name, media_type) = (SCENE_ATTACHMENT.to_owned(), String::new());
+        let attachment = Attachment { log_time: 0, create_time: 0, name, media_type, data: Cow::Borrowed(b"text") };
+        writer.attach(&attachment).unwrap();
+        writer.finish().unwrap();
+        let mut bytes = writer.into_inner().into_inner();
+        let index = Summary::read(&bytes).unwrap().unwrap().attachment_indexes[0].clone();
+        let place = [index.offset, index.length].map(u64::to_le_bytes).concat();
+        let at = bytes.windows(place.len()).rposition(|window| window == place).unwrap();
+        // Without the text and the check of the attachment, and then without the check of the index.
+        bytes[at + 8..at + 16].copy_from_slice(&(index.length - 8).to_le_bytes());
+        let check = bytes.len() - 12;
+        bytes[check..check + 4].fill(0);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), &bytes).unwrap();
+        let read = Recording::open(file.path()).map(drop);
+        assert!(matches!(&read, Err(ReadError::Damaged { at, .. }) if *at == index.offset), "{read:?}");
+    }
 }

@@ -3,12 +3,12 @@
 use super::super::hash::{FrameHasher, columns, header_words};
 use super::super::lines::{Line, SecondLine, ShowLine, command_of};
 use super::super::writer::{sampled, second_of};
-use super::reference::Reference;
 use super::{Difference, Verdict};
 use bench_dragon_messages::control::Code;
 use bench_dragon_motion::event::unreported;
 use bench_dragon_show::convert::{Stamps, frame_header};
 use bench_dragon_show::scene::Scene;
+use bench_dragon_show::second_solver::SecondSolver;
 use bench_dragon_show::{Frame, Playback, Show, StartError};
 
 /// A show that replays a log.
@@ -16,7 +16,7 @@ pub(super) struct Player {
     show: Show,
     rate: f64,
     same_arithmetic: bool,
-    reference: Reference,
+    reference: SecondSolver,
     /// The next tick.
     tick: u64,
     sequence: u64,
@@ -61,7 +61,7 @@ impl Player {
             None => scene.ensemble.timeline_without_contact(&mut unreported),
         };
         let show = Show::new(scene, timeline, playback)?;
-        let reference = Reference::of(scene);
+        let reference = SecondSolver::of(scene);
         Ok(Self {
             show,
             rate: playback.rate,
@@ -267,7 +267,7 @@ impl Player {
             return Ok(());
         }
         if !self.same_arithmetic {
-            match self.reference.compare(line, self.latest.sim_time) {
+            match self.reference.compare(line.sim_time, self.latest.sim_time, &line.handles) {
                 Ok(()) => self.counts.last_tick = Some(to),
                 Err(what) => self.differ(number, (from, to), what),
             }
@@ -348,7 +348,7 @@ mod tests {
         let scene = Scene::parse(&text, "lock.toml", "lock").unwrap();
         let motion = scene.ensemble.only().unwrap();
         let lock = scene.ensemble.timeline_without_contact(&mut unreported).show_end(false).time;
-        let mut reference = Reference::of(&scene);
+        let mut reference = SecondSolver::of(&scene);
         let mut solver = motion.solver(Velocities::Omitted).solver;
         let mut chain = Chain::new(motion.team().handles());
         let mut furthest: f64 = 0.0;
@@ -356,18 +356,13 @@ mod tests {
             let time = lock - before;
             let rounded = time - 8.0 * f64::EPSILON * time;
             solve_at_or_just_before(solver.as_mut(), rounded, &mut chain).unwrap();
-            let line = |moved: f64| SecondLine {
-                second: 0,
-                from: 0,
-                to: 0,
-                frames: 1,
-                hash: String::new(),
-                sim_time: time,
-                handles: sampled(40).map(|handle| (handle as u32, chain.x[handle] + moved, chain.y[handle])).collect(),
+            let mut compare = |moved: f64| {
+                let handle = |handle: usize| (handle as u32, chain.x[handle] + moved, chain.y[handle]);
+                reference.compare(time, time, &sampled(40).map(handle).collect::<Vec<_>>())
             };
-            assert_eq!(reference.compare(&line(0.0), time), Ok(()), "{before} s before the lock");
+            assert!(compare(1e-4).is_err(), "{before} s before the lock");
+            assert_eq!(compare(0.0), Ok(()), "{before} s before the lock");
             furthest = furthest.max(reference.worst().unwrap().0);
-            assert!(reference.compare(&line(1e-4), time).is_err(), "{before} s before the lock");
         }
         assert!(furthest > 1e-11, "the last moments are no harder than others: {furthest:.1e} m");
     }

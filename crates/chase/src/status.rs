@@ -8,10 +8,9 @@ use ::iceoryx2::port::server::Server;
 use ::iceoryx2::prelude::*;
 use ::iceoryx2::service::port_factory::server::ServerCreateError;
 
+use bench_dragon_client::shared_memory::sender::{SMALL_QUEUE, SPARE_NODES, Sender, sender};
 use bench_dragon_client::shared_memory::{OpenError, failed, node, service_name};
 use bench_dragon_messages::{ChaseStatus, ControlRequest, ControlResponse};
-
-use super::{SMALL_QUEUE, SPARE_NODES, Sender, sender};
 
 /// Subscribers that the service of the status admits. The scene's `publish.subscribers` has no effect on this number.
 const MOST_SUBSCRIBERS: usize = 64;

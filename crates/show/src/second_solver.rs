@@ -4,14 +4,12 @@
 
 use std::f64::consts::PI;
 
-use super::super::lines::SecondLine;
-use super::accuracy_of;
+use crate::scene::Scene;
+use crate::solve_at_or_just_before;
 use bench_dragon_messages::HandlePose;
-use bench_dragon_motion::Method;
 use bench_dragon_motion::ensemble::Dragon;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
-use bench_dragon_show::scene::Scene;
-use bench_dragon_show::solve_at_or_just_before;
+use bench_dragon_motion::{Method, Motion};
 
 /// The time, in seconds, by which two arithmetics may differ in the times of events, at which a show ends or pauses.
 const EVENT_TIME: f64 = 1e-9;
@@ -23,13 +21,13 @@ const MOST_GROWTH: f64 = 1e6;
 const ROUNDING_OF_ANGLES: f64 = 1e-14;
 
 /// The second solver of a scene: one for each dragon.
-pub struct Reference {
+pub struct SecondSolver {
     /// By dragon: its first handle, and its solver.
-    parts: Vec<(usize, OneReference)>,
+    parts: Vec<(usize, OneSolver)>,
 }
 
 /// The second solver of a dragon, and the greatest distance from it so far.
-struct OneReference {
+struct OneSolver {
     dragon: Dragon,
     solver: Box<dyn Solver>,
     chain: Chain,
@@ -41,29 +39,32 @@ struct OneReference {
     worst: Option<(f64, f64)>,
 }
 
-impl Reference {
+impl SecondSolver {
     /// Makes the second solver of a scene: `newton`, or the paper's rules for a scene that requests them.
     pub fn of(scene: &Scene) -> Self {
         let ensemble = &scene.ensemble;
-        let part = |(k, dragon): (usize, &Dragon)| (ensemble.handles_of(k).start, OneReference::new(dragon.clone()));
+        let part = |(k, dragon): (usize, &Dragon)| (ensemble.handles_of(k).start, OneSolver::new(dragon.clone()));
         Self { parts: ensemble.dragons().iter().enumerate().map(part).collect() }
     }
 
-    /// Compares the time of a line with the show's, and its handles with the second solver's.
-    pub(super) fn compare(&mut self, line: &SecondLine, shown: f64) -> Result<(), String> {
-        let time = line.sim_time;
+    /// Compares a simulated time with that of the show, `shown`, and the places of some handles with those of that
+    /// time. A handle is its number with x and y.
+    ///
+    /// # Errors
+    /// A sentence for the first difference outside of the tolerance.
+    pub fn compare(&mut self, time: f64, shown: f64, handles: &[(u32, f64, f64)]) -> Result<(), String> {
         let apart = (time - shown).abs();
         let allowed = self.parts.iter().map(|(_, part)| part.accuracy / part.head_speed).fold(0.0, f64::max);
         if apart.is_nan() || apart > EVENT_TIME + allowed + 8.0 * f64::EPSILON * shown {
             return Err(format!("its simulated time is {time} s, computed {shown} s"));
         }
-        if line.handles.is_empty() {
+        if handles.is_empty() {
             return Err(no_solution(time));
         }
         for (first, part) in &mut self.parts {
             let own_time = part.solve(time)?;
-            let handles = *first..*first + part.chain.handles();
-            for (handle, x, y) in line.handles.iter().filter(|of| handles.contains(&(of.0 as usize))) {
+            let own = *first..*first + part.chain.handles();
+            for (handle, x, y) in handles.iter().filter(|of| own.contains(&(of.0 as usize))) {
                 part.compare_place(*first, *handle as usize - *first, own_time, *x, *y)?;
             }
         }
@@ -92,7 +93,7 @@ impl Reference {
     }
 }
 
-impl OneReference {
+impl OneSolver {
     fn new(dragon: Dragon) -> Self {
         let motion = dragon.motion.clone();
         let accuracy = accuracy_of(&motion);
@@ -165,6 +166,19 @@ impl OneReference {
             self.worst = Some((metres, tolerance));
         }
         Ok(tolerance)
+    }
+}
+
+/// Returns the distance in metres that two exact solutions may have besides their rounding.
+fn accuracy_of(motion: &Motion) -> f64 {
+    /// The least tolerance.
+    const LEAST: f64 = 1e-12;
+    /// The error that rounding causes in the bisection of the paper's rules.
+    const PAPER: f64 = 1e-9;
+    match motion.method() {
+        Method::Accuracy(accuracy) => accuracy.max(LEAST),
+        Method::Paper(_) => PAPER,
+        Method::Newton | Method::FollowerTable => LEAST,
     }
 }
 

@@ -1,4 +1,4 @@
-//! `soak --report`: the distributions of wake-up lateness and step cost as an HdrHistogram interval log.
+//! `run --histograms`: the distributions of wake-up lateness and step cost as an HdrHistogram interval log.
 //!
 //! In: the samples of the loop, on the statistics thread. Out: a text file of format version 1.3, with two lines for
 //! each ten seconds. Their tags are `lateness` and `step`, their values nanoseconds. Each histogram is encoded as V2
@@ -13,8 +13,8 @@ use std::time::{Duration, UNIX_EPOCH};
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 
+use super::{Durations, Sample};
 use bench_dragon_messages::sentence::not_writable;
-use bench_dragon_publisher::live::statistics::{Durations, Sample};
 
 /// The header of every interval log.
 const LEGEND: &str = "\"StartTimestamp\",\"Interval_Length\",\"Interval_Max\",\"Interval_Compressed_Histogram\"\n";
