@@ -182,6 +182,6 @@ fn print_error(sentence: &str) {
     let label = if commands::shows_colour(&stderr) { "\x1b[1;31merror\x1b[0m" } else { "error" };
     let line = format!("{label}: {sentence}");
     let line = if stderr.is_terminal() { folded(&line, COLUMNS) } else { line };
-    // Nobody reads a closed standard error.
+    // A closed standard error has no reader.
     let _ = writeln!(stderr, "{line}");
 }

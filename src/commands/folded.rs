@@ -1,5 +1,5 @@
-//! Lines for people, folded to a width. In: text of one or more lines. Out: the text, where what is too long for a line
-//! goes on below the first words behind the line's time or name.
+//! Lines for people, folded to a width. In: text of one or more lines. Out: the text, in which a long line continues
+//! below its first words behind its time or name.
 
 use textwrap::{Options, WordSplitter};
 
