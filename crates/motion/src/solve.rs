@@ -143,7 +143,8 @@ pub enum Velocities {
 /// use bench_dragon_motion::solve::{Chain, Velocities};
 /// use bench_dragon_motion::{Method, Motion};
 ///
-/// let team = Team { benches: 223, head_length: 3.41, body_length: 2.20, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
+/// let (head_length, body_length) = (3.41, 2.20);
+/// let team = Team { benches: 223, head_length, body_length, width: 0.30, hole_inset: 0.275, ends: Ends::NONE };
 /// let path = PathDescription::Spiral { pitch: 0.55, start_turn: 16.0 };
 /// let motion = Motion::new(path, team, 1.0, Method::Accuracy(1e-9))?;
 /// let mut solver = motion.solver(Velocities::Computed).solver;
