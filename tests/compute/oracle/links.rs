@@ -161,14 +161,10 @@ impl<'a> Link<'a> {
             let (one, other) = (self.configuration(one.front), self.configuration(other.front));
             return self.search(one, other);
         }
-        if range.is_none() && self.is_apart(other.front, one.rear) {
-            self.locked = true;
-            self.jumps.push((middle.s, false));
-            return;
-        }
         let jump = (other.rear.s - one.rear.s).abs() / self.length;
-        if range.is_none() && jump > LEAST_JUMP {
-            self.locked = jump > DOUBTFUL_JUMP;
+        let is_apart = range.is_none() && self.is_apart(other.front, one.rear);
+        if is_apart || range.is_none() && jump > LEAST_JUMP {
+            self.locked = is_apart || jump > DOUBTFUL_JUMP;
             if self.locked {
                 // In the last bits before a jump the follower is fast.
                 self.jumps.retain(|(at, _)| middle.s - at > 1e-10 * (1.0 + middle.s.abs()));
