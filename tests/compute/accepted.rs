@@ -97,11 +97,11 @@ fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosur
     Some((proved.least_clearance.unwrap(), enclosed))
 }
 
-/// Boards that come nearest at the very lock that ends the show. The certificate ends a nanometre before the lock. It
-/// still has an upper bound, unless its steps end before the place of that bound.
+/// Boards that come nearest at the very lock that ends the show. Over the last nanometre before a lock they move by
+/// the root of that, so a certificate has an upper bound only where its steps come nearer to the lock.
 #[test]
-fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound() {
-    let (mut bounded, mut at_lock, mut index) = (0, 0, 0);
+fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound_where_the_steps_come_to_it() {
+    let (mut at_lock, mut index) = (0, 0);
     while at_lock < 8 {
         assert!(index < 2000, "{at_lock} scenes of {index}");
         let text = tight_route(&mut Rng::with_seed(0x10c6 + index));
@@ -121,14 +121,11 @@ fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound() {
         assert_eq!(claim.until, Until::Time, "{text}");
         if let (Some(lo), Some(hi)) = (claim.lo, claim.hi) {
             assert!(hi - lo <= 1e-9 && enclosed.travelled > lock - 1e-8, "{claim:?} {enclosed:?}\n{text}");
-            bounded += 1;
         } else {
             let is_short = enclosed.until.is_some_and(|until| until < enclosed.travelled);
             assert!(is_short, "{claim:?} {enclosed:?}\n{text}");
         }
     }
-    println!("{bounded} of {at_lock} in {index} scenes");
-    assert!(bounded * 2 >= at_lock, "{bounded} of {at_lock}");
 }
 
 /// Writes the certificate of the greatest speed and has it checked. Returns false for a show without such a speed, or
@@ -271,13 +268,13 @@ fn certificates_that_were_refused_are_accepted() {
     }
 }
 
-/// A search that halts on its way to a contact claims no more than before that way. The head's rear handle cannot be
-/// enclosed between the contact and the lock, which are a nanometre apart.
+/// A nearer place comes to the distance of the head's link on this way, and a follower that jumped to it would touch a
+/// board. The handle continues, and all events are decided: no contact, a stall, no lock, the path's end.
 #[test]
-fn a_certificate_that_ends_on_the_way_to_a_contact_is_accepted() {
-    let text = std::fs::read_to_string("tests/scenes/halt_before_a_contact.toml").unwrap();
+fn a_certificate_of_a_follower_that_passes_a_nearer_place_is_accepted() {
+    let text = std::fs::read_to_string("tests/scenes/passes_a_nearer_place.toml").unwrap();
     let results = certified(&text).unwrap();
-    assert_eq!(results[0], Status::Undecided, "{results:?}");
+    assert_eq!(results, [Status::None, Status::Proved, Status::None, Status::Proved]);
 }
 
 /// The turns of a piece whose length is given are known to more digits than a double has. Rounded, they end this spiral

@@ -8,6 +8,7 @@ use crate::scene::Scene;
 use crate::solve_at_or_just_before;
 use bench_dragon_messages::HandlePose;
 use bench_dragon_motion::ensemble::Dragon;
+use bench_dragon_motion::model::Vector;
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::{Method, Motion};
 
@@ -146,15 +147,15 @@ impl OneSolver {
     /// Returns the metres between the holes of a bench.
     fn link(&self, bench: usize) -> f64 {
         let Chain { x, y, .. } = &self.chain;
-        (x[bench] - x[bench + 1]).hypot(y[bench] - y[bench + 1])
+        Vector::new(x[bench] - x[bench + 1], y[bench] - y[bench + 1]).norm()
     }
 
     /// Compares the place of a handle with the solution. Returns the tolerance in metres.
     fn compare_place(&mut self, first: usize, handle: usize, time: f64, x: f64, y: f64) -> Result<f64, String> {
         let place = self.chain.x.get(handle).zip(self.chain.y.get(handle));
-        let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| (x - own_x).hypot(y - own_y));
+        let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| Vector::new(x - own_x, y - own_y).norm());
         // Both solutions have rounding errors.
-        let rounding = 8.0 * f64::EPSILON * (x.hypot(y) + self.head_speed * time + self.placed);
+        let rounding = 8.0 * f64::EPSILON * (Vector::new(x, y).norm() + self.head_speed * time + self.placed);
         let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, handle);
         if metres.is_nan() || metres > tolerance {
             let handle = first + handle + 1;
