@@ -180,6 +180,7 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
         "bench_a": found.overlap.map(|overlap| overlap.bench_a),
         "bench_b": found.overlap.map(|overlap| overlap.bench_b),
         "head_radius": found.overlap.map(|overlap| overlap.head_radius),
+        "clearance": Some(clearance).filter(|clearance| *clearance > 0.0),
         "sentence": sentence,
     });
     Ok(Planned::numbers(answer, with(scene, "path.pitch", found.value_hi)))
@@ -249,6 +250,7 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
         "limit": found.limit.map(|limit| limit.kind.name()),
         "bench_a": found.limit.map(|limit| limit.bench_a),
         "bench_b": found.limit.and_then(|limit| limit.bench_b),
+        "clearance": Some(clearance).filter(|clearance| *clearance > 0.0),
         "sentence": sentence,
     });
     let planned = found.value_hi.or(found.value).and_then(number);
