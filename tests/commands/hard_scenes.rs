@@ -115,7 +115,7 @@ fn a_contact_past_a_stall_is_found() {
     }
 }
 
-/// A nearer place of the path comes within a link's reach, where its rear handle once jumped by metres: it goes on, until
+/// A nearer place of the path comes within a link's reach, where its rear handle once jumped by metres. It continues until
 /// it would need unbounded speed. The times are those of `second_judge.py`, and lie between the two at which it finds
 /// the handle, nearly square to its link, and no handle.
 #[test]

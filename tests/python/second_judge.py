@@ -14,7 +14,7 @@ The checks are by question:
 In N random steps of each certificate, the spans contain the handles, and boards are as far apart as claimed. For
 several dragons the script checks each alone, and each two on the stage at times of the show. Path and chain are built
 as docs/proofs.md defines them. A follower is enclosed in numbers of 192 bits. It is the first point backward along the
-path at the distance of the link, or the one that continues it: the script moves each link along the path in small steps
+path at the distance of the link, or the one that continues it. The script moves each link along the path in small steps
 of its own (`Walk`), and takes no branch of a certificate on trust.
 
 Prints a JSON object for each file. Its `refused` and `undecided` are a sentence or null. The numbers of what was
@@ -54,7 +54,7 @@ LINES_OF_TWO = {
 # The most points of the path that are looked at for one follower.
 MOST_POINTS = 3000
 # Points of the path in the length of a link, for the walk of a link, and the most of them that a follower may pass while
-# its front passes one: a follower that passes more has vanished.
+# its front passes one. A follower that passes more has vanished.
 POINTS_IN_LINK = 400
 MOST_PASSED = 60
 

@@ -60,8 +60,9 @@ pub(super) fn link_kind(team: &Team, bench: usize) -> usize {
     if team.own_tail() == Some(bench) { 2 } else { bench.min(1) }
 }
 
-/// Cuts a span of the front handle of a link of some kind into the stretches with one rule: the place from which the follower
-/// is the first one back, or `None` for the front handle itself. A place at which two stretches meet is in both.
+/// Cuts a span of the front handle of a link of some kind into the stretches with one rule. A rule is the place from
+/// which the follower is the first one back, or `None` for the front handle itself. A place at which two stretches meet
+/// is in both.
 pub(super) fn rules(
     branches: &[Branch],
     exact: &ExactPath,

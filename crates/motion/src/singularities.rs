@@ -4,14 +4,14 @@
 //! steps at the turning points found here.
 //!
 //! **Two links are enough.** Let F be the follower map of a body link, from its front handle's travel to its rear
-//! handle's: the continuous map that begins on the first segment, where it leads to the first place behind at the link's
-//! distance. All body links begin there, so all have the same F. Handle k + 1 is behind handle k, so no handle after the
-//! first is ever further along the path than handle 1 has been. On the first segment, outside the fold, F is continuous
-//! arbitrarily far back. So while F exists up to the furthest place of handle 1, no body link locks. Before the first stall all handles go forward, so each place
-//! is first reached by the foremost handle that did not start beyond it. The handles that start behind handle 1 are on
-//! the first segment, which is a straight line without singularities, or an inward spiral with singularities near its
-//! centre only (`inward`). Therefore only a start near the centre makes `SingularitySearch::body_stall` consider more
-//! links.
+//! handle's. It is the continuous map that begins on the first segment, where it leads to the first place behind at the
+//! link's distance. All body links begin there, so all have the same F. Handle k + 1 is behind handle k, so no handle
+//! after the first is ever further along the path than handle 1 has been. On the first segment, outside the fold, F is
+//! continuous arbitrarily far back. So while F exists up to the furthest place of handle 1, no body link locks. Before
+//! the first stall all handles go forward, so each place is first reached by the foremost handle that did not start
+//! beyond it. The handles that start behind handle 1 are on the first segment, which is a straight line without
+//! singularities, or an inward spiral with singularities near its centre only (`inward`). Therefore only a start near
+//! the centre makes `SingularitySearch::body_stall` consider more links.
 //!
 //! So two problems in one variable remain, a `LinkTrace` each: the head's link for all places of the head, and a body
 //! link for all places that handle 1 has come to. They are solved in lockstep. Every step is proven to hold nothing

@@ -46,9 +46,9 @@ impl Branches {
         Ok(())
     }
 
-    /// Cuts a span of the front handle of a link of some kind into the stretches with one rule: the place from which the follower is
-    /// the first one back, or `None` for the front handle itself. A place at which two stretches meet is in both. Returns
-    /// `None` if no link has a branch.
+    /// Cuts a span of the front handle of a link of some kind into the stretches with one rule. A rule is the place from
+    /// which the follower is the first one back, or `None` for the front handle itself. A place at which two stretches
+    /// meet is in both. Returns `None` if no link has a branch.
     pub fn rules(&self, path: &Path, link: usize, span: Span) -> Option<Vec<(Span, Option<Place>)>> {
         if self.0.is_empty() {
             return None;

@@ -2,8 +2,8 @@
 //!
 //! Both depend on the place of the front handle alone, so a path is searched once for each length of link. The search
 //! halves a stretch until it is certain to hold neither. Where the first place at the link's distance jumps forward, a
-//! nearer place has come to the distance: from there on the follower is the first place back from another one, the
-//! place of least distance between the follower and the nearer places.
+//! nearer place has come to the distance. From there on the follower is the first place back from another one. That is
+//! the place of least distance between the follower and the nearer places.
 
 use super::geometry::{Param, Path};
 

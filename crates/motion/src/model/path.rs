@@ -98,7 +98,7 @@ pub struct Branch {
     pub end: f64,
     /// A place between the follower and all nearer places at the link's distance, with the front handle at `begin`.
     pub behind: Param,
-    /// The metres by which that place goes on per metre of the front handle: 0, or 1 or -1 on parallel lines.
+    /// The metres by which that place moves per metre of the front handle: 0, or 1 or -1 on parallel lines.
     pub drift: f64,
 }
 

@@ -194,8 +194,8 @@ impl<'a> LinkTrace<'a> {
         Ok(())
     }
 
-    /// Goes on while both handles of a branch are on parallel lines and the link is nearly square to them, so that other
-    /// steps would be short. There it keeps its direction. Returns false if this is not the case.
+    /// Follows a branch while both handles are on parallel lines and the link is nearly square to them, so that other
+    /// steps would be short. There the link keeps its direction. Returns false if this is not the case.
     fn goes_parallel(&mut self, branch: &Branch) -> Result<bool, NoFollower> {
         let parallel =
             self.link.parallel_until(&self.at, branch.behind).filter(|_| self.at.rear_cosine < NEARLY_SQUARE);
