@@ -110,6 +110,7 @@ fn a_turn_in_a_route_is_that_of_a_turnaround() {
         (12, 4.5, 2.0, "right"),
         (12, 4.5, 1.0, "left"),
         (12, 2.6, 2.0, "left"),
+        (12, 2.0, 2.0, "left"),
         (12, 3.1, 0.7, "right"),
         (40, 3.0, 1.0, "left"),
     ] {

@@ -264,9 +264,12 @@ class Walk:
         rear = self.rears[min(k - self.begin, len(self.rears) - 1)]
         # From the place itself: between two points of the walk a nearer place may come, and the follower vanish.
         x, y = (float(part.mid()) for part in scene.point(place))
-        if not any(math.hypot(x - u, y - v) >= self.link for u, v in self.points[rear + 1 : k]):
-            return place
-        return self.valley(scene, place, rear)
+        is_far = [math.hypot(x - u, y - v) >= self.link for u, v in self.points[rear + 1 : k]]
+        # The points that the follower has passed since the point of the walk are no nearer places.
+        passed = is_far.index(False) if False in is_far else len(is_far)
+        if passed < MOST_PASSED:
+            rear, is_far = rear + passed, is_far[passed:]
+        return self.valley(scene, place, rear) if any(is_far) else place
 
     def valley(self, scene, place, rear):
         """Returns the place of least distance from the front handle that comes next ahead of a point."""

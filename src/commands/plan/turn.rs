@@ -38,7 +38,6 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
         Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
     }
     let (scene, motion) = common.scene_text()?.parse_only()?;
-    warn_of_route(&scene, "the rest of the route", "boards on an S between two spirals that are long enough");
     let clearance = spacing.required(&scene)?;
     let description = motion.description();
     let Some(pitch) = description.pitch().or_else(|| description.turn().map(|turn| turn.pitch)) else {
@@ -46,6 +45,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
                         \"turnaround\", or a route with one piece of kind \"turn\"";
         return Err(CommandError::BadInput(sentence.to_owned()));
     };
+    warn_of_route(&scene, "the rest of the route", "boards on an S between two spirals that are long enough");
     let bar = progress_bar(1000, common).with_message("searching for the turn");
     let mut progress = |share| report(&bar, share);
     let asked = Spaced { team: motion.team(), clearance };
