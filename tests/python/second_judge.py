@@ -265,10 +265,10 @@ class Walk:
         # From the place itself: between two points of the walk a nearer place may come, and the follower vanish.
         x, y = (float(part.mid()) for part in scene.point(place))
         is_far = [math.hypot(x - u, y - v) >= self.link for u, v in self.points[rear + 1 : k]]
-        # The points that the follower has passed since the point of the walk are no nearer places.
-        passed = is_far.index(False) if False in is_far else len(is_far)
-        if passed < MOST_PASSED:
-            rear, is_far = rear + passed, is_far[passed:]
+        # Points that the follower passes before the next point of the walk are no nearer places.
+        after = self.rears[k + 1 - self.begin] if k + 1 - self.begin < len(self.rears) else rear
+        while rear < after and is_far[0]:
+            rear, is_far = rear + 1, is_far[1:]
         return self.valley(scene, place, rear) if any(is_far) else place
 
     def valley(self, scene, place, rear):
