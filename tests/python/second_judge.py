@@ -264,12 +264,12 @@ class Walk:
         rear = self.rears[min(k - self.begin, len(self.rears) - 1)]
         # From the place itself: between two points of the walk a nearer place may come, and the follower vanish.
         x, y = (float(part.mid()) for part in scene.point(place))
-        is_far = [math.hypot(x - u, y - v) >= self.link for u, v in self.points[rear + 1 : k]]
-        # Points that the follower passes before the next point of the walk are no nearer places.
-        after = self.rears[k + 1 - self.begin] if k + 1 - self.begin < len(self.rears) else rear
-        while rear < after and is_far[0]:
-            rear, is_far = rear + 1, is_far[1:]
-        return self.valley(scene, place, rear) if any(is_far) else place
+        if not any(math.hypot(x - u, y - v) >= self.link for u, v in self.points[rear + 1 : k]):
+            return place
+        # Points that the follower has passed since the point of the walk are no nearer places: then there is no valley.
+        valley = self.valley(scene, place, rear)
+        gap = sub(scene.point(place), scene.point(valley))
+        return valley if dot(gap, gap) < arb(self.link) ** 2 else place
 
     def valley(self, scene, place, rear):
         """Returns the place of least distance from the front handle that comes next ahead of a point."""
