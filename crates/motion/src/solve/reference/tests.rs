@@ -9,6 +9,7 @@ use tables::{Row, table};
 use super::curve::Curve;
 use super::real::{Functions, RealVector};
 use super::*;
+use crate::event::{Budget, unreported};
 use crate::model::Point;
 use crate::model::curve::Side;
 use crate::model::description::RouteStep;
@@ -16,6 +17,7 @@ use crate::model::path::tests::any_spiral;
 use crate::model::path::{Param, Path};
 use crate::model::spiral::Direction;
 use crate::model::team::Ends;
+use crate::singularities::Singularities;
 use crate::solve::newton::Newton;
 use crate::solve::{Chain, Velocities};
 
@@ -281,8 +283,16 @@ fn a_vector_turned_slightly_is_that_of_sine_and_cosine() {
     }
 }
 
-/// Checks the properties of every chain on any path. Each handle is on its segment, and each link has its length and
-/// keeps it. No place between a handle and its follower is further away.
+/// Returns the path with the branches of the followers, and the head's place at the end of the motion.
+fn followed(team: &Team, path: &Path) -> (Path, f64) {
+    let mut unreported = unreported;
+    let singular = Singularities::search(path, team, &mut Budget::new(20_000_000, &mut unreported));
+    let end = singular.end.map_or(f64::INFINITY, |end| end.travelled);
+    (path.clone().with_branches(singular.branches), end)
+}
+
+/// Checks the properties of every chain on any path without nearer places. Each handle is on its segment, and each link
+/// has its length and keeps it. No place between a handle and its follower is further away.
 fn assert_sound(team: Team, description: &PathDescription, time: f64) -> Vec<Seat> {
     let mut reference = Reference::new(team, description, 1.0).unwrap();
     let path = description.path().unwrap();
@@ -363,7 +373,10 @@ fn integrated(path: &mut RealPath, segment: usize, to: &Real) -> Real {
 /// Computes the chain at `time` by the safe solver, and checks it against the reference. Each position agrees within
 /// 1e-12 m, times the growth of small errors along the chain.
 fn assert_newton_agrees(team: Team, description: &PathDescription, time: f64) {
-    let path: Path = description.path().unwrap();
+    let (path, end) = followed(&team, &description.path().unwrap());
+    if time > end - 1e-9 {
+        return;
+    }
     let newton = Newton::new(path, team, 1.0, Velocities::Computed);
     let mut chain = Chain::new(team.handles());
     let solved = newton.solve_at(time, &mut chain);
@@ -463,7 +476,10 @@ proptest! {
     ) {
         let description = PathDescription::Route { heading_turns, steps };
         let time = share * description.path().unwrap().length();
-        assert_sound(team(12), &description, time);
+        let (path, end) = followed(&team(12), &description.path().unwrap());
+        if time < end - 1e-9 && path.branches().is_empty() {
+            assert_sound(team(12), &description, time);
+        }
         assert_newton_agrees(team(12), &description, time);
     }
 }
