@@ -93,6 +93,10 @@ fn answer(socket: &mut Socket, id: u64, key: &str) -> Value {
 fn events_and_clearances_are_those_of_the_commands() {
     let scene = include_str!("../../config/square.toml");
     let design = Design::start("design-results", scene, &[]);
+    let file = design.place.folder().join("scene.toml");
+    let [events, facts] = ["events", "check"].map(|command| {
+        json_lines(&Process::start(design.place.program().args([command, "--json"]).arg(&file)).output())
+    });
     let mut socket = design.connect(None).unwrap();
     let hello = until(&mut socket, |message| message["hello"].is_object());
     assert_eq!((&hello["hello"]["save"], &hello["hello"]["token"]), (&json!(false), &json!(false)));
@@ -107,10 +111,7 @@ fn events_and_clearances_are_those_of_the_commands() {
     // The layout of `view`: the number of handles at byte 4, of the run at byte 32.
     assert_eq!(frame[4..8], 21_u32.to_le_bytes());
     assert_eq!(u64::from_le_bytes(frame[32..40].try_into().unwrap()).to_string(), stage["run_id"].as_str().unwrap());
-    let file = design.place.folder().join("scene.toml");
-    for (command, key) in [("events", "events"), ("check", "facts")] {
-        let output = Process::start(design.place.program().args([command, "--json"]).arg(&file)).output();
-        let printed = json_lines(&output);
+    for (printed, key) in [(events, "events"), (facts, "facts")] {
         let shown = answer(&mut socket, 0, key);
         let shown = shown["list"].as_array().unwrap();
         assert!(!printed.is_empty() && shown.len() == printed.len(), "{shown:?} {printed:?}");
@@ -181,14 +182,15 @@ fn beyond_loopback_every_request_needs_the_token() {
 fn the_least_turn_of_a_route_is_that_of_the_command() {
     let village = include_str!("../../config/village.toml");
     let design = Design::start("design-turn", village, &[]);
-    let mut socket = design.connect(None).unwrap();
-    answer(&mut socket, 0, "scene");
-    send(&mut socket, &json!({"id": 1, "plan": "turn"}));
-    let found = until(&mut socket, |message| message["id"] == 1 && !message["plan"].is_null());
     let file = design.place.folder().join("scene.toml");
     let command = ["plan", "turn", "--json", "--arc-ratio", "1"];
     let printed = json_lines(&Process::start(design.place.program().args(command).arg(&file)).output());
     assert_eq!(printed[0]["status"], "proved", "{printed:?}");
+    // After the command: the server ends a connection that is not read for half a minute.
+    let mut socket = design.connect(None).unwrap();
+    answer(&mut socket, 0, "scene");
+    send(&mut socket, &json!({"id": 1, "plan": "turn"}));
+    let found = until(&mut socket, |message| message["id"] == 1 && !message["plan"].is_null());
     printed[0].as_object().unwrap().iter().for_each(|(key, value)| assert_eq!(found["plan"][key], *value, "{key}"));
     let planned = format!("to_radius = {}", printed[0]["value_hi"]);
     assert_eq!(found["text"], village.replace("to_radius = 2.99", &planned));

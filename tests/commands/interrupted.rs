@@ -1,11 +1,13 @@
 //! Ctrl-C during a search: the command prints what it knows, says that it was stopped, and exits with 1.
 
-use std::fs::read_to_string;
+use std::fs::{File, read_to_string};
+use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
 use nix::sys::signal::Signal::SIGINT;
+use nix::sys::stat::Mode;
 use serde_json::Value;
 
 use crate::harness::{Process, json_lines, text, wait_until};
@@ -72,8 +74,15 @@ fn an_interrupted_plan_prints_what_is_proved() {
 
 #[test]
 fn a_second_signal_ends_the_command_at_once() {
-    let process = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(["trade", "config/paper.toml"]));
-    handles_interrupts(&process);
+    let folder = tempfile::tempdir().unwrap();
+    let scene = long_scene(folder.path());
+    let pipe = folder.path().join("pipe");
+    nix::unistd::mkfifo(&pipe, Mode::S_IRUSR | Mode::S_IWUSR).unwrap();
+    let arguments = ["solve", &scene, "--at", "0", "-o", pipe.to_str().unwrap()];
+    let process = Process::start(Command::new(env!("CARGO_BIN_EXE_bench-dragon")).args(arguments));
+    // A frame is larger than a pipe: where its first byte is there and no other is read, the command cannot end.
+    let mut reader = File::open(&pipe).unwrap();
+    reader.read_exact(&mut [0]).unwrap();
     let status = format!("/proc/{}/status", process.id());
     wait_until("two signals end it", || {
         process.signal(SIGINT);
