@@ -4,7 +4,7 @@
 
 TIME, seconds, is a guess, correct to a microsecond. The clearance of each board is enclosed half a unit of the last
 digit before and after the time printed. All are positive before, and one is negative after. `ground.py` tests that
-nothing is met earlier. `second_judge.py` reads the scene, in coordinates of its path. The script shares no code with
+nothing is met earlier. `judge_scene.py` reads the scene, in coordinates of its path. The script shares no code with
 the program.
 """
 
@@ -12,7 +12,8 @@ import sys
 import tomllib
 
 from flint import arb, ctx
-from second_judge import PI, Scene, cross, dot, sub
+from judge_curves import PI, cross, dot, sub
+from judge_scene import Scene
 
 ctx.prec = 224
 # Decimal places of a time.
