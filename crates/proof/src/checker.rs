@@ -1,0 +1,361 @@
+//! The lines of a certificate in their order: which may follow which, and the room that checks each.
+
+use super::Proved;
+use super::events::{Events, LockShown};
+use super::greatest::Greatest;
+use super::lines::{About, ParsedLine, ProvedClearance, ProvedObstacleClearance};
+use super::path::Span;
+use super::pitch::Pitch;
+use super::results;
+use super::scene::Scene;
+use super::several::{Alone, Claim, Pair};
+use super::steps::{Step, Steps};
+
+/// The version of the file format.
+const FORMAT: u32 = 2;
+
+/// The state of the check.
+pub struct Checker {
+    pub about: About,
+    /// The dragon of a scene of one, or all.
+    scenes: Vec<Scene>,
+    /// Facts that the sections of dragons have shown; `None` in a scene of one.
+    pub alone: Option<Vec<Alone>>,
+    /// True in the section of a dragon.
+    is_in_section: bool,
+    between: Option<Pair>,
+    /// The number of results before the section.
+    before: usize,
+    steps: Steps,
+    events: Events,
+    greatest: Greatest,
+    pitch: Option<Pitch>,
+    pub proved: Proved,
+}
+
+impl Checker {
+    /// Begins with the first line.
+    pub fn begin(first: ParsedLine) -> Result<Self, String> {
+        let ParsedLine::Certificate { format, version, about, scene: text } = first else {
+            return Err("the first line is not that of a certificate".to_owned());
+        };
+        if format != FORMAT {
+            return Err(format!("a certificate of format {format}, expected {FORMAT}"));
+        }
+        let in_scene = |problem: String| format!("the scene: {problem}");
+        let mut scenes = Scene::read_ensemble(&text).map_err(in_scene)?;
+        let alone = if scenes.is_empty() { None } else { Some(Vec::new()) };
+        if alone.is_none() {
+            scenes.push(Scene::read(&text).map_err(in_scene)?);
+        } else if !matches!(about, About::Events | About::LeastClearance) {
+            return Err("the scene has several dragons, of which this kind of certificate proves nothing".to_owned());
+        }
+        let dragons =
+            if alone.is_some() { scenes.iter().map(|scene| scene.name.clone()).collect() } else { Vec::new() };
+        let (results, steps, links, pairs) = (Vec::new(), 0, 0, 0);
+        let proved = Proved {
+            scene: text,
+            version,
+            dragons,
+            results,
+            least_clearance: None,
+            least_clearances: Vec::new(),
+            obstacle_clearances: Vec::new(),
+            greatest_speed: None,
+            least_pitch: None,
+            steps,
+            links,
+            pairs,
+        };
+        let (steps, events, greatest) = (Steps::new(), Events::default(), Greatest::default());
+        let (is_in_section, between, before) = (false, None, 0);
+        Ok(Self { about, scenes, alone, is_in_section, between, before, steps, events, greatest, pitch: None, proved })
+    }
+
+    /// Returns the number of results of a dragon's section.
+    fn results_of(&self, dragon: usize) -> usize {
+        let kinds = if self.about == About::Events { 4 } else { 1 };
+        kinds + self.scenes[dragon].obstacles.len()
+    }
+
+    /// Returns the number of results of all sections so far.
+    fn results(&self) -> usize {
+        let Proved { results, least_clearance, least_clearances, obstacle_clearances, .. } = &self.proved;
+        let of_clearance = usize::from(least_clearance.is_some()) + least_clearances.len();
+        results.len() + of_clearance + obstacle_clearances.len()
+    }
+
+    /// Returns true if the section of a dragon or of two has its results.
+    fn is_section_complete(&self) -> bool {
+        let so_far = self.results() - self.before;
+        match (&self.alone, &self.between) {
+            (_, Some(_)) => so_far == 1,
+            (Some(alone), None) => self.is_in_section && so_far == self.results_of(alone.len()),
+            (None, None) => so_far == self.results_of(0),
+        }
+    }
+
+    /// Ends a section, and adds its counts.
+    fn end_section(&mut self) -> Result<(), String> {
+        if (self.is_in_section || self.between.is_some()) && !self.is_section_complete() {
+            return Err("the section before it lacks a result".to_owned());
+        }
+        let Some(alone) = &mut self.alone else {
+            return Err("the scene has one dragon, and no sections".to_owned());
+        };
+        let (steps, events) = (std::mem::replace(&mut self.steps, Steps::new()), std::mem::take(&mut self.events));
+        let mut counts = [steps.steps, steps.links, steps.pairs];
+        if self.is_in_section {
+            alone.push(Alone::new(&steps, &events));
+        }
+        if let Some(Pair { steps, links, pairs, .. }) = self.between.take() {
+            counts = [steps, links, pairs];
+        }
+        self.proved.steps += counts[0];
+        self.proved.links += counts[1];
+        self.proved.pairs += counts[2];
+        (self.is_in_section, self.before) = (false, self.results());
+        Ok(())
+    }
+
+    /// Returns the pair that follows another, in their order; `None` after the last.
+    fn next_pair(&self, after: Option<[usize; 2]>) -> Option<[usize; 2]> {
+        let count = self.scenes.len();
+        let next = match after {
+            None => [0, 1],
+            Some([a, b]) if b + 1 < count => [a, b + 1],
+            Some([a, _]) => [a + 1, a + 2],
+        };
+        (next[1] < count).then_some(next)
+    }
+
+    /// Handles the lines of a scene of several dragons. Returns false for another line.
+    fn add_of_ensemble(&mut self, line: &ParsedLine) -> Result<bool, String> {
+        let has_result = self.between.is_some() && self.results() > self.before;
+        let Self { about, scenes, alone, between, proved, .. } = self;
+        if has_result && !matches!(line, ParsedLine::Dragon { .. } | ParsedLine::Pair { .. }) {
+            return Err("nothing of two dragons can follow their result".to_owned());
+        }
+        match (line, between, alone) {
+            (ParsedLine::Dragon { dragon }, None, _) => {
+                self.end_section()?;
+                let expected = self.alone.as_ref().map_or(0, Vec::len);
+                if *dragon != expected || *dragon >= self.scenes.len() {
+                    return Err(format!("it is about dragon {dragon}, expected {expected}"));
+                }
+                self.is_in_section = true;
+            }
+            (ParsedLine::Pair { dragons }, between, _) => {
+                let last = between.as_ref().map(|pair| pair.dragons);
+                self.end_section()?;
+                let are_alone_shown = self.alone.as_ref().is_some_and(|alone| alone.len() == self.scenes.len());
+                if !are_alone_shown || self.next_pair(last) != Some(*dragons) {
+                    return Err("the two dragons are not those that follow".to_owned());
+                }
+                self.between = Some(Pair::new(*dragons));
+            }
+            (ParsedLine::Both { from, to, heads, spans: [one, other], apart, at }, Some(pair), Some(_)) => {
+                let claim = match (&about, apart) {
+                    (About::Events, None) => Claim::Clear,
+                    (About::Events, Some(_)) => return Err("`apart` in a certificate of events".to_owned()),
+                    (_, None) => Claim::Links,
+                    (_, Some(metres)) => Claim::Apart(*metres, at.each_ref().map(Vec::as_slice)),
+                };
+                pair.add_both(scenes, [*from, *to], (*heads, [one, other]), claim)?;
+            }
+            (ParsedLine::NearBoth { benches, time, heads, spans: [one, other], at, most }, Some(pair), Some(_)) => {
+                let at = at.each_ref().map(Vec::as_slice);
+                pair.add_near(scenes, (*benches, *time), (*heads, [one, other]), (at, *most))?;
+            }
+            (ParsedLine::Meeting { benches, time, heads, spans: [one, other], point }, Some(pair), Some(alone)) => {
+                let alone = (*about == About::Events).then_some(alone.as_slice());
+                pair.add_meeting(scenes, alone, (*benches, *time), (*heads, [one, other]), *point)?;
+            }
+            (ParsedLine::Result(outcome), Some(pair), Some(alone)) => {
+                pair.check(scenes, alone, outcome)?;
+                proved.results.push(outcome.clone());
+            }
+            (ParsedLine::LeastClearance(outcome), Some(pair), Some(_)) => {
+                pair.check_clearance(scenes, outcome)?;
+                proved.least_clearances.push(outcome.clone());
+            }
+            (
+                ParsedLine::Dragon { .. }
+                | ParsedLine::Both { .. }
+                | ParsedLine::NearBoth { .. }
+                | ParsedLine::Meeting { .. },
+                ..,
+            ) => {
+                return Err("it is not in a section of two dragons, or not in its place".to_owned());
+            }
+            (_, Some(_), _) => return Err("it is about one dragon, in a section of two".to_owned()),
+            (_, None, Some(_)) if !self.is_in_section => {
+                return Err("no line says which dragon it is about".to_owned());
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Returns true if all results of the question are there.
+    pub fn is_complete(&self) -> bool {
+        match self.about {
+            About::Events | About::LeastClearance => match (&self.alone, &self.between) {
+                (None, _) => self.is_section_complete(),
+                (Some(_), Some(pair)) => self.is_section_complete() && self.next_pair(Some(pair.dragons)).is_none(),
+                (Some(_), None) => self.scenes.len() == 1 && self.is_section_complete(),
+            },
+            About::GreatestSpeed => self.proved.greatest_speed.is_some(),
+            About::LeastPitch => self.proved.least_pitch.is_some(),
+        }
+    }
+
+    /// Checks the next line.
+    pub fn add(&mut self, line: ParsedLine) -> Result<(), String> {
+        if self.about != About::Events && self.is_complete() {
+            return Err("nothing can follow the result".to_owned());
+        }
+        let question = match line {
+            ParsedLine::Result(_) => Some(About::Events),
+            ParsedLine::LeastClearance(_) | ParsedLine::ObstacleClearance(_) => Some(About::LeastClearance),
+            ParsedLine::Speeds { .. } | ParsedLine::Fast { .. } | ParsedLine::GreatestSpeed(_) => {
+                Some(About::GreatestSpeed)
+            }
+            ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
+            _ => None,
+        };
+        if question.is_some_and(|question| question != self.about) {
+            return Err("it belongs to another question".to_owned());
+        }
+        if self.add_of_ensemble(&line)? {
+            return Ok(());
+        }
+        let section = self.alone.as_ref().map(Vec::len);
+        if let (ParsedLine::Branch { link, from, to, behind }, true) = (&line, self.about != About::LeastPitch) {
+            if self.steps.end.is_some() || self.greatest.steps > 0 {
+                return Err("a branch has to precede all steps".to_owned());
+            }
+            let Scene { path, team, branches, .. } = &mut self.scenes[section.unwrap_or(0)];
+            return branches.add((path, team), *link, Span(*from, *to), *behind);
+        }
+        let so_far = self.results() - self.before;
+        let Self { about, scenes, steps, events, greatest, pitch, proved, .. } = self;
+        let scene = &scenes[section.unwrap_or(0)];
+        let of_section = Vec::from_iter(section);
+        if question.is_none() && (events.finish.is_some() || so_far > 0) {
+            return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
+        }
+        match line {
+            ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
+            ParsedLine::Step { links, from, to, moving, clear, spans, free, apart, beside, at } => {
+                let step = Step { links, head: Span(from, to), moving, clear, spans, free, apart, beside, at };
+                match pitch {
+                    Some(pitch) => pitch.add_step(step),
+                    None => steps.add(scene, step),
+                }
+            }
+            ParsedLine::Near { benches, from, to, spans, at, most } => {
+                events.add_near(scene, steps, benches, Span(from, to), (&spans, &at), most)
+            }
+            ParsedLine::NearObstacle { obstacle, bench, from, to, spans, at, most } => {
+                events.add_near_obstacle(scene, steps, (obstacle, bench), Span(from, to), (&spans, &at), most)
+            }
+            ParsedLine::Contact { benches, from, to, spans, point } => {
+                events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
+            }
+            ParsedLine::Reached { obstacle, bench, from, to, spans, point } => {
+                events.add_reached(scene, steps, (obstacle, bench), Span(from, to), &spans, point)
+            }
+            ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
+            ParsedLine::Branch { .. } => Err("a branch in a certificate of another question".to_owned()),
+            ParsedLine::Lock { link, to, spans, last, window, beyond } => {
+                let shown = match (window, beyond) {
+                    (Some(window), None) => LockShown::Nearer(window),
+                    (None, Some(beyond)) => LockShown::Further(beyond),
+                    _ => return Err("expected one of `window` and `beyond`".to_owned()),
+                };
+                events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
+            }
+            ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
+            ParsedLine::Result(outcome) => {
+                let earlier = &proved.results[proved.results.len() - so_far..];
+                results::check(scene, steps, events, &outcome, earlier)?;
+                if of_section != outcome.dragons {
+                    return Err("it is not the result for this dragon".to_owned());
+                }
+                proved.results.push(outcome);
+                Ok(())
+            }
+            ParsedLine::LeastClearance(_) if so_far > 0 => Err("a second result".to_owned()),
+            ParsedLine::LeastClearance(ProvedClearance { dragons, .. })
+            | ParsedLine::ObstacleClearance(ProvedObstacleClearance { dragons, .. })
+                if dragons != of_section =>
+            {
+                Err("it is not the result for this dragon".to_owned())
+            }
+            ParsedLine::ObstacleClearance(outcome) => {
+                let Some(earlier) = so_far.checked_sub(1) else {
+                    return Err("the result for two boards does not precede it".to_owned());
+                };
+                results::check_obstacle_clearance(scene, steps, events, &outcome, earlier)?;
+                proved.obstacle_clearances.push(outcome);
+                Ok(())
+            }
+            ParsedLine::LeastClearance(outcome) => {
+                results::check_clearance(scene, steps, events, &outcome)?;
+                match section {
+                    Some(_) => proved.least_clearances.push(outcome),
+                    None => proved.least_clearance = Some(outcome),
+                }
+                Ok(())
+            }
+            ParsedLine::Speeds { from, to, spans, at } => greatest.add_step(scene, Span(from, to), &spans, &at),
+            ParsedLine::Fast { handle, spans, at } => greatest.add_fast(scene, handle, &spans, &at),
+            ParsedLine::GreatestSpeed(outcome) => {
+                greatest.check(scene, &outcome)?;
+                proved.greatest_speed = Some(outcome);
+                Ok(())
+            }
+            ParsedLine::Reach { radius, from, clearance } if *about == About::LeastPitch && pitch.is_none() => {
+                *pitch = Some(Pitch::new(radius, from, clearance)?);
+                Ok(())
+            }
+            ParsedLine::Reach { .. } => Err("a line `reach` of another question, or a second one".to_owned()),
+            ParsedLine::Overlap { from, to, theta, benches, spans, point, other } => {
+                let points = [point, other.unwrap_or(point)];
+                begun(pitch)?.add_overlap(scene, [from, to], theta, benches, &spans, points)
+            }
+            ParsedLine::HeadLocks { from, to } => begun(pitch)?.add_lock(scene, from, to),
+            ParsedLine::Far { pitch: free, radius } => begun(pitch)?.add_far(scene, free, radius),
+            ParsedLine::Dragon { .. }
+            | ParsedLine::Pair { .. }
+            | ParsedLine::Both { .. }
+            | ParsedLine::NearBoth { .. }
+            | ParsedLine::Meeting { .. } => Err("the scene has one dragon".to_owned()),
+            ParsedLine::LeastPitch(outcome) => {
+                begun(pitch)?.check(&outcome)?;
+                proved.least_pitch = Some(outcome);
+                Ok(())
+            }
+        }
+    }
+
+    /// Returns what is proved, after the last line.
+    pub fn finished(mut self) -> Proved {
+        if self.alone.is_some() {
+            // A complete certificate ends with a complete section.
+            let _ = self.end_section();
+            return self.proved;
+        }
+        let Steps { steps, links, pairs, .. } = self.steps;
+        let of_pitch = self.pitch.as_ref().map_or((0, 0, 0), Pitch::counts);
+        let (steps, links) = (steps + self.greatest.steps + of_pitch.0, links + self.greatest.links + of_pitch.1);
+        let pairs = pairs + of_pitch.2;
+        Proved { steps, links, pairs, ..self.proved }
+    }
+}
+
+/// Returns the pitch that a line is about.
+fn begun(pitch: &mut Option<Pitch>) -> Result<&mut Pitch, String> {
+    pitch.as_mut().ok_or_else(|| "no line `reach` precedes it".to_owned())
+}
