@@ -1,0 +1,165 @@
+//! The steps of the head: one at a time, each shown completely or refused. A refused step may show a lower upper bound.
+
+use super::super::first_order::When;
+use super::super::first_order_step::{FirstOrderStep, StepPoints, step_points};
+use super::super::grid::GridPoint;
+use super::super::lines::{CertificateLine, Links, Step};
+use super::super::place::Span;
+use super::super::step::Obstacle;
+use super::beside::UpperBeside;
+use super::{Descent, LOWER, Upper};
+use bench_dragon_motion::event::Progress;
+
+/// The factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and
+/// later shrinks. Steps close to the longest need more attempts, but make the certificate shorter.
+const GROWTH: f64 = 1.1;
+const SHRINK: f64 = 0.8;
+const SHRINK_FURTHER: f64 = 0.5;
+
+/// The shortest step, as a share of the path length in metres.
+const LEAST_STEP: f64 = 1e-14;
+
+/// A step that was not shown completely.
+pub(super) struct Refused {
+    pub obstacle: Obstacle,
+    pub nearer: Option<Nearer>,
+}
+
+/// A lower upper bound, found where a step is refused.
+pub(super) enum Nearer {
+    Boards(Upper),
+    Obstacle(usize, UpperBeside),
+}
+
+impl Descent<'_, '_> {
+    /// Goes to `target`. Returns the travel that it reached if a step before cannot be shown.
+    pub(super) fn go_to(&mut self, target: &GridPoint, progress: Progress<'_>) -> Option<f64> {
+        let least = LEAST_STEP * (1.0 + self.chain.path.length());
+        let longest = self.chain.team.shortest_link();
+        let mut shrink = SHRINK;
+        while self.chain.exact.is_before(self.at.head, target.head) {
+            let steps = self.steps as f64 / self.most_steps as f64;
+            if progress((self.at.travelled / self.end).max(steps).clamp(0.0, 1.0)).is_break() {
+                return Some(self.travelled());
+            }
+            let remaining = target.travelled - self.at.travelled;
+            let length = self.step.min(remaining);
+            let mut to = if self.step >= 0.9 * remaining {
+                target.clone()
+            } else {
+                self.at.further(self.chain.path, &self.chain.exact, length)
+            };
+            self.steps += 1;
+            let given_up = match self.show(&mut to) {
+                Ok(()) => {
+                    self.at = to;
+                    self.step = (self.step * GROWTH).min(longest);
+                    shrink = SHRINK;
+                    false
+                }
+                Err(Refused { nearer: Some(Nearer::Boards(nearer)), .. }) => {
+                    self.upper = Some(nearer);
+                    false
+                }
+                Err(Refused { nearer: Some(Nearer::Obstacle(number, nearer)), .. }) => {
+                    self.beside[number].upper = Some(nearer);
+                    false
+                }
+                Err(Refused { obstacle, .. }) if length > least => {
+                    self.step = std::mem::replace(&mut shrink, SHRINK_FURTHER) * length;
+                    if self.links == Links::Front && obstacle == Obstacle::Stall(1) {
+                        self.links = Links::All;
+                    }
+                    false
+                }
+                Err(Refused { obstacle: Obstacle::Stall(_) | Obstacle::Behind, .. }) if self.links == Links::Front => {
+                    self.links = Links::All;
+                    self.covered = false;
+                    false
+                }
+                Err(Refused { obstacle: Obstacle::Stage(number), .. }) => {
+                    self.beside[number].is_lost = true;
+                    false
+                }
+                Err(_) => true,
+            };
+            if given_up || self.steps > self.most_steps || self.failed.is_some() {
+                return Some(self.travelled());
+            }
+        }
+        None
+    }
+
+    /// Shows a step from the current place, and prepares the next.
+    fn show(&mut self, to: &mut GridPoint) -> Result<(), Refused> {
+        let mut middle = self.grid_point(0.5 * self.at.travelled + 0.5 * to.travelled);
+        let mut from = std::mem::replace(&mut self.at, to.clone());
+        let shown = self.show_between(&mut StepPoints { from: &mut from, middle: &mut middle, to });
+        self.at = from;
+        let ShownStep { step, body_forward } = shown?;
+        self.chain.start = self.chain.start.or(step.spans.first().map(|span| span.1));
+        self.add_beside(&step);
+        if let Some(metres) = step.apart {
+            let least = self.shown.map_or(metres, |(least, _)| least.min(metres));
+            self.shown = Some((least, step.to));
+        }
+        let second = step.spans.get(1).copied();
+        self.write(&CertificateLine::Step(step));
+        self.covered &= body_forward;
+        if !self.covered {
+            self.links = Links::All;
+        } else if let (Links::All, Some(start), Some(second)) = (self.links, self.chain.start, second)
+            && self.chain.exact.in_order(start, second.0)
+        {
+            self.links = Links::Front;
+        }
+        Ok(())
+    }
+
+    /// Shows a step.
+    fn show_between(&self, points: &mut StepPoints) -> Result<ShownStep, Refused> {
+        let mut first_order = FirstOrderStep::new(&self.chain, points);
+        while first_order.listed.handles.len() <= self.chain.team.benches
+            && !self.is_enough(&first_order.listed, self.links)
+        {
+            let points = step_points(points.from, points.middle, points.to);
+            first_order.extend(points, self.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
+        }
+        if self.looks_at_boards() {
+            self.boards_are_apart(&first_order.listed, Some(&first_order), self.links).map_err(|benches| {
+                let [one, other] =
+                    benches.map(|bench| first_order.board(bench.min(first_order.listed.handles.len() - 2)));
+                let travelled = self.chain.exact.travelled(first_order.at);
+                let inside = travelled.lo >= 0.0
+                    && travelled.hi <= self.latest
+                    && benches[1] + 1 < first_order.listed.handles.len();
+                let nearer = inside
+                    .then(|| Upper {
+                        value: one.at_most(&other, When::Middle),
+                        travelled: points.middle.travelled,
+                        head: [first_order.at; 2],
+                        benches,
+                    })
+                    .filter(|nearer| self.upper.is_some_and(|upper| nearer.value < upper.value - LOWER));
+                Refused { obstacle: Obstacle::Pair(benches[0], benches[1]), nearer: nearer.map(Nearer::Boards) }
+            })?;
+        }
+        let beside = self.boards_are_beside(&first_order, points.middle.travelled)?;
+        let looks = self.looks_at_boards();
+        let FirstOrderStep { listed, places, .. } = first_order;
+        let spans: Vec<Span> = listed.handles[1..].iter().map(|handle| handle.span).collect();
+        let Span(from, to) = listed.handles[0].span;
+        let apart = looks.then(|| self.threshold());
+        let at = if looks || !beside.is_empty() { places } else { Vec::new() };
+        let (links, free) = (self.links, Vec::new());
+        let step = Step { links, from, to, moving: false, clear: false, spans, free, apart, beside, at };
+        Ok(ShownStep { step, body_forward: listed.body_forward })
+    }
+}
+
+/// A step that was shown.
+struct ShownStep {
+    step: Step,
+    /// True if every link behind the head's goes forward.
+    body_forward: bool,
+}
