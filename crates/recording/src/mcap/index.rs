@@ -19,7 +19,7 @@ use super::error::ReadError;
 
 /// The number of bytes of the footer with the final magic, and of the record before the index.
 const FOOTER_BYTES: usize = 37;
-const DATA_END_BYTES: u64 = 13;
+const DATA_END_BYTES: usize = 13;
 
 /// The contents of the index.
 #[derive(Default)]
@@ -53,10 +53,15 @@ pub(super) fn index(file: &mut File, length: u64) -> Result<Index, ReadError> {
         return Err(ReadError::NoIndex);
     }
     let damaged = |reason: &dyn Display| ReadError::Damaged { at, reason: reason.to_string() };
-    let begins = begins.checked_sub(DATA_END_BYTES).filter(|begins| *begins <= at);
+    let begins = begins.checked_sub(DATA_END_BYTES as u64).filter(|begins| *begins <= at);
     let begins = begins.ok_or_else(|| damaged(&"its index is elsewhere"))?;
-    let mut bytes = Vec::new();
+    let mut bytes = vec![0; DATA_END_BYTES];
     file.seek(SeekFrom::Start(begins))?;
+    file.read_exact(&mut bytes)?;
+    // Behind another record the reader would not compare the index with its check.
+    if !matches!(bytes[..], [op::DATA_END, 4, 0, 0, 0, 0, 0, 0, 0, ..]) {
+        return Err(damaged(&"its index is elsewhere"));
+    }
     file.read_to_end(&mut bytes)?;
     // A chunk is not expected here and is not read.
     let options = LinearReaderOptions::default().with_skip_start_magic(true).with_emit_chunks(true);

@@ -479,4 +479,22 @@ mod tests {
         let read = Recording::open(file.path()).map(drop);
         assert!(matches!(&read, Err(ReadError::Damaged { at, .. }) if *at == index.offset), "{read:?}");
     }
+
+    /// Behind a record of an unknown kind the index would be read without its check.
+    #[test]
+    fn an_index_that_does_not_follow_the_end_of_the_data_is_damaged() {
+        let mut writer = Writer::new(Cursor::new(Vec::new())).unwrap();
+        writer.finish().unwrap();
+        let mut bytes = writer.into_inner().into_inner();
+        // The footer has 37 bytes and begins with its opcode and its length.
+        let begins = bytes.len() - 37 + 9;
+        let index = u64::from_le_bytes(bytes[begins..begins + 8].try_into().unwrap()) as usize;
+        // The last record of the data has 13 bytes.
+        assert_eq!(bytes[index - 13], mcap::records::op::DATA_END);
+        bytes[index - 13] |= 0x80;
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), &bytes).unwrap();
+        let read = Recording::open(file.path()).map(drop);
+        assert!(matches!(&read, Err(ReadError::Damaged { .. })), "{read:?}");
+    }
 }
