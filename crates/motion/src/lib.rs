@@ -8,6 +8,7 @@ pub mod clearance;
 pub mod contact;
 pub mod ensemble;
 pub mod event;
+mod followed;
 pub mod ground;
 pub mod linkage;
 pub mod model;
@@ -16,8 +17,6 @@ pub mod singularities;
 pub mod solve;
 pub mod sweep;
 pub mod timeline;
-
-use std::sync::{Arc, OnceLock};
 
 use bench_dragon_messages::state::EventKind;
 
@@ -33,8 +32,9 @@ use crate::solve::table::{FollowerTable, Instructions};
 use crate::solve::{Solver, Velocities};
 
 use clearance::{ClearanceMonitor, Pairs, Precision};
-use contact::{ConservativeAdvancement, Found, LeastClearance, ObstacleClearance, Touch};
-use event::{Budget, Event, Progress, unreported};
+use contact::{Found, LeastClearance, ObstacleClearance, Touch};
+use event::{Budget, Event, Progress};
+use followed::Followed;
 use ground::Ground;
 use placement::{Placed, Placement};
 use singularities::Singularities;
@@ -118,18 +118,6 @@ pub struct Motion {
     followed: Followed,
 }
 
-/// The path with the branches of its followers, and the singular configurations: found when first needed, for all
-/// clones of the motion.
-#[derive(Debug, Clone, Default)]
-struct Followed(Arc<OnceLock<(Path, Singularities)>>);
-
-impl PartialEq for Followed {
-    /// They follow from the path and the team.
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
-}
-
 /// The events of a motion, in no order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionEvents {
@@ -139,13 +127,10 @@ pub struct MotionEvents {
     pub searched_until: Option<f64>,
 }
 
-/// Units of work after which the search for stall and lock gives up: about ten seconds.
-const SINGULARITIES_BUDGET: u64 = 50_000_000;
-
 /// Units of work after which the search for a contact, or for the least clearance, gives up: about half a minute.
 const CONTACT_BUDGET: u64 = 100_000_000;
 
-const NO_TABLE: &str = "there is no table for this team and path that is as exact";
+const NO_TABLE: &str = "there is no table for this team and path";
 
 /// Describes the measured error of a table, for people.
 fn measured(selection: &Selection, requested: f64) -> String {
@@ -214,30 +199,6 @@ impl Motion {
     /// Returns the numbers of which the path is made.
     pub fn description(&self) -> &PathDescription {
         &self.description
-    }
-
-    /// Returns the path, in its own coordinates, with the branches of this team's followers. An inward spiral has none.
-    pub fn path(&self) -> &Path {
-        self.search_branches(&mut unreported);
-        self.searched_path()
-    }
-
-    /// Searches for the branches of this team's followers, if they are not known yet. [`Motion::path`] does the same, but
-    /// cannot be stopped.
-    pub fn search_branches(&self, progress: Progress<'_>) {
-        if self.path.as_spiral().is_none() && self.followed.0.get().is_none() {
-            self.singularities(progress);
-        }
-    }
-
-    /// Returns the same path without branches, and without a search for them.
-    pub fn bare_path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Returns the same path, without branches before the search of [`Motion::singularities`] or if it was stopped.
-    fn searched_path(&self) -> &Path {
-        self.followed.0.get().map_or(&self.path, |followed| &followed.0)
     }
 
     /// Returns the benches.
@@ -326,7 +287,9 @@ impl Motion {
                         let why = measured(&selection, accuracy);
                         self.chosen_table(selection.table, &why)
                     }
-                    None => newton(format!("newton: {NO_TABLE}, and {accuracy:e} m is met by exact motion alone")),
+                    None => newton(format!(
+                        "newton: {NO_TABLE} that is as exact, and {accuracy:e} m is met by exact motion alone"
+                    )),
                 }
             }
             (Method::FollowerTable, _) => {
@@ -458,26 +421,6 @@ impl Motion {
         let mut budget = Budget::new(CONTACT_BUDGET, progress);
         let ground = self.ground.in_own_frame(&self.placement);
         self.advancement(&found).obstacle_clearances(&ground, 0.0, to, &mut budget).unwrap_or((Vec::new(), to))
-    }
-
-    /// Searches for stall, lock and the turns of the handles.
-    pub fn singularities(&self, progress: Progress<'_>) -> Singularities {
-        if let Some(known) = self.followed.0.get() {
-            return known.1.clone();
-        }
-        let mut budget = Budget::new(SINGULARITIES_BUDGET, progress);
-        let found = Singularities::search(&self.path, &self.team, &mut budget);
-        if !budget.is_stopped() {
-            let path = self.path.clone().with_branches(found.branches.clone());
-            self.followed.0.get_or_init(|| (path, found.clone()));
-        }
-        found
-    }
-
-    /// Returns the search for contacts and clearances, from the result of [`Motion::singularities`].
-    pub fn advancement<'a>(&'a self, found: &'a Singularities) -> ConservativeAdvancement<'a> {
-        ConservativeAdvancement::new(self.searched_path(), &self.team, &found.head_turns, &found.body_turns)
-            .with_tail_turns(&found.tail_turns)
     }
 
     /// Returns the lock or path end; if the search gave up before either, the path's end.

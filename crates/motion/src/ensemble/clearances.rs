@@ -81,8 +81,7 @@ impl Ensemble {
         Some(TimedClearance {
             least: LeastClearance { value, travelled, bench_a: bench_a + first, bench_b: bench_b + first },
             time: time_at(travelled),
-            searched_until: (found.searched_until < to)
-                .then(|| if found.searched_until > 0.0 { time_at(found.searched_until) } else { 0.0 }),
+            searched_until: (found.searched_until < to).then(|| self.searched_time(dragon, found.searched_until)),
         })
     }
 
@@ -152,13 +151,19 @@ impl Ensemble {
         let to = self.own_end(dragon, show_end);
         let (least, reached) = motion.obstacle_clearances(to, progress);
         let time_at = |travelled| motion.time_at(travelled) + delay;
-        let searched_until = (reached < to).then(|| if reached > 0.0 { time_at(reached) } else { 0.0 });
+        let searched_until = (reached < to).then(|| self.searched_time(dragon, reached));
         let of_show = |(obstacle, least): (usize, Option<ObstacleClearance>)| {
             let ObstacleClearance { value, travelled, bench } = least?;
             let least = ObstacleClearance { value, travelled, bench: bench + self.first_handles[dragon] as u32 };
             Some(TimedObstacleClearance { obstacle, least, time: time_at(travelled), searched_until })
         };
         least.into_iter().enumerate().map(of_show).collect()
+    }
+
+    /// Returns the time up to which a search has come. One that has not left the start knows nothing of the delay either.
+    fn searched_time(&self, dragon: usize, travelled: f64) -> f64 {
+        let Dragon { delay, motion, .. } = &self.dragons[dragon];
+        if travelled > 0.0 { motion.time_at(travelled) + delay } else { 0.0 }
     }
 
     /// Returns the metres that a dragon's head has travelled when the show ends.

@@ -111,9 +111,13 @@ impl Reference {
     /// along the curve.
     ///
     /// # Errors
-    /// A sentence if there is no memory for the constants pi and ln 2.
+    /// A sentence if there is no memory for the constants pi and ln 2, or if a path with tight bends is too long.
     pub fn new(team: Team, description: &PathDescription, head_speed: f64) -> Result<Self, String> {
-        Ok(Self { team, path: RealPath::new(description)?, head_speed, traces: Vec::new() })
+        let path = RealPath::new(description)?;
+        if [0, 1, team.benches - 1].into_iter().any(|bench| trace::is_too_long(&path, team.link(bench))) {
+            return Err("the path has tight bends and is too long for the reference with 38 digits".to_owned());
+        }
+        Ok(Self { team, path, head_speed, traces: Vec::new() })
     }
 
     /// Returns all handles at `time` simulated seconds, the head first.
@@ -151,8 +155,9 @@ impl Reference {
 
     /// Returns the follower: a guess by a walk back in doubles, then Newton's method.
     ///
-    /// The guess is the first place at the distance, or the one that continues it, up to the rounding of doubles. The result of Newton's method counts as the same
-    /// place if it is within a millionth of the link and the distance grows backward there.
+    /// The guess is the first place at the distance, or the one that continues it, up to the rounding of doubles. The
+    /// result of Newton's method counts as the same place if it is within a millionth of the link and the distance grows
+    /// backward there.
     fn follower(&mut self, segment: usize, front: &RealParam, link: f64) -> Result<(usize, RealParam), NoFollower> {
         let (mut segment, guess) = self.guess(segment, front, link)?;
         let mut place = self.settled(segment, front, guess.clone(), link)?;

@@ -18,7 +18,7 @@ const POINTS_IN_LINK: f64 = 400.0;
 /// The most points that a follower passes while its front passes one: a follower that passes more has vanished.
 const MOST_PASSED: usize = 60;
 
-/// The most points. On a longer path with tight bends the first place is taken for the follower.
+/// The most points of a path with tight bends.
 const MOST_POINTS: f64 = 1e7;
 
 /// The turning, in radians, and the length, in links, of a bend behind the front handle that is not tight: its chord is
@@ -37,16 +37,26 @@ pub(super) struct Trace {
     rears: Vec<usize>,
 }
 
+/// Returns true if a path that a link has to be traced along has more than the most points.
+pub(super) fn is_too_long(path: &RealPath, link: f64) -> bool {
+    let length = path.segment(path.segments() - 1).end.rounded();
+    has_tight_bends(path, link) && 2.0 * length * POINTS_IN_LINK / link > MOST_POINTS
+}
+
+fn has_tight_bends(path: &RealPath, link: f64) -> bool {
+    let segments = (0..path.segments()).map(|index| path.segment(index));
+    let tightest = segments.map(|segment| segment.curve.tightest(&segment.first, &segment.last));
+    path.segments() > 1 && tightest.fold(0.0, f64::max) * 1.5 * link >= TIGHT
+}
+
 impl Trace {
     /// Traces a link. Returns `None` if no bend of the path is so tight that a nearer place could come to the link's
     /// distance.
     pub fn new(path: &RealPath, link: f64) -> Option<Self> {
         let segments = || (0..path.segments()).map(|index| path.segment(index));
-        let tightest = segments().map(|segment| segment.curve.tightest(&segment.first, &segment.last));
         let length = path.segment(path.segments() - 1).end.rounded();
         let step = link / POINTS_IN_LINK;
-        let is_straight = tightest.fold(0.0, f64::max) * 1.5 * link < TIGHT;
-        if path.segments() == 1 || is_straight || 2.0 * length / step > MOST_POINTS {
+        if !has_tight_bends(path, link) {
             return None;
         }
         let mut trace = Self { link, points: vec![], backs: vec![], begins: vec![], rears: vec![] };
