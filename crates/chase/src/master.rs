@@ -114,7 +114,7 @@ impl<'a, S: Sink> MasterClock<'a, S> {
     /// Writes the bytes that are due before the next poll, each at its moment.
     fn write_due(&mut self) -> io::Result<()> {
         let until_ns = monotonic_ns() + AHEAD_NS;
-        while self.sink.is_ready() {
+        while self.sink.is_ready() && !self.stop.load(Ordering::Relaxed) {
             let Some(due) = self.signal.next(self.course.as_ref(), monotonic_ns(), until_ns) else { break };
             sleep_until(due.at_ns);
             self.sink.write(&due.bytes)?;

@@ -1,7 +1,8 @@
 //! Programs that follow a running publisher from another process: all that a subscriber in Rust compiles.
 //!
 //! [`feed`] is the one source of a publisher's messages; [`hermite`] interpolates between frames; [`control`] sends
-//! commands. This crate knows the messages and no solver.
+//! commands. It also has the senders of single messages that a publisher and a chase share. This crate knows the messages
+//! and no solver.
 
 pub mod clock;
 pub mod connection;

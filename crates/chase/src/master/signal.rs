@@ -234,6 +234,9 @@ impl Signal for Ltc {
             self.lost_ns += behind_ns;
             began_ns += behind_ns;
             self.began_ns = Some(began_ns);
+        } else if behind_ns > MOST_BEHIND_NS {
+            let behind_ms = behind_ns / 1_000_000;
+            log::warn!("this machine is {behind_ms} ms late: the labels of that time are those of the newest frame");
         }
         let due = ((now_ns - began_ns) as f64 / sample_ns) as u64 + 1;
         let count = due.saturating_sub(self.samples).min(MOST_SAMPLES);
