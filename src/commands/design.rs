@@ -54,7 +54,12 @@ struct SavedFile {
 }
 
 impl SavedFile {
+    /// Returns the text with the line ends that a text has in a browser.
     fn read(&self) -> Result<String, String> {
+        Ok(self.text()?.replace("\r\n", "\n"))
+    }
+
+    fn text(&self) -> Result<String, String> {
         Ok(SceneText::load(&self.path).map_err(|error| error.to_string())?.text)
     }
 
@@ -62,13 +67,20 @@ impl SavedFile {
     fn save(&self, base: &str, text: &str) -> Result<(), SaveError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         let shown = self.path.display();
-        if self.read().map_err(SaveError::Failed)? != base {
+        let file = self.text().map_err(SaveError::Failed)?;
+        let known = file.replace("\r\n", "\n");
+        // The answer of an earlier save may have been lost.
+        if known == text {
+            return Ok(());
+        }
+        if known != base {
             let sentence = format!(
                 "{shown} has changed since this page read it, so nothing was written: load the page again to see the \
                  file (undo brings your text back), or download the scene"
             );
             return Err(SaveError::Changed(sentence));
         }
+        let text = if file.contains("\r\n") { text.replace('\n', "\r\n") } else { text.to_owned() };
         let written = NewFile::create(&self.path).and_then(|mut file| {
             io::Write::write_all(&mut file, text.as_bytes())?;
             file.finish()

@@ -48,8 +48,8 @@ pub fn events(common: &Common, arguments: &EventsArguments) -> Result<(), Comman
     stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     let proved = match &arguments.certify {
-        Some(file) => Some(certified(&scene, &timeline, &text.text, file, common)?),
-        None => None,
+        Some(file) if !timeline.is_stopped() => Some(certified(&scene, &timeline, &text.text, file, common)?),
+        _ => None,
     };
     let outcome_of = |kind: EventKind, obstacle: Option<usize>, dragons: &[usize]| {
         let outcomes = proved.as_ref()?.iter();

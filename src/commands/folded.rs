@@ -10,8 +10,9 @@ pub const COLUMNS: usize = 120;
 pub fn folded(text: &str, columns: usize) -> String {
     let fold = |line: &str| {
         let indent = " ".repeat(column_of_words(line).min(columns / 2));
-        // A split at hyphens would part options.
+        // A split at hyphens would part options, and one within words would part paths.
         let options = Options::new(columns).subsequent_indent(&indent).word_splitter(WordSplitter::NoHyphenation);
+        let options = options.break_words(false);
         textwrap::fill(line, options)
     };
     text.split('\n').map(fold).collect::<Vec<_>>().join("\n")

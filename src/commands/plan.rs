@@ -181,11 +181,10 @@ fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Pat
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        let of_boards = value_hi;
-        let value_hi = stage.value(of_boards);
-        let status = status(proved && value_hi == of_boards);
+        let (of_boards, value) = (value_hi, stage.value(value_hi));
+        let (status, value_hi) = (status(proved && value == of_boards), value.or(of_boards));
         let (bench_a, bench_b) = (overlap.map(|overlap| overlap.bench_a), overlap.map(|overlap| overlap.bench_b));
-        let (value, head_radius) = (value_hi, overlap.map(|overlap| overlap.head_radius));
+        let head_radius = overlap.map(|overlap| overlap.head_radius);
         let value_lo = (intervals > 0).then_some(value_lo);
         output.json(&PitchLine {
             plan: "pitch",

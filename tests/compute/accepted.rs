@@ -100,7 +100,7 @@ fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosur
 /// Boards that come nearest at the very lock that ends the show. Over the last nanometre before a lock they move by
 /// the root of that, so a certificate has an upper bound only where its steps come nearer to the lock.
 #[test]
-fn a_clearance_that_is_least_at_a_lock_has_an_upper_bound_where_the_steps_come_to_it() {
+fn a_clearance_that_is_least_at_a_lock_claims_no_more_than_its_steps() {
     let (mut at_lock, mut index) = (0, 0);
     while at_lock < 8 {
         assert!(index < 2000, "{at_lock} scenes of {index}");

@@ -60,9 +60,9 @@ impl Heard {
             let label = self.label(is_running, "a running label");
             labels.push((number(&label, "late"), number(&label, "moment")));
             if labels.len() >= RUNNING && labels.len().is_multiple_of(RUNNING / 3) {
-                match fault_of(&labels[labels.len() - RUNNING..]) {
-                    Some(found) => fault = found,
-                    None => return println!("{}: on time after {} labels", self.name, labels.len()),
+                match times_of(&labels[labels.len() - RUNNING..]) {
+                    (false, found) => fault = found,
+                    (true, found) => return println!("{}: after {} labels {found}", self.name, labels.len()),
                 }
             }
         }
@@ -84,9 +84,10 @@ impl Heard {
     }
 }
 
-/// Returns how far labels, each with its delay and its moment, are off. The least delays show the moments of the
-/// sender. The median excludes labels that wait for the next frame of the show: that would be 8 ms.
-fn fault_of(labels: &[(f64, f64)]) -> Option<String> {
+/// Returns whether labels, each with its delay and its moment, are on time, and how far they are off. The least delays
+/// show the moments of the sender. The median excludes labels that wait for the next frame of the show: that would be
+/// 8 ms.
+fn times_of(labels: &[(f64, f64)]) -> (bool, String) {
     let least = |labels: &[(f64, f64)]| labels.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
     let third = labels.len() / 3;
     let (first, last) = (least(&labels[..third]), least(&labels[2 * third..]));
@@ -95,8 +96,7 @@ fn fault_of(labels: &[(f64, f64)]) -> Option<String> {
     late.sort_by(f64::total_cmp);
     let (least, median) = (late[0], late[labels.len() / 2]);
     let is_on_time = least.abs() < 1e-3 && median < 5e-3 && drift.abs() < 1e-4;
-    let off = || format!("{:.3} ms, median {:.3} ms, {:.1} ppm: {late:?}", 1e3 * least, 1e3 * median, 1e6 * drift);
-    (!is_on_time).then(off)
+    (is_on_time, format!("{:.3} ms, median {:.3} ms, {:.1} ppm", 1e3 * least, 1e3 * median, 1e6 * drift))
 }
 
 /// Returns the label of a simulated time at 25 frames per second, an hour later.

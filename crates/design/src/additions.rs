@@ -11,10 +11,9 @@ use crate::handles::arc_through;
 use crate::request::Addition;
 use crate::scene::{DesignedScene, Fault};
 use crate::tables::{Path, table};
-use bench_dragon_messages::MOST_OBSTACLES;
 use bench_dragon_motion::model::description::PathDescription;
 use bench_dragon_motion::model::{Point, Vector};
-use bench_dragon_show::scene::MOST_DRAGONS;
+use bench_dragon_show::scene::{MOST_DRAGONS, MOST_OBSTACLES};
 
 /// The length of a line, and the radius of an arc, that a page adds without a place, in metres.
 const LINE: f64 = 5.0;

@@ -16,7 +16,9 @@ use crate::edit;
 use crate::hand_outs::{Form, HandOut, hand_outs};
 use crate::request::Setting;
 use crate::scene::DesignedScene;
-use bench_dragon_certify::plan::{Spaced, greatest_speed, least_pitch, least_turn};
+use bench_dragon_certify::plan::{
+    self, Spaced, greatest_speed, is_on_stage, least_pitch, least_turn, outside_keep_outs,
+};
 use bench_dragon_certify::{CertifiedEvent, MOST_STEPS, Status, certify};
 use bench_dragon_fit::search::{Vary, fit};
 use bench_dragon_motion::Motion;
@@ -126,10 +128,30 @@ fn with(scene: &DesignedScene, field: &str, value: Option<f64>) -> Option<String
     edit::set(scene, &values).ok()
 }
 
-/// Returns a note that obstacles are not part of a plan.
-fn without_obstacles(scene: &DesignedScene) -> &'static str {
-    let is_empty = scene.scene.ensemble.ground().is_empty();
-    if is_empty { "" } else { " Obstacles are left out: the plan is about boards alone." }
+/// Returns the number with which boards also stay outside the keep-outs, and a sentence about these. `value` is the
+/// answer for the boards alone.
+fn on_stage(
+    motion: &Motion,
+    asked: Spaced<'_>,
+    planned: plan::Planned,
+    value: Option<f64>,
+    progress: Progress<'_>,
+) -> (Option<f64>, String) {
+    if motion.ground().is_empty() {
+        return (value, String::new());
+    }
+    if !is_on_stage(motion, planned) {
+        return (value, " Obstacles are left out: the plan is about boards alone.".to_owned());
+    }
+    let outside = value.and_then(|value| outside_keep_outs(asked, motion, planned, value, progress));
+    match outside.map(|outside| outside.value) {
+        Some(outside) if Some(outside) == value => (value, " They stay outside the keep-outs, too.".to_owned()),
+        Some(outside) => (
+            Some(outside),
+            format!(" {} m is the least found with which they stay outside the keep-outs.", figure(outside)),
+        ),
+        None => (None, " No number was found with which they are proved to stay outside the keep-outs.".to_owned()),
+    }
 }
 
 /// Returns the clearance that the scene requires of boards, in metres.
@@ -160,30 +182,30 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
     let clearance = required(scene);
     let asked = Spaced { team: motion.team(), clearance };
     let found = least_pitch(asked, radius, progress).map_err(|error| error.to_string())?;
+    let (value, of_stage) = on_stage(motion, asked, plan::Planned::Pitch { radius }, found.value_hi, progress);
     let sentence = match found.value_hi {
         Some(pitch) => format!(
-            "With a pitch of {} m the head comes to {} m from the centre, and {} before.{}",
+            "With a pitch of {} m the head comes to {} m from the centre, and {} before.{of_stage}",
             figure(pitch),
             figure(radius),
             apart(clearance),
-            without_obstacles(scene)
         ),
         None => "No pitch was found.".to_owned(),
     };
     let answer = json!({
         "plan": "pitch",
-        "status": status(found.proved),
-        "value": found.value_hi,
+        "status": status(found.proved && value == found.value_hi),
+        "value": value,
         "from": found.from,
         "value_lo": (found.intervals > 0).then_some(found.value_lo),
-        "value_hi": found.value_hi,
+        "value_hi": value.or(found.value_hi),
         "bench_a": found.overlap.map(|overlap| overlap.bench_a),
         "bench_b": found.overlap.map(|overlap| overlap.bench_b),
         "head_radius": found.overlap.map(|overlap| overlap.head_radius),
         "clearance": Some(clearance).filter(|clearance| *clearance > 0.0),
         "sentence": sentence,
     });
-    Ok(Planned::numbers(answer, with(scene, "path.pitch", found.value_hi)))
+    Ok(Planned::numbers(answer, with(scene, "path.pitch", value)))
 }
 
 /// The turn of a scene: its pitch, its ratio of arcs, and the number of the text that a radius of the turn gives to a
@@ -229,16 +251,17 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
     let clearance = required(scene);
     let asked = Spaced { team: motion.team(), clearance };
     let found = least_turn(asked, pitch, Some(arc_ratio), progress).map_err(|error| error.to_string())?;
+    let (value, of_stage) = on_stage(motion, asked, plan::Planned::Turn { arc_ratio }, found.value_hi, progress);
     let sentence = match (found.value, found.length) {
         (Some(radius), Some(length)) => format!(
-            "With a turn radius of {} m the team turns round on this pitch, and {}: the S is {} m long.{}",
+            "With a turn radius of {} m the team turns round on this pitch, and {}: the S is {} m long.{of_stage}",
             figure(radius),
             apart(clearance),
             figure(length),
-            without_obstacles(scene)
         ),
         _ => "No radius was found.".to_owned(),
     };
+    let found = if value == found.value_hi { found } else { found.with_radius(value, pitch) };
     let answer = json!({
         "plan": "turn",
         "status": status(found.proved),
@@ -253,7 +276,7 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
         "clearance": Some(clearance).filter(|clearance| *clearance > 0.0),
         "sentence": sentence,
     });
-    let planned = found.value_hi.or(found.value).and_then(number);
+    let planned = found.value.and_then(number);
     let text = planned.and_then(|(field, value)| with(scene, &field, Some(value)));
     Ok(Planned::numbers(answer, text))
 }
@@ -306,6 +329,14 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
             format!("No numbers were found that keep what is required: at best {} m are missing.", figure(-margin))
         }
     };
+    let of_rest = found.without_boundary.map(|rest| {
+        format!(
+            " The team stands outside the boundary at the start; all else has {} m to spare with these numbers. Draw the \
+             boundary round the street in which the team waits.",
+            figure(rest)
+        )
+    });
+    let sentence = sentence + of_rest.as_deref().unwrap_or_default();
     let fields: BTreeMap<&str, f64> = found.fields.iter().map(|(name, value)| (name.as_str(), *value)).collect();
     let answer = json!({
         "plan": "fit",
@@ -315,7 +346,8 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
         "margin": margin,
         "sentence": sentence,
     });
-    Ok(Planned::numbers(answer, found.is_found().then_some(found.text)))
+    let has_text = found.is_found() || found.without_boundary.is_some_and(|rest| rest >= 0.0);
+    Ok(Planned::numbers(answer, has_text.then_some(found.text)))
 }
 
 /// Proves the events, as `events --certify` does, without a certificate.

@@ -108,7 +108,10 @@ pub fn fit(
     let expected = scattered + per_step * steps as usize;
     let state = State { progress, refusal: None, best: None, given: Vec::new(), judged: (0, 0), stopped: false };
     let mut search = Search { text, fields, rules, expected, state: RefCell::new(state) };
-    search.rules.with_boundary |= search.can_start_inside(scattered, seed);
+    // Only a boundary outside which the team stands is looked at again.
+    if !search.rules.with_boundary {
+        search.rules.with_boundary = search.can_start_inside(scattered, seed);
+    }
     search.run(scattered, seed);
     search.finish()
 }

@@ -117,6 +117,19 @@ impl From<EventKind> for FrameState {
     }
 }
 
+const _: () = {
+    let mut at = 0;
+    while at < FrameState::ALL.len() {
+        assert!(FrameState::ALL[at] as usize == at);
+        at += 1;
+    }
+    assert!(Level::Approaching as u32 == FrameState::Approaching as u32);
+    assert!(Level::Contact as u32 == FrameState::Contact as u32);
+    assert!(Level::Stall as u32 == FrameState::Stall as u32);
+    assert!(Level::Lock as u32 == FrameState::Lock as u32);
+    assert!(Level::Obstacle as u32 == FrameState::Obstacle as u32);
+};
+
 impl From<Level> for FrameState {
     fn from(level: Level) -> Self {
         // Levels have the numbers of their states.

@@ -37,6 +37,7 @@ pub use self::require::Requirements;
 use self::ros2::RawRos2;
 pub use self::source::CheckedNumber;
 use self::source::Source;
+pub use self::stage::MOST_OBSTACLES;
 use self::stage::RawStage;
 use self::team::RawTeam;
 pub use self::text::{SceneText, printable};

@@ -152,10 +152,11 @@ impl OneSolver {
 
     /// Compares the place of a handle with the solution. Returns the tolerance in metres.
     fn compare_place(&mut self, first: usize, handle: usize, time: f64, x: f64, y: f64) -> Result<f64, String> {
-        let place = self.chain.x.get(handle).zip(self.chain.y.get(handle));
-        let metres = place.map_or(f64::INFINITY, |(own_x, own_y)| Vector::new(x - own_x, y - own_y).norm());
-        // Both solutions have rounding errors.
-        let rounding = 8.0 * f64::EPSILON * (Vector::new(x, y).norm() + self.head_speed * time + self.placed);
+        let own = self.chain.x.get(handle).zip(self.chain.y.get(handle)).map(|(x, y)| Vector::new(*x, *y));
+        let metres = own.map_or(f64::INFINITY, |own| (Vector::new(x, y) - own).norm());
+        // Both solutions have rounding errors. A place that is judged does not widen what is allowed.
+        let far = own.map_or(0.0, |own| own.norm());
+        let rounding = 8.0 * f64::EPSILON * (far + self.head_speed * time + self.placed);
         let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, handle);
         if metres.is_nan() || metres > tolerance {
             let handle = first + handle + 1;
@@ -193,4 +194,25 @@ fn growth(speeds: &[f64], handle: usize) -> f64 {
     let growth = speeds.get(handle).map_or(f64::NAN, |speed| speed.abs()) / least;
     // NaN if this handle and one before it stand still.
     if growth.is_nan() { MOST_GROWTH } else { growth.clamp(1.0, MOST_GROWTH) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneText;
+
+    #[test]
+    fn a_place_beyond_all_bounds_is_not_close() {
+        let scene = SceneText::paper().parse().unwrap();
+        let mut solver = SecondSolver::of(&scene);
+        let [x, y] = {
+            let mut chain = Chain::new(224);
+            scene.ensemble.only().unwrap().solver(Velocities::Computed).solver.solve(1.0, &mut chain).unwrap();
+            [chain.x[7], chain.y[7]]
+        };
+        solver.compare(1.0, 1.0, &[(7, x, y)]).unwrap();
+        for beyond in [x + 1e-6, 1e9, 1e200, f64::MAX, f64::INFINITY, f64::NAN] {
+            assert!(solver.compare(1.0, 1.0, &[(7, beyond, y)]).is_err(), "{beyond}");
+        }
+    }
 }

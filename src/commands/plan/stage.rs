@@ -65,7 +65,7 @@ impl Stage {
         } else {
             let below = match self.obstacle(motion) {
                 Some(name) => format!("with a {what} just below, a board is in the keep-out of the {name}"),
-                None => format!("with a {what} just below, boards alone are in the way"),
+                None => format!("with a {what} just below, boards alone are in the way, or it could not be decided"),
             };
             format!(
                 "On the scene's stage {} m is the least {what} found with which all boards stay outside the keep-outs, \

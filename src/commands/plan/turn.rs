@@ -55,7 +55,8 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        let on_stage = on_stage(&found, &stage, pitch);
+        let value = stage.value(found.value_hi);
+        let on_stage = if value == found.value_hi { found } else { found.with_radius(value, pitch) };
         output.json(&TurnLine { obstacle: stage.obstacle(&motion), ..line(&on_stage, clearance) })?;
     } else {
         for sentence in sentences(&scene, (pitch, clearance), arc_ratio.is_none(), &found) {
@@ -66,17 +67,6 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
         }
     }
     output.finish().and(unstopped())
-}
-
-/// Returns the answer with the radius that keeps boards outside the keep-outs, if that is another one.
-fn on_stage(found: &LeastTurn, stage: &Stage, pitch: f64) -> LeastTurn {
-    let value = stage.value(found.value_hi);
-    if value == found.value_hi {
-        return *found;
-    }
-    let a = pitch / std::f64::consts::TAU;
-    let length = value.map(|radius| 2.0 * radius.hypot(a) * (radius / a).atan());
-    LeastTurn { value, value_hi: value, length, proved: false, ..*found }
 }
 
 fn line(found: &LeastTurn, clearance: f64) -> TurnLine {

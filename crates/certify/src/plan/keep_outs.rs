@@ -71,6 +71,8 @@ pub fn outside_keep_outs(
     progress: Progress<'_>,
 ) -> Option<Outside> {
     let on_stage = OnStage { asked, motion, planned };
+    // A head that starts inside the radius has no way to it.
+    on_stage.with(value)?;
     let (mut blocked, mut free, mut last) = (None, value, None);
     while let Some(why) = on_stage.blocked(free, progress) {
         if progress(0.0).is_break() || free > MOST * value {
@@ -119,7 +121,7 @@ impl OnStage<'_> {
         let Self { motion, planned, .. } = self;
         let moved = Motion::new(description, *motion.team(), motion.head_speed(), motion.method()).ok()?;
         let moved = moved.placed(*motion.placement()).on_ground(motion.ground().clone());
-        let length = moved.path().length();
+        let length = moved.bare_path().length();
         let to = match *planned {
             Planned::Pitch { radius } => length - Path::spiral(value, radius / value).length(),
             Planned::Turn { .. } => length,

@@ -5,6 +5,7 @@
 //! proof. The ordinary search ([`super::turn_trial`]) only suggests where to search.
 
 use std::cell::{Cell, RefCell};
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use super::PlanError;
@@ -43,6 +44,16 @@ pub struct LeastTurn {
     pub intervals: u64,
     /// The lengths of path before and after the S that the proof for `value_hi` covers, in metres.
     pub leads: Option<[f64; 2]>,
+}
+
+impl LeastTurn {
+    /// Returns the answer with another radius on a spiral of a pitch, in metres, which is not proved to be the least one.
+    /// Without a radius the upper bound remains.
+    pub fn with_radius(&self, radius: Option<f64>, pitch: f64) -> Self {
+        let a = pitch / TAU;
+        let length = radius.map(|radius| 2.0 * radius.hypot(a) * (radius / a).atan());
+        Self { value: radius, value_hi: radius.or(self.value_hi), length, proved: false, ..*self }
+    }
 }
 
 /// The event that keeps the turn from being smaller.

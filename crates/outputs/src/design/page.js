@@ -234,6 +234,8 @@ function allowed(isAllowed) {
 function offer({ scene: offered, error }) {
   const given = offered?.text ?? error.text ?? "";
   if (history.key !== null) {
+    // A save whose answer was lost.
+    if (given === text.value) history.saved(given);
     if (hello.save && given !== history.base) tell(`${hello.file} has changed since this page read it. Load the page again to see the file; undo brings your text back.`);
     return false;
   }
@@ -308,13 +310,16 @@ function keep({ name, kind, text: content }) {
   setTimeout(() => URL.revokeObjectURL(address), 1000);
 }
 
+/** The time after which a save is given up, so that the next one begins, ms. */
+const SAVE_LIMIT = 10_000;
 /** Writes the file, after an earlier save, which changes its base. */
 const save = () => (saving = saving.then(write));
 async function write() {
   const headers = token === null ? {} : { Authorization: `Bearer ${token}` }, { value } = text;
   const body = JSON.stringify({ base: history.base, text: value });
   try {
-    const answer = await fetch(new URL("save", import.meta.url), { method: "POST", body, headers });
+    const answer = await fetch(new URL("save", import.meta.url), { method: "POST", body, headers,
+        signal: AbortSignal.timeout(SAVE_LIMIT) });
     if (answer.ok) history.saved(value);
     tell(answer.ok ? `Saved ${hello.file}.` : await answer.text());
   } catch {

@@ -72,7 +72,7 @@ export class Plans {
 
   /** Drops a result of a text before the change `accepted`. */
   outdate(accepted) {
-    if (this.text !== null && this.id < accepted) this.clear();
+    if (!element("plan-discard").hidden && this.id < accepted) this.clear();
   }
 
   /** A search of an earlier text is over. */

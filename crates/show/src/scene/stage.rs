@@ -12,7 +12,7 @@ use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::shape::{MOST_CORNERS, Shape};
 
 /// The greatest number of obstacles, the boundary not counted.
-pub(crate) const MOST_OBSTACLES: usize = 64;
+pub const MOST_OBSTACLES: usize = 64;
 /// The greatest number of bytes of an obstacle's name: the stage message has no room for more.
 const MOST_NAME_BYTES: usize = 64;
 
