@@ -21,7 +21,7 @@ use super::lines::{CertificateLine, Links};
 use super::path::ExactPath;
 use super::place::Place;
 use super::search::{LEAST, path_end};
-use super::step::Chain;
+use super::step::{Chain, Obstacle};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::contact::LeastClearance;
@@ -103,6 +103,18 @@ pub(super) fn stays_outside(motion: &Motion, to: f64, progress: Progress<'_>) ->
 fn chain_of(motion: &Motion) -> Chain<'_> {
     let chain = Chain::new(motion.path(), ExactPath::new(motion.description()), motion.team());
     Chain { barriers: ground::barriers(motion), ..chain }
+}
+
+/// A step that was not shown completely.
+struct Refused {
+    obstacle: Obstacle,
+    nearer: Option<Nearer>,
+}
+
+/// A lower upper bound, found where a step is refused.
+enum Nearer {
+    Boards(Upper),
+    Obstacle(usize, UpperBeside),
 }
 
 /// An upper bound of the clearance of two boards, and its place.

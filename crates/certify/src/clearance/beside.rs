@@ -1,7 +1,6 @@
 //! The clearance of obstacles over the steps of a show. Lemma 11 of `docs/proofs.md`.
 
-use super::steps::{Nearer, Refused};
-use super::{Descent, LOWER, ObstacleEnclosure, WIDTH};
+use super::{Descent, LOWER, Nearer, ObstacleEnclosure, Refused, WIDTH};
 use crate::first_order::When;
 use crate::first_order_step::{FirstOrderStep, step_points};
 use crate::grid::GridPoint;

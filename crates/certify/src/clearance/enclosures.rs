@@ -1,4 +1,4 @@
-//! What a search for the least clearances takes, and what it returns.
+//! The hints that a search for the least clearances takes, and the enclosures that it returns.
 
 use bench_dragon_motion::contact::LeastClearance;
 use bench_dragon_motion::timeline::TimedObstacleClearance;

@@ -6,8 +6,7 @@ use super::super::grid::GridPoint;
 use super::super::lines::{CertificateLine, Links, Step};
 use super::super::place::Span;
 use super::super::step::Obstacle;
-use super::beside::UpperBeside;
-use super::{Descent, LOWER, Upper};
+use super::{Descent, LOWER, Nearer, Refused, Upper};
 use bench_dragon_motion::event::Progress;
 
 /// The factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and
@@ -18,18 +17,6 @@ const SHRINK_FURTHER: f64 = 0.5;
 
 /// The shortest step, as a share of the path length in metres.
 const LEAST_STEP: f64 = 1e-14;
-
-/// A step that was not shown completely.
-pub(super) struct Refused {
-    pub obstacle: Obstacle,
-    pub nearer: Option<Nearer>,
-}
-
-/// A lower upper bound, found where a step is refused.
-pub(super) enum Nearer {
-    Boards(Upper),
-    Obstacle(usize, UpperBeside),
-}
 
 impl Descent<'_, '_> {
     /// Goes to `target`. Returns the travel that it reached if a step before cannot be shown.
