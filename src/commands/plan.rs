@@ -8,14 +8,13 @@ use std::path::{Path, PathBuf};
 
 use bench_dragon::certify::CertificateLine;
 use bench_dragon::certify::plan::{
-    GreatestSpeed, LeastPitch, Overlap, PlanError, Planned, Spaced, certify_greatest_speed, certify_least_pitch,
-    greatest_speed, least_pitch,
+    GreatestSpeed, LeastPitch, Overlap, PitchLine, PlanError, Planned, Spaced, SpeedLine, certify_greatest_speed,
+    certify_least_pitch, greatest_speed, least_pitch,
 };
 use bench_dragon::certify::speed::MOST_HANDLES;
 use bench_dragon::show::scene::{Accepted, Scene};
-use serde::Serialize;
 
-use self::stage::Stage;
+use self::stage::{on_stage, stage_sentence};
 use super::certificate_file::CertificateFile;
 use super::events::bench_name;
 use super::scene_argument::scene_argument;
@@ -97,49 +96,6 @@ pub fn come_too_near(clearance: f64) -> String {
     if clearance > 0.0 { format!("come as near as {clearance} m") } else { "touch".to_owned() }
 }
 
-/// The line of `plan pitch --json`.
-#[derive(Serialize)]
-struct PitchLine {
-    plan: &'static str,
-    status: &'static str,
-    value: Option<f64>,
-    /// The least pitch examined.
-    from: f64,
-    value_lo: Option<f64>,
-    value_hi: Option<f64>,
-    bench_a: Option<u32>,
-    bench_b: Option<u32>,
-    head_radius: Option<f64>,
-    /// The required clearance, if any.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    clearance: Option<f64>,
-    /// The obstacle of the stage that decides, if one does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    obstacle: Option<String>,
-}
-
-/// The line of `plan speed --json`.
-#[derive(Serialize)]
-struct SpeedLine {
-    plan: &'static str,
-    status: &'static str,
-    value: f64,
-    value_lo: f64,
-    value_hi: f64,
-    time: f64,
-    handle: u32,
-    ratio: f64,
-}
-
-/// Returns the status of a JSON line.
-fn status(proved: bool) -> &'static str {
-    match (proved, are_searches_stopped()) {
-        (true, _) => "proved",
-        (false, true) => "stopped",
-        (false, false) => "given_up",
-    }
-}
-
 /// Returns the words for the end of a search that came to no end.
 fn given_up() -> &'static str {
     if are_searches_stopped() { "was stopped" } else { "was given up" }
@@ -176,31 +132,14 @@ fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Pat
     } else {
         least_pitch(asked, radius, &mut progress)?
     };
-    let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;
-    let stage = Stage::search(&motion, asked, Planned::Pitch { radius }, value_hi, &mut progress);
+    let stage = on_stage(&motion, asked, Planned::Pitch { radius }, found.value_hi, &mut progress);
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        let (of_boards, value) = (value_hi, stage.value(value_hi));
-        let (status, value_hi) = (status(proved && value == of_boards), value.or(of_boards));
-        let (bench_a, bench_b) = (overlap.map(|overlap| overlap.bench_a), overlap.map(|overlap| overlap.bench_b));
-        let head_radius = overlap.map(|overlap| overlap.head_radius);
-        let value_lo = (intervals > 0).then_some(value_lo);
-        output.json(&PitchLine {
-            plan: "pitch",
-            status,
-            value,
-            from,
-            value_lo,
-            value_hi,
-            bench_a,
-            bench_b,
-            head_radius,
-            clearance: Some(clearance).filter(|clearance| *clearance > 0.0),
-            obstacle: stage.obstacle(&motion),
-        })?;
+        output.json(&PitchLine::new(&found, clearance, (&stage, &motion), are_searches_stopped()))?;
         return output.finish().and(unstopped());
     }
+    let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;
     if let Some(value_hi) = value_hi {
         output.line(&format!(
             "With a pitch of {value_hi} m the head reaches {radius} m, and no two boards that share no handle {} before.",
@@ -233,7 +172,7 @@ fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Pat
         None if intervals > 0 => format!("Not decided: {searched}. What is proved: {blocked}."),
         None => format!("Not decided: the search {}, and nothing is proved.", given_up()),
     })?;
-    if let Some(sentence) = stage.sentence(&motion, "pitch", value_hi) {
+    if let Some(sentence) = stage_sentence(&stage, &motion, "pitch", value_hi) {
         output.line(&sentence)?;
     }
     output.finish().and(unstopped())
@@ -262,9 +201,7 @@ fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), Co
     let GreatestSpeed { value_lo, value_hi, time, handle, ratio, proved, steps } = found;
     let mut output = Output::standard();
     if common.json {
-        let status = status(proved);
-        let value = value_lo;
-        output.json(&SpeedLine { plan: "speed", status, value, value_lo, value_hi, time, handle, ratio })?;
+        output.json(&SpeedLine::new(&found, are_searches_stopped()))?;
         return output.finish().and(unstopped());
     }
     let limit = number(limit);

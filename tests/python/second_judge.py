@@ -50,7 +50,7 @@ LINES_OF_TWO = {
 
 def judged(lines, places, seed):
     first = json.loads(lines[0])
-    require(first.get("type") == "certificate" and first.get("format") == 2, "no certificate of format 2")
+    require(first.get("type") == "certificate" and first.get("format") == 3, "no certificate of format 3")
     about = first.get("about", "events")
     file = tomllib.loads(first["scene"])
     lines = [json.loads(text) for text in lines[1:]]

@@ -8,7 +8,7 @@ use super::place::{Place, Span};
 use bench_dragon_messages::state::EventKind;
 
 /// The version of the file format.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 /// The difference of the two times of a proved event, in seconds, beyond which the search gives the reason.
 pub const WIDE: f64 = 1e-9;

@@ -7,6 +7,7 @@
 //! In: a team or a scene. Out: two numbers that enclose the answer, proved, and the place that decides it.
 
 mod keep_outs;
+mod lines;
 mod pitch;
 mod speed;
 mod trial;
@@ -14,7 +15,8 @@ mod turn;
 mod turn_trial;
 
 pub use crate::spaced::Spaced;
-pub use keep_outs::{Outside, Planned, is_on_stage, outside_keep_outs};
+pub use keep_outs::{Outside, Planned, Stage};
+pub use lines::{PitchLine, SpeedLine, TurnLine};
 pub use pitch::{LeastPitch, Overlap, certify_least_pitch, least_pitch};
 pub use speed::{GreatestSpeed, certify_greatest_speed, greatest_speed};
 pub use turn::{LeastTurn, TurnLimit, least_turn};

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::edit;
@@ -17,13 +18,16 @@ use crate::hand_outs::{Form, HandOut, hand_outs};
 use crate::request::Setting;
 use crate::scene::DesignedScene;
 use bench_dragon_certify::plan::{
-    self, Spaced, greatest_speed, is_on_stage, least_pitch, least_turn, outside_keep_outs,
+    self, PitchLine, Spaced, SpeedLine, Stage, TurnLine, greatest_speed, least_pitch, least_turn,
 };
 use bench_dragon_certify::{CertifiedEvent, MOST_STEPS, Status, certify};
 use bench_dragon_fit::search::{Vary, fit};
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::event::Progress;
+use bench_dragon_motion::model::curve::Curve;
 use bench_dragon_motion::model::description::{PathDescription, RouteTurn};
+use bench_dragon_motion::model::double_double::DoubleDouble;
+use bench_dragon_motion::model::spiral::{Direction, Spiral};
 use bench_dragon_motion::timeline::Timeline;
 use bench_dragon_sheets::Language;
 use bench_dragon_show::results::figure;
@@ -128,29 +132,25 @@ fn with(scene: &DesignedScene, field: &str, value: Option<f64>) -> Option<String
     edit::set(scene, &values).ok()
 }
 
-/// Returns the number with which boards also stay outside the keep-outs, and a sentence about these. `value` is the
-/// answer for the boards alone.
-fn on_stage(
-    motion: &Motion,
-    asked: Spaced<'_>,
-    planned: plan::Planned,
-    value: Option<f64>,
-    progress: Progress<'_>,
-) -> (Option<f64>, String) {
-    if motion.ground().is_empty() {
-        return (value, String::new());
-    }
-    if !is_on_stage(motion, planned) {
-        return (value, " Obstacles are left out: the plan is about boards alone.".to_owned());
-    }
-    let outside = value.and_then(|value| outside_keep_outs(asked, motion, planned, value, progress));
-    match outside.map(|outside| outside.value) {
-        Some(outside) if Some(outside) == value => (value, " They stay outside the keep-outs, too.".to_owned()),
-        Some(outside) => (
-            Some(outside),
-            format!(" {} m is the least found with which they stay outside the keep-outs.", figure(outside)),
-        ),
-        None => (None, " No number was found with which they are proved to stay outside the keep-outs.".to_owned()),
+/// The answer of `plan --json` with the sentence that the page shows.
+#[derive(Serialize)]
+struct Told<L> {
+    #[serde(flatten)]
+    line: L,
+    sentence: String,
+}
+
+/// Returns a sentence about the stage. `value` is the answer for the boards alone.
+fn of_stage(stage: &Stage, value: Option<f64>) -> String {
+    match stage {
+        Stage::Empty => String::new(),
+        Stage::OtherPath => " Obstacles are left out: the plan is about boards alone.".to_owned(),
+        Stage::Outside(outside) if Some(outside.value) == value => " They stay outside the keep-outs, too.".to_owned(),
+        Stage::Outside(outside) => {
+            let value = figure(outside.value);
+            format!(" {value} m is the least found with which they stay outside the keep-outs.")
+        }
+        Stage::NotFound => " No number was found with which they are proved to stay outside the keep-outs.".to_owned(),
     }
 }
 
@@ -182,30 +182,20 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
     let clearance = required(scene);
     let asked = Spaced { team: motion.team(), clearance };
     let found = least_pitch(asked, radius, progress).map_err(|error| error.to_string())?;
-    let (value, of_stage) = on_stage(motion, asked, plan::Planned::Pitch { radius }, found.value_hi, progress);
+    let stage = Stage::search(motion, asked, plan::Planned::Pitch { radius }, found.value_hi, progress);
     let sentence = match found.value_hi {
         Some(pitch) => format!(
-            "With a pitch of {} m the head comes to {} m from the centre, and {} before.{of_stage}",
+            "With a pitch of {} m the head comes to {} m from the centre, and {} before.{}",
             figure(pitch),
             figure(radius),
             apart(clearance),
+            of_stage(&stage, found.value_hi)
         ),
         None => "No pitch was found.".to_owned(),
     };
-    let answer = json!({
-        "plan": "pitch",
-        "status": status(found.proved && value == found.value_hi),
-        "value": value,
-        "from": found.from,
-        "value_lo": (found.intervals > 0).then_some(found.value_lo),
-        "value_hi": value.or(found.value_hi),
-        "bench_a": found.overlap.map(|overlap| overlap.bench_a),
-        "bench_b": found.overlap.map(|overlap| overlap.bench_b),
-        "head_radius": found.overlap.map(|overlap| overlap.head_radius),
-        "clearance": Some(clearance).filter(|clearance| *clearance > 0.0),
-        "sentence": sentence,
-    });
-    Ok(Planned::numbers(answer, with(scene, "path.pitch", value)))
+    let value = stage.value(found.value_hi);
+    let line = PitchLine::new(&found, clearance, (&stage, motion), false);
+    Ok(Planned::numbers(json!(Told { line, sentence }), with(scene, "path.pitch", value)))
 }
 
 /// The turn of a scene: its pitch, its ratio of arcs, and the number of the text that a radius of the turn gives to a
@@ -213,14 +203,14 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
 struct TurnInText {
     pitch: f64,
     arc_ratio: f64,
-    number: Box<dyn Fn(f64) -> Option<(String, f64)>>,
+    number: Box<dyn Fn(f64) -> (String, f64)>,
 }
 
 impl TurnInText {
     /// Returns the turn of a turnaround, or the only turn of a route.
     fn of(scene: &DesignedScene, description: &PathDescription) -> Option<Self> {
         if let PathDescription::Turnaround { pitch, arc_ratio, .. } = *description {
-            let number = Box::new(|radius: f64| Some(("path.turn_radius".to_owned(), radius)));
+            let number = Box::new(|radius: f64| ("path.turn_radius".to_owned(), radius));
             return Some(Self { pitch, arc_ratio, number });
         }
         let RouteTurn { spiral, pitch, radius: beginning } = description.turn()?;
@@ -230,12 +220,16 @@ impl TurnInText {
             return None;
         }
         let arc_ratio = scene.values.number(&format!("{turn}.arc_ratio")).unwrap_or(ARC_RATIO);
-        let has = |field: &str| scene.values.number(&format!("{spiral}.{field}")).is_some();
-        let (has_radius, has_turns) = (has("to_radius"), has("turns"));
-        let number = Box::new(move |radius: f64| match (has_radius, has_turns) {
-            (true, _) => Some((format!("{spiral}.to_radius"), radius)),
-            (_, true) => Some((format!("{spiral}.turns"), ((beginning - radius) / pitch).next_down())),
-            _ => None,
+        let has = |field: &&str| scene.values.number(&format!("{spiral}.{field}")).is_some();
+        let extent = ["to_radius", "turns", "length"].into_iter().find(has)?;
+        let at = move |radius: f64| DoubleDouble::from_turns(radius / pitch);
+        let number = Box::new(move |radius: f64| {
+            let value = match extent {
+                "turns" => ((beginning - radius) / pitch).next_down(),
+                "length" => Spiral::new(pitch, Direction::Inward).arc_length(at(beginning), at(radius)).next_down(),
+                _ => radius,
+            };
+            (format!("{spiral}.{extent}"), value)
         });
         Some(Self { pitch, arc_ratio, number })
     }
@@ -251,34 +245,21 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
     let clearance = required(scene);
     let asked = Spaced { team: motion.team(), clearance };
     let found = least_turn(asked, pitch, Some(arc_ratio), progress).map_err(|error| error.to_string())?;
-    let (value, of_stage) = on_stage(motion, asked, plan::Planned::Turn { arc_ratio }, found.value_hi, progress);
+    let stage = Stage::search(motion, asked, plan::Planned::Turn { arc_ratio }, found.value_hi, progress);
     let sentence = match (found.value, found.length) {
         (Some(radius), Some(length)) => format!(
-            "With a turn radius of {} m the team turns round on this pitch, and {}: the S is {} m long.{of_stage}",
+            "With a turn radius of {} m the team turns round on this pitch, and {}: the S is {} m long.{}",
             figure(radius),
             apart(clearance),
             figure(length),
+            of_stage(&stage, found.value_hi)
         ),
         _ => "No radius was found.".to_owned(),
     };
-    let found = if value == found.value_hi { found } else { found.with_radius(value, pitch) };
-    let answer = json!({
-        "plan": "turn",
-        "status": status(found.proved),
-        "value": found.value,
-        "value_lo": (found.intervals > 0).then_some(found.value_lo),
-        "value_hi": found.value_hi,
-        "length": found.length,
-        "arc_ratio": found.arc_ratio,
-        "limit": found.limit.map(|limit| limit.kind.name()),
-        "bench_a": found.limit.map(|limit| limit.bench_a),
-        "bench_b": found.limit.and_then(|limit| limit.bench_b),
-        "clearance": Some(clearance).filter(|clearance| *clearance > 0.0),
-        "sentence": sentence,
-    });
-    let planned = found.value.and_then(number);
+    let line = TurnLine::new(&found, (pitch, clearance), (&stage, motion), false);
+    let planned = line.value.map(number);
     let text = planned.and_then(|(field, value)| with(scene, &field, Some(value)));
-    Ok(Planned::numbers(answer, text))
+    Ok(Planned::numbers(json!(Told { line, sentence }), text))
 }
 
 fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
@@ -291,22 +272,9 @@ fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Strin
         found.handle + 1,
         figure(found.time)
     );
-    let answer = json!({
-        "plan": "speed",
-        "status": status(found.proved),
-        "value": found.value_lo,
-        "value_lo": found.value_lo,
-        "value_hi": found.value_hi,
-        "time": found.time,
-        "handle": found.handle,
-        "ratio": found.ratio,
-        "sentence": sentence,
-    });
-    Ok(Planned::numbers(answer, with(scene, "motion.head_speed", Some(found.value_lo))))
-}
-
-fn status(proved: bool) -> &'static str {
-    if proved { "proved" } else { "given_up" }
+    let line = SpeedLine::new(&found, false);
+    let text = with(scene, "motion.head_speed", Some(found.value_lo));
+    Ok(Planned::numbers(json!(Told { line, sentence }), text))
 }
 
 /// Fits numbers of the scene, as `plan fit` does, so that the show keeps what is required.
@@ -368,7 +336,8 @@ fn prove(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Strin
         _ => format!("{undecided} of {} statements could not be decided.", found.len()),
     };
     let list: Vec<Value> = found.iter().map(proved_line).collect();
-    let answer = json!({"plan": "prove", "status": status(undecided == 0), "list": list, "sentence": sentence});
+    let status = if undecided == 0 { "proved" } else { "given_up" };
+    let answer = json!({"plan": "prove", "status": status, "list": list, "sentence": sentence});
     Ok(Planned::numbers(answer, None))
 }
 
@@ -400,6 +369,33 @@ fn proved_line(event: &CertifiedEvent) -> Value {
 mod tests {
     use super::*;
     use bench_dragon_motion::event::unreported;
+    use bench_dragon_motion::model::description::RouteStep;
+
+    #[test]
+    fn the_least_turn_of_a_route_is_a_number_of_its_spiral() {
+        for extent in ["to_radius = 5.0", "turns = 3", "length = 120.0"] {
+            let way = "direction = \"in\", side = \"left\", pitch = 1.7, radius = 12.0";
+            let spiral = format!("{{ kind = \"spiral\", {way}, {extent} }}");
+            let back = "{ kind = \"spiral\", to_radius = 12.0 }";
+            let text = format!(
+                "[team]\nbenches = 10\n[path]\nkind = \"pieces\"\nstart = [0, 0]\n\
+                 pieces = [{spiral}, {{ kind = \"turn\" }}, {back}]\n[motion]\nhead_speed = 1.0\n"
+            );
+            let scene = DesignedScene::read(&text, "scene").unwrap();
+            let planned = plan(("turn", &[]), &scene, &mut unreported).unwrap();
+            let radius = planned.answer["value"].as_f64().unwrap();
+            let text = planned.text.unwrap();
+            let field = extent.split(' ').next().unwrap();
+            assert!(text.contains(field), "{text}");
+            let scene = DesignedScene::read(&text, "scene").unwrap();
+            let PathDescription::Route { steps, .. } = scene.scene.ensemble.only().unwrap().description() else {
+                panic!("{text}")
+            };
+            let Some(RouteStep::Spiral { pitch, radius: begin, turns, .. }) = steps.first() else { panic!("{text}") };
+            let end = begin.high - pitch * turns.high;
+            assert!((end - radius).abs() < 1e-9, "{extent}: {end} {radius}");
+        }
+    }
 
     #[test]
     fn the_least_pitch_keeps_the_clearance_that_is_required() {

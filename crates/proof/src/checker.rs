@@ -12,7 +12,7 @@ use super::several::{Alone, Claim, Pair};
 use super::steps::{Step, Steps};
 
 /// The version of the file format.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// The state of the check.
 pub struct Checker {

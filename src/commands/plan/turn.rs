@@ -1,36 +1,14 @@
 //! `plan turn`: the least turn radius.
 
-use bench_dragon::certify::plan::{LeastTurn, Planned, Spaced, TurnLimit, least_turn};
+use bench_dragon::certify::plan::{LeastTurn, Planned, Spaced, TurnLimit, TurnLine, least_turn};
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::show::scene::{Accepted, Scene};
-use serde::Serialize;
 
 use super::super::events::bench_name;
-use super::super::signals::{report, unstopped};
+use super::super::signals::{are_searches_stopped, report, unstopped};
 use super::super::{CommandError, Common, Output, progress_bar};
-use super::stage::Stage;
-use super::{Spacing, are_too_near, given_up, status, warn_of_route};
-
-/// The line of `plan turn --json`.
-#[derive(Serialize)]
-struct TurnLine {
-    plan: &'static str,
-    status: &'static str,
-    value: Option<f64>,
-    value_lo: Option<f64>,
-    value_hi: Option<f64>,
-    length: Option<f64>,
-    arc_ratio: f64,
-    limit: Option<&'static str>,
-    bench_a: Option<u32>,
-    bench_b: Option<u32>,
-    /// The required clearance, if any.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    clearance: Option<f64>,
-    /// The obstacle of the stage that decides, if one does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    obstacle: Option<String>,
-}
+use super::stage::{on_stage, stage_sentence};
+use super::{Spacing, are_too_near, given_up, warn_of_route};
 
 /// Plans the turn.
 pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> Result<(), CommandError> {
@@ -51,40 +29,21 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
     let asked = Spaced { team: motion.team(), clearance };
     let found = least_turn(asked, pitch, arc_ratio, &mut progress)?;
     let planned = Planned::Turn { arc_ratio: found.arc_ratio };
-    let stage = Stage::search(&motion, asked, planned, found.value_hi, &mut progress);
+    let stage = on_stage(&motion, asked, planned, found.value_hi, &mut progress);
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        let value = stage.value(found.value_hi);
-        let on_stage = if value == found.value_hi { found } else { found.with_radius(value, pitch) };
-        output.json(&TurnLine { obstacle: stage.obstacle(&motion), ..line(&on_stage, clearance) })?;
+        let line = TurnLine::new(&found, (pitch, clearance), (&stage, &motion), are_searches_stopped());
+        output.json(&line)?;
     } else {
         for sentence in sentences(&scene, (pitch, clearance), arc_ratio.is_none(), &found) {
             output.line(&sentence)?;
         }
-        if let Some(sentence) = stage.sentence(&motion, "turn radius", found.value_hi) {
+        if let Some(sentence) = stage_sentence(&stage, &motion, "turn radius", found.value_hi) {
             output.line(&sentence)?;
         }
     }
     output.finish().and(unstopped())
-}
-
-fn line(found: &LeastTurn, clearance: f64) -> TurnLine {
-    let LeastTurn { value_lo, value_hi, value, length, arc_ratio, limit, proved, intervals, .. } = *found;
-    TurnLine {
-        plan: "turn",
-        status: status(proved),
-        value,
-        value_lo: (intervals > 0).then_some(value_lo),
-        value_hi,
-        length,
-        arc_ratio,
-        limit: limit.map(|limit| limit.kind.name()),
-        bench_a: limit.map(|limit| limit.bench_a),
-        bench_b: limit.and_then(|limit| limit.bench_b),
-        clearance: Some(clearance).filter(|clearance| *clearance > 0.0),
-        obstacle: None,
-    }
 }
 
 fn sentences(scene: &Scene, (pitch, clearance): (f64, f64), is_best: bool, found: &LeastTurn) -> Vec<String> {

@@ -52,18 +52,59 @@ const FURTHER: [f64; 3] = [1.0, 10.0, 1000.0];
 /// Limit of steps of the head for the proof of one number.
 const MOST_STEPS: u64 = 100_000;
 
-/// Returns true if a motion can be planned on its stage: its path is the spiral or turnaround that is planned.
-pub fn is_on_stage(motion: &Motion, planned: Planned) -> bool {
-    matches!(
-        (planned, motion.description()),
-        (Planned::Pitch { .. }, PathDescription::Spiral { .. })
-            | (Planned::Turn { .. }, PathDescription::Turnaround { .. })
-    )
+/// The answer on the stage of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stage {
+    /// The stage has no obstacles.
+    Empty,
+    /// The scene's path is not the spiral or turnaround that is planned: obstacles are left out.
+    OtherPath,
+    /// With this number boards stay outside the keep-outs.
+    Outside(Outside),
+    /// No such number was found, or it was not proved.
+    NotFound,
+}
+
+impl Stage {
+    /// Searches from `value`, the answer for the boards alone, on.
+    pub fn search(
+        motion: &Motion,
+        asked: Spaced<'_>,
+        planned: Planned,
+        value: Option<f64>,
+        progress: Progress<'_>,
+    ) -> Self {
+        if motion.ground().is_empty() {
+            return Self::Empty;
+        }
+        match (planned, motion.description()) {
+            (Planned::Pitch { .. }, PathDescription::Spiral { .. })
+            | (Planned::Turn { .. }, PathDescription::Turnaround { .. }) => {}
+            _ => return Self::OtherPath,
+        }
+        let outside = value.and_then(|value| outside_keep_outs(asked, motion, planned, value, progress));
+        outside.map_or(Self::NotFound, Self::Outside)
+    }
+
+    /// Returns the number with which boards stay outside, if obstacles may change `value`, the answer for the boards.
+    pub fn value(&self, value: Option<f64>) -> Option<f64> {
+        match self {
+            Self::Empty | Self::OtherPath => value,
+            Self::Outside(outside) => Some(outside.value),
+            Self::NotFound => None,
+        }
+    }
+
+    /// Returns the name of the obstacle that decides.
+    pub fn obstacle<'a>(&self, motion: &'a Motion) -> Option<&'a str> {
+        let Self::Outside(Outside { obstacle: Some(number), .. }) = self else { return None };
+        Some(&motion.ground().obstacles().get(*number)?.name)
+    }
 }
 
 /// Returns the least number from `value` on, found in steps of half a percent, with which boards keep their clearance
 /// and stay outside the keep-outs of the stage. Returns `None` if none is found, or if that is not proved.
-pub fn outside_keep_outs(
+fn outside_keep_outs(
     asked: Spaced<'_>,
     motion: &Motion,
     planned: Planned,

@@ -43,7 +43,7 @@ pub(super) fn step(from: f64, to: f64) -> Value {
 }
 
 pub(super) fn certificate() -> Vec<Value> {
-    let mut lines = vec![json!({"type": "certificate", "format": 2, "version": "0.1.0", "scene": SCENE})];
+    let mut lines = vec![json!({"type": "certificate", "format": 3, "version": "0.1.0", "scene": SCENE})];
     let ends = [-0.5, 0.3, 1.3, 2.3, 3.3, 4.3, 5.3, 6.3, 7.3, 8.3, 9.3, 10.0];
     lines.extend(ends.windows(2).map(|ends| step(ends[0], ends[1])));
     lines.push(json!({"type": "path_end"}));
@@ -174,7 +174,7 @@ fn what_does_not_follow_is_refused() {
     refused(1, "missing field", &|lines| drop(lines[1].as_object_mut().unwrap().remove("clear")));
     refused(0, "first line", &|lines| lines.drain(..1).for_each(drop));
     refused(1, "second first line", &|lines| lines.insert(1, lines[0].clone()));
-    refused(0, "format 3", &|lines| lines[0]["format"] = json!(3));
+    refused(0, "format 4", &|lines| lines[0]["format"] = json!(4));
     refused(5, "", &|lines| lines[5]["to"] = json!([1, null]));
     refused(5, "", &|lines| lines[5]["to"] = json!([-1, 2.0]));
     refused(5, "", &|lines| lines[5]["to"] = json!([1, 2.0, 3.0]));
