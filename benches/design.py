@@ -4,6 +4,7 @@
     .venv/bin/python benches/design.py              # the table of docs/design-page.md
     .venv/bin/python benches/design.py storm        # the server alone, with 300 changes
     .venv/bin/python benches/design.py picture      # makes docs/design-page.jpg
+    .venv/bin/python benches/design.py film         # makes docs/design-page.webp; needs `.venv/bin/pip install pillow`
 
 Uses the release build, Debian's Chromium without a graphics card, and Playwright, which tests/run installs. Everything
 runs on this machine, in one run. A change is a number that is typed into a field; its picture is on the canvas at the
@@ -11,7 +12,9 @@ end of a pass of the page. A time includes the browser, the server and the way b
 """
 
 import contextlib
+import io
 import json
+import math
 import os
 import pathlib
 import statistics
@@ -34,6 +37,14 @@ EXACT = """() => {
     const { session, picture } = design, lists = ["events", "facts"].map((id) => document.getElementById(id).dataset.state);
     return picture.stage && !picture.coming && !session.inFlight && !session.waiting.length && lists.every((one) => one !== "computing");
 }"""
+AT_REST = """() => {
+    const { session, picture } = design, isExact = EXACT;
+    // The curve comes after the results, and the nearest boards when the picture has not changed for a time.
+    return isExact() && session.atInFlight === null && session.wantedAt === null && !document.getElementById("curve").hidden
+        && performance.now() > picture.restsAt + 100;
+}""".replace("EXACT", EXACT)
+# The outline of a pointer, from its tip (pixels).
+ARROW = [(0, 0), (0, 22), (5, 17), (9, 26), (13, 24), (9, 16), (16, 16)]
 
 
 @contextlib.contextmanager
@@ -179,4 +190,107 @@ def picture():
         page.screenshot(path=ROOT / "docs" / "design-page.jpg", type="jpeg", quality=80)
 
 
-{"picture": picture, "storm": storm}.get((sys.argv[1:] or [""])[0], table)()
+class Film:
+    """Pictures of a page, ten for each second of the film, with the hand that moves on it."""
+
+    def __init__(self, page):
+        self.page, self.pictures, self.at, self.holds = page, [], (620, 420), False
+
+    def take(self, seconds=0.1):
+        """Takes a picture that stays for a time, when all of it is exact, however slow this machine is."""
+        # Only the film needs it.
+        from PIL import Image, ImageDraw
+        until(self.page, AT_REST)
+        image = Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")
+        (x, y), draw = self.at, ImageDraw.Draw(image)
+        if self.holds:
+            draw.ellipse((x - 14, y - 14, x + 14, y + 14), outline="#d9480f", width=3)
+        draw.polygon([(x + across, y + down) for across, down in ARROW], fill="#d9480f", outline="white", width=1)
+        self.pictures += [image] * round(10 * seconds)
+
+    def move(self, to, seconds):
+        """Moves the hand: it starts and stops slowly."""
+        begin, count = self.at, round(10 * seconds)
+        for number in range(1, count + 1):
+            share = (1 - math.cos(math.pi * number / count)) / 2
+            self.at = tuple(a + share * (b - a) for a, b in zip(begin, to))
+            self.page.mouse.move(*self.at)
+            self.take()
+
+    def click(self, selector, seconds=0.6):
+        self.move(self.middle(selector), seconds)
+        self.page.mouse.click(*self.at)
+        self.take()
+
+    def type(self, field, number):
+        """Replaces a number, after scrolling down to its field."""
+        selector = f"[data-field='{field}']"
+        while self.middle(selector)[1] > self.page.viewport_size["height"] - 20:
+            self.move(self.middle("#fields"), 0.3)
+            self.page.mouse.wheel(0, 100)
+        self.click(selector)
+        self.page.keyboard.press("Control+A")
+        self.page.keyboard.insert_text(number)
+        self.take(0.6)
+
+    def hold(self, holds):
+        self.holds = holds
+        self.page.mouse.down() if holds else self.page.mouse.up()
+        self.take()
+
+    def middle(self, selector):
+        until(self.page, AT_REST)
+        box = self.page.locator(selector).first.bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def time(self, seconds):
+        """Returns the place of a time on the time line, whose knob is 16 pixels wide."""
+        box, end = self.page.locator("#when").bounding_box(), float(self.page.get_attribute("#when", "max"))
+        return box["x"] + 8 + seconds / end * (box["width"] - 16), box["y"] + box["height"] / 2
+
+    def save(self, path):
+        first, *others = self.pictures
+        first.save(path, save_all=True, append_images=others, duration=100, loop=0, quality=60,
+            method=6, minimize_size=True)
+        print(f"{path.name}: {len(self.pictures) / 10:.1f} s, {path.stat().st_size / 1e6:.2f} MB")
+
+
+def film():
+    """From a template to a dragon that walks far enough from itself, as docs/design-page.md describes it."""
+    with design("paper.toml") as (url, _), opened(url, width=1120, height=630) as page:
+        page.emulate_media(reduced_motion="reduce")
+        page.reload()
+        until(page, EXACT)
+        film = Film(page)
+        film.take(0.6)
+        film.move(film.middle("#template"), 0.6)
+        # An open list is not on a screenshot, so the choice stays for a moment.
+        page.evaluate("document.getElementById('template').value = 'turn'")
+        film.take(0.5)
+        page.select_option("#template", "turn")
+        film.take(0.8)
+        film.type("team.benches", "60")
+        # A zoomed view stays as it is while the dragon walks.
+        film.move(film.middle("#stage"), 0.5)
+        page.mouse.wheel(0, 60)
+        film.take(0.3)
+        film.type("require.clearance", "0.5")
+        film.take(0.8)
+        film.click("#facts [data-verdict=fail] button")
+        film.take(1)
+        x, y = film.middle("[data-handle='path.pitch']")
+        film.move((x, y), 0.6)
+        film.hold(True)
+        film.move((x + 0.6 * page.evaluate("design.picture.camera.scale"), y), 2.2)
+        film.hold(False)
+        film.take(0.8)
+        film.move(film.time(page.evaluate("design.picture.time")), 0.6)
+        film.hold(True)
+        film.move(film.time(15), 1)
+        film.move(film.time(205), 6)
+        film.hold(False)
+        film.take(1.5)
+        film.save(ROOT / "docs" / "design-page.webp")
+
+
+{"film": film, "picture": picture, "storm": storm}.get((sys.argv[1:] or [""])[0], table)()
