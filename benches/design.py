@@ -38,10 +38,10 @@ EXACT = """() => {
     return picture.stage && !picture.coming && !session.inFlight && !session.waiting.length && lists.every((one) => one !== "computing");
 }"""
 AT_REST = """() => {
-    const { session, picture } = design, isExact = EXACT;
-    // The curve comes after the results, and the nearest boards when the picture has not changed for a time.
+    const { session, picture } = design, isExact = EXACT, { nearest, newest, shown } = picture.live;
+    // The curve comes after the results, and the nearest boards are searched less often than the picture is drawn.
     return isExact() && session.atInFlight === null && session.wantedAt === null && !document.getElementById("curve").hidden
-        && performance.now() > picture.restsAt + 100;
+        && nearest.key === [newest.run, shown.from.epoch, shown.time].join();
 }""".replace("EXACT", EXACT)
 # The outline of a pointer, from its tip (pixels).
 ARROW = [(0, 0), (0, 22), (5, 17), (9, 26), (13, 24), (9, 16), (16, 16)]
@@ -217,7 +217,7 @@ class Film:
             self.page.mouse.move(*self.at)
             self.take()
 
-    def click(self, selector, seconds=0.6):
+    def click(self, selector, seconds=0.5):
         self.move(self.middle(selector), seconds)
         self.page.mouse.click(*self.at)
         self.take()
@@ -263,7 +263,7 @@ def film():
         until(page, EXACT)
         film = Film(page)
         film.take(0.6)
-        film.move(film.middle("#template"), 0.6)
+        film.move(film.middle("#template"), 0.5)
         # An open list is not on a screenshot, so the choice stays for a moment.
         page.evaluate("document.getElementById('template').value = 'turn'")
         film.take(0.5)
@@ -272,24 +272,24 @@ def film():
         film.type("team.benches", "60")
         # A zoomed view stays as it is while the dragon walks.
         film.move(film.middle("#stage"), 0.5)
-        page.mouse.wheel(0, 60)
+        page.mouse.wheel(0, 90)
         film.take(0.3)
         film.type("require.clearance", "0.5")
         film.take(0.8)
         film.click("#facts [data-verdict=fail] button")
         film.take(1)
         x, y = film.middle("[data-handle='path.pitch']")
-        film.move((x, y), 0.6)
+        film.move((x, y), 0.5)
         film.hold(True)
         film.move((x + 0.6 * page.evaluate("design.picture.camera.scale"), y), 2.2)
         film.hold(False)
         film.take(0.8)
-        film.move(film.time(page.evaluate("design.picture.time")), 0.6)
+        film.move(film.time(page.evaluate("design.picture.time")), 0.5)
         film.hold(True)
-        film.move(film.time(15), 1)
-        film.move(film.time(205), 6)
+        film.move(film.time(45), 0.8)
+        film.move(film.time(200), 6.4)
         film.hold(False)
-        film.take(1.5)
+        film.take(1.2)
         film.save(ROOT / "docs" / "design-page.webp")
 
 
