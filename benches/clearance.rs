@@ -8,6 +8,7 @@
 use std::cell::RefCell;
 
 use bench_dragon::motion::clearance::{ClearanceMonitor, Pairs, Precision, board, least_clearance_all_pairs};
+use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::ground::Ground;
 use bench_dragon::motion::model::curve::Side;
 use bench_dragon::motion::model::path::Path;
@@ -65,7 +66,8 @@ fn procession() -> Path {
 
 /// Times a run from `start` metres of travel on, at `rate` frames a second.
 fn run(bencher: Bencher, path: &Path, team: Team, start: f64, rate: f64) {
-    let mut table = FollowerTable::new(path, team, 1.0, Velocities::Omitted).expect("these paths have a table");
+    let mut table =
+        FollowerTable::new(path, team, 1.0, Velocities::Omitted, &mut unreported).expect("these paths have a table");
     let precision = Precision { handle_error: 0.0, seconds_per_link: team.shortest_link() };
     let mut monitor = ClearanceMonitor::new(&[team], Pairs::Own, Ground::default(), precision);
     let chains = chains(path, team, start, rate);

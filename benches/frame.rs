@@ -118,7 +118,8 @@ fn newton_cold_without_care(bencher: Bencher) {
 }
 
 fn follower_table(benches: usize, velocities: Velocities) -> FollowerTable {
-    FollowerTable::new(&spiral(), team(benches), 1.0, velocities).expect("the paper's spiral has a table")
+    FollowerTable::new(&spiral(), team(benches), 1.0, velocities, &mut unreported)
+        .expect("the paper's spiral has a table")
 }
 
 #[divan::bench(args = [60.0, 1000.0], sample_count = 500, sample_size = 20)]
@@ -171,7 +172,7 @@ const SIZES: [(usize, f64); 15] = [
 /// making the table.
 #[divan::bench(args = SIZES, sample_count = 100, sample_size = 4)]
 fn accuracy_by_benches(bencher: Bencher, (benches, accuracy): (usize, f64)) {
-    let selected = selection::cheapest(&spiral(), team(benches), 1.0, Velocities::Computed, accuracy);
+    let selected = selection::cheapest(&spiral(), team(benches), 1.0, Velocities::Computed, accuracy, &mut unreported);
     let Some(selected) = selected else { return eprintln!("{benches} benches at {accuracy:e} m: no table fits") };
     eprintln!(
         "{benches} benches at {accuracy:e} m: {}, {:.0} bytes a handle, {:.1} MB, made in {:.0} ms",

@@ -62,6 +62,7 @@ use std::time::Duration;
 use anstyle::AnsiColor;
 use bench_dragon::messages::sentence::{self, number};
 use bench_dragon::messages::state::Severity;
+use bench_dragon::motion::solve::{Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::results::figure;
 use bench_dragon::show::scene::{Scene, SceneError, SceneText};
@@ -287,6 +288,22 @@ pub fn search_timeline(scene: &Scene, common: &Common) -> Timeline {
     bar.finish_and_clear();
     warn_of_gap(&timeline);
     timeline
+}
+
+/// Makes the solver of a scene, with a progress bar for the tables of large teams.
+///
+/// # Errors
+/// A signal has stopped it.
+pub fn make_solver(scene: &Scene, velocities: Velocities, common: &Common) -> Result<Box<dyn Solver>, CommandError> {
+    let bar = table_bar(common);
+    let solver = scene.ensemble.solver_unless_stopped(velocities, &mut |share| signals::report(&bar, share));
+    bar.finish_and_clear();
+    solver.ok_or_else(signals::stopped)
+}
+
+/// Returns the progress bar of the making of a table.
+fn table_bar(common: &Common) -> ProgressBar {
+    progress_bar(1000, common).with_message("making the table of the followers")
 }
 
 /// Warns of numbers of a scene that are hardly meant.

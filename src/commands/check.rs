@@ -80,7 +80,7 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
         return output.finish().and(unstopped());
     }
     if !common.json {
-        describe(&scene, &warnings(&scene, &timeline), &mut output)?;
+        describe(&scene, &warnings(&scene, &timeline), common, &mut output)?;
         ahead(&scene, &timeline, &mut output)?;
     }
     let found = find_least_clearance(&scene, &timeline, common);

@@ -16,7 +16,8 @@ use super::signals::{stop_searches_on_signals, unstopped};
 use super::solve::time_of;
 use super::swept::{Benches, Stretch, benches, swept};
 use super::{
-    CommandError, Common, Output, figure, number, progress_bar, search_timeline, seconds, svg_file, warn_of_doubts,
+    CommandError, Common, Output, figure, make_solver, number, progress_bar, search_timeline, seconds, svg_file,
+    warn_of_doubts,
 };
 
 /// Arguments of `draw`.
@@ -121,7 +122,9 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
     stop_searches_on_signals()?;
     let timeline = search_timeline(&scene, common);
     unstopped()?;
-    let mut session = Session::new(&scene, &timeline, arguments.output.as_deref(), common.json);
+    // Boards are coloured by speed, even if the scene publishes no speeds.
+    let solver = make_solver(&scene, Velocities::Computed, common)?;
+    let mut session = Session::new((&scene, &timeline), solver, arguments.output.as_deref(), common.json);
     let many = &arguments.many;
     match (many.every, &many.until) {
         (Some(every), Some(until)) => {
@@ -188,9 +191,12 @@ struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    fn new(scene: &'a Scene, timeline: &'a Timeline, file: Option<&'a Path>, json: bool) -> Self {
-        // Boards are coloured by speed, even if the scene publishes no speeds.
-        let solver = scene.ensemble.solver(Velocities::Computed);
+    fn new(
+        (scene, timeline): (&'a Scene, &'a Timeline),
+        solver: Box<dyn Solver>,
+        file: Option<&'a Path>,
+        json: bool,
+    ) -> Self {
         let [chain, earlier] = [0, 1].map(|_| Chain::new(scene.ensemble.handles()));
         Self { scene, timeline, solver, chain, earlier, file, json }
     }

@@ -9,7 +9,7 @@ use bench_dragon::sheets::walk::{MOST_BENCHES, Searched};
 use bench_dragon::sheets::{Language, csv, followed, minutes_and_seconds};
 
 use super::events::find_least_clearance;
-use super::signals::{report, stop_searches_on_signals, unstopped};
+use super::signals::{report, stop_searches_on_signals, stopped, unstopped};
 use super::swept::{Benches, benches, ranges};
 use super::{CommandError, Common, Output, expect_exact_motion, progress_bar, search_timeline, warn_of_doubts};
 
@@ -60,8 +60,12 @@ pub fn sheets(common: &Common, arguments: &SheetsArguments) -> Result<(), Comman
     bar.finish_and_clear();
     unstopped()?;
     if let Some(file) = &arguments.csv {
+        let bar = progress_bar(1000, common).with_message("writing the rows of every bench");
+        let rows = csv(&walk, arguments.lang, &chosen, &clock, &mut |share| report(&bar, share));
+        bar.finish_and_clear();
+        let rows = rows.ok_or_else(stopped)?;
         let mut output = Output::file(file)?;
-        output.text(&csv(&walk, arguments.lang, &chosen, &clock))?;
+        output.text(&rows)?;
         output.finish()?;
     }
     let hash = &scene_hash(&text.text);

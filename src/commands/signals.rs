@@ -48,12 +48,12 @@ pub fn gave_up() -> &'static str {
 /// # Errors
 /// Failed: there was a signal.
 pub fn unstopped() -> Result<(), CommandError> {
-    if are_searches_stopped() {
-        return Err(CommandError::Failed(
-            "stopped by a signal before the end: the results are not complete".to_owned(),
-        ));
-    }
-    Ok(())
+    if are_searches_stopped() { Err(stopped()) } else { Ok(()) }
+}
+
+/// Returns the same error, for a result that is missing because of the signal.
+pub fn stopped() -> CommandError {
+    CommandError::Failed("stopped by a signal before the end: the results are not complete".to_owned())
 }
 
 /// Returns SIGINT, SIGTERM and SIGHUP; SIGHUP unless it is ignored.

@@ -8,7 +8,7 @@ use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::{solve_at_or_just_before, table};
 
 use super::signals::{are_searches_stopped, report, stop_searches_on_signals, unstopped};
-use super::{CommandError, Common, Output, figure, number, progress_bar, search_timeline, seconds};
+use super::{CommandError, Common, Output, figure, make_solver, number, progress_bar, search_timeline, seconds};
 
 /// Arguments of `solve`.
 #[derive(Debug, clap::Args)]
@@ -47,7 +47,7 @@ pub fn solve(common: &Common, arguments: &SolveArguments) -> Result<(), CommandE
     };
     unstopped()?;
     let (count, times) = arguments.times(&timeline)?;
-    let mut solver = scene.ensemble.solver(scene.velocities);
+    let mut solver = make_solver(&scene, scene.velocities, common)?;
     let mut chain = Chain::new(scene.ensemble.handles());
     let mut output = match &arguments.output {
         Some(file) => Output::file(file)?,

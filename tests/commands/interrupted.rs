@@ -1,19 +1,55 @@
 //! Ctrl-C during a search: the command prints what it knows, says that it was stopped, and exits with 1.
 
+use std::ffi::OsStr;
 use std::fs::{File, read_to_string};
 use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 
+use nix::pty::{Winsize, openpty};
 use nix::sys::signal::Signal::SIGINT;
+use nix::sys::signal::kill;
 use nix::sys::stat::Mode;
+use nix::unistd::Pid;
 use serde_json::Value;
 
 use crate::harness::{Process, json_lines, text, wait_until};
 
 /// The bit of SIGINT in a mask of signals (proc(5), SigCgt).
 const SIGINT_BIT: u64 = 1 << (SIGINT as u64 - 1);
+
+/// Writes a scene whose events are found soon, and whose table takes long: 300,000 benches on a short spiral.
+fn long_table(folder: &Path) -> PathBuf {
+    let paper = read_to_string("config/paper.toml").unwrap();
+    let file = folder.join("table.toml");
+    std::fs::write(&file, paper.replace("benches = 223", "benches = 300_000")).unwrap();
+    file
+}
+
+/// Interrupts a command as soon as it shows some words on the terminal. Returns its exit code, its standard output and
+/// all that it has shown.
+fn interrupted_at(words: &str, arguments: &[&OsStr]) -> (Option<i32>, String, String) {
+    let window = Winsize { ws_row: 24, ws_col: 200, ws_xpixel: 0, ws_ypixel: 0 };
+    let terminal = openpty(Some(&window), None).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));
+    command.args(arguments).env("TERM", "xterm").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(terminal.slave);
+    let process = command.spawn().unwrap();
+    // With it goes this process's end of the terminal.
+    drop(command);
+    let (mut terminal, mut shown, mut chunk) = (File::from(terminal.master), Vec::new(), [0; 4096]);
+    let mut is_signalled = false;
+    // On Linux, a terminal that no process has open any more is an error.
+    while let Ok(count @ 1..) = terminal.read(&mut chunk) {
+        shown.extend_from_slice(&chunk[..count]);
+        if !is_signalled && text(&shown).contains(words) {
+            kill(Pid::from_raw(process.id() as i32), SIGINT).unwrap();
+            is_signalled = true;
+        }
+    }
+    let output = process.wait_with_output().unwrap();
+    (output.status.code(), text(&output.stdout), text(&shown))
+}
 
 /// Writes a scene whose searches take long: a team of 100,000 benches.
 fn long_scene(folder: &Path) -> String {
@@ -61,6 +97,20 @@ fn an_interrupted_search_says_how_far_it_came() {
     let file = folder.path().join("table.csv");
     interrupted(&["solve", &scene, "--at", "contact", "-o", file.to_str().unwrap()]);
     assert!(!file.exists());
+}
+
+#[test]
+fn a_check_that_is_interrupted_while_it_makes_a_table_ends_without_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = long_table(folder.path());
+    // A table may be ready before the signal, where this process stands still between the words and the signal.
+    let is_given_up = (0..5).any(|_| {
+        let (code, told, shown) = interrupted_at("making the table", &["check".as_ref(), scene.as_os_str()]);
+        assert_eq!(code, Some(1), "{told}{shown}");
+        assert!(shown.contains("stopped by a signal before the end: the results are not complete"), "{shown}");
+        told.contains("Solver: not known, because making its table was stopped.")
+    });
+    assert!(is_given_up);
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn scene(name: &str) -> Scene {
 }
 
 fn select(motion: &Motion, accuracy: f64, velocities: Velocities) -> Option<Selection> {
-    selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, accuracy)
+    selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, accuracy, &mut unreported)
 }
 
 /// Returns times up to `end` that the selection has not used. The times are `count` multiples of the golden ratio,

@@ -86,7 +86,8 @@ fn crossing(motion: &Motion, from: f64, to: f64, handle: usize, junction: f64) -
 fn assert_kept(motion: &Motion, accuracy: f64, kinks: &[f64]) -> (usize, f64) {
     let (team, head_speed) = (*motion.team(), motion.head_speed());
     let velocities = Velocities::Computed;
-    let Some(selection) = selection::cheapest(motion.path(), team, head_speed, velocities, accuracy) else {
+    let Some(selection) = selection::cheapest(motion.path(), team, head_speed, velocities, accuracy, &mut unreported)
+    else {
         return (0, 0.0);
     };
     let link = team.shortest_link();

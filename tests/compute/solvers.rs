@@ -66,7 +66,13 @@ impl Subject {
     }
 
     fn table(&self) -> Option<FollowerTable> {
-        FollowerTable::new(self.motion.path(), *self.motion.team(), self.motion.head_speed(), Velocities::Computed)
+        FollowerTable::new(
+            self.motion.path(),
+            *self.motion.team(),
+            self.motion.head_speed(),
+            Velocities::Computed,
+            &mut unreported,
+        )
     }
 
     fn newton(&self) -> Newton {
@@ -76,7 +82,14 @@ impl Subject {
     /// Returns the solvers that an accuracy of 1e-9 m selects, on every code path, by name.
     fn selected(&self) -> Vec<(String, Box<dyn Solver>)> {
         let (motion, velocities) = (&self.motion, Velocities::Computed);
-        let selection = selection::cheapest(motion.path(), *motion.team(), motion.head_speed(), velocities, ACCURACY);
+        let selection = selection::cheapest(
+            motion.path(),
+            *motion.team(),
+            motion.head_speed(),
+            velocities,
+            ACCURACY,
+            &mut unreported,
+        );
         let Some(Selection { table, .. }) = selection else { return Vec::new() };
         let selected = Instructions::available().into_iter().filter_map(|instructions| {
             let table = table.clone().with_instructions(instructions)?;

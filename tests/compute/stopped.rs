@@ -9,6 +9,7 @@ use bench_dragon::certify::plan::{greatest_speed, least_pitch, least_turn};
 use bench_dragon::certify::{MOST_STEPS, Status, certify};
 use bench_dragon::motion::event::{Progress, unreported};
 use bench_dragon::motion::model::team::Team;
+use bench_dragon::motion::solve::{Chain, Velocities};
 use bench_dragon::motion::timeline::{TimedClearance, TimedEvent};
 use bench_dragon::proof::verify;
 use bench_dragon::show::scene::SceneText;
@@ -184,4 +185,37 @@ fn plans_enclose_no_more_than_they_have_proved() {
             assert!(part.value_lo <= whole.value_lo && part.value_hi >= whole.value_hi);
         },
     );
+}
+
+#[test]
+fn a_solver_is_made_whole_or_not_at_all() {
+    for name in ["long", "turnaround"] {
+        let text = SceneText::load(&Path::new("config").join(format!("{name}.toml"))).unwrap();
+        let made = |most: u32| {
+            let mut calls = 0;
+            let mut progress = |_| {
+                calls += 1;
+                if calls > most { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            // Read again, because a motion keeps the branches that it has found.
+            let ensemble = text.parse().unwrap().ensemble;
+            let solver = ensemble.solver_unless_stopped(Velocities::Computed, &mut progress);
+            (solver, calls)
+        };
+        let (whole, calls) = made(u32::MAX);
+        assert!(calls > 50, "{name}: {calls} calls");
+        for share in [0.0, 0.02, 0.2, 0.5, 0.8] {
+            let most = (share * f64::from(calls)) as u32;
+            let (part, asked) = made(most);
+            assert!(part.is_none() && asked <= most + 2, "{name}: {asked} of {calls} calls, stopped after {most}");
+        }
+        let ensemble = text.parse().unwrap().ensemble;
+        let [mut of_one, mut of_other] = [0, 1].map(|_| Chain::new(ensemble.handles()));
+        let (mut one, mut other) = (whole.unwrap(), ensemble.solver(Velocities::Computed));
+        for time in [0.0, 12.25, 100.0] {
+            one.solve(time, &mut of_one).unwrap();
+            other.solve(time, &mut of_other).unwrap();
+            assert_eq!(of_one, of_other, "{name} at {time} s");
+        }
+    }
 }

@@ -77,7 +77,7 @@ pub fn run() {
     println!("{WITH}{}", motion.instructions().name());
     let Method::Accuracy(accuracy) = motion.method() else { panic!("the paper's scene names a solver") };
     let (path, team) = (motion.path(), *motion.team());
-    let table = selection::cheapest(path, team, 1.0, Velocities::Computed, accuracy).unwrap().table;
+    let table = selection::cheapest(path, team, 1.0, Velocities::Computed, accuracy, &mut unreported).unwrap().table;
     let mut portable = table.for_frames().with_instructions(Instructions::Portable).unwrap();
     frame("frame", &mut table.for_frames(), START, team.handles());
     frame("frame, portable", &mut portable, START, team.handles());

@@ -84,7 +84,9 @@ pub type Write<'w> = &'w mut dyn FnMut(&CertificateLine) -> io::Result<()>;
 /// Returns true if all boards of a motion are proved to stay outside the keep-outs of its stage, and no link to lock,
 /// from the start until the head has travelled `to` metres.
 pub(super) fn stays_outside(motion: &Motion, to: f64, progress: Progress<'_>) -> bool {
-    motion.search_branches(progress);
+    if !motion.search_branches(progress) {
+        return false;
+    }
     let mut descent = Descent::new(chain_of(motion), to, MOST_CLEARANCE_STEPS, None);
     let length = motion.path().length();
     let target = if to < length {

@@ -12,7 +12,8 @@ use bench_dragon_show::convert::{Stamps, frame_header, handle_poses, stage_witho
 use bench_dragon_show::moments::Moments;
 use bench_dragon_show::scene::Scene;
 
-/// The time after which a search for the end of the motion gives up, while a page waits for its picture.
+/// The time after which the searches for the branches of the followers and for the end of the motion give up, while a
+/// page waits for its picture.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Returns the stage of a scene whose events are not known yet.
@@ -25,7 +26,11 @@ pub fn stage(scene: &Scene, run: u64, end: f64) -> StageMessage {
 pub struct Frames {
     /// The scene in exact motion.
     exact: Scene,
-    moments: Moments,
+    timeline: Timeline,
+    /// Its solvers are made for the first frame.
+    moments: Option<Moments>,
+    /// True if the first frame waits for the branches that a search beside it finds.
+    waits: bool,
     run: u64,
     /// The events that the frames know.
     knowledge: Knowledge,
@@ -49,7 +54,7 @@ impl Frames {
         let exact = Scene { alerts: None, ..without_tables(scene) };
         let knowledge = if timeline.is_some() { Knowledge::All } else { Knowledge::PathEnd };
         let timeline = timeline.unwrap_or_else(|| path_end(&exact));
-        Self { moments: Moments::new(&exact, timeline), exact, run, knowledge }
+        Self { exact, timeline, moments: None, waits: false, run, knowledge }
     }
 
     /// Returns true if the states of the frames know all events.
@@ -57,26 +62,43 @@ impl Frames {
         self.knowledge == Knowledge::All
     }
 
+    /// Returns true if the search for the branches of the followers has taken too long for the first frame. The search
+    /// of another thread finds them, too, and frames do not search again.
+    pub fn waits(&self) -> bool {
+        self.waits
+    }
+
     /// Returns the frame at a time, or at the end of the motion before that, for the request of a number; `None`
-    /// without a solution.
+    /// without a solution, and if it [`waits`](Self::waits).
     pub fn at(&mut self, time: f64, id: u64) -> Option<(FrameHeader, Vec<HandlePose>)> {
-        if self.moments.frame(time).is_none() && self.knowledge == Knowledge::PathEnd {
+        let until = Instant::now() + PATIENCE;
+        let waits = self.waits;
+        let mut progress =
+            |_| if !waits && Instant::now() < until { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+        let moments = match &mut self.moments {
+            Some(moments) => moments,
+            None => {
+                let mut dragons = self.exact.ensemble.dragons().iter();
+                self.waits = !dragons.all(|dragon| dragon.motion.search_branches(&mut progress));
+                if self.waits {
+                    return None;
+                }
+                self.moments.insert(Moments::new(&self.exact, self.timeline.clone()))
+            }
+        };
+        if moments.frame(time).is_none() && self.knowledge == Knowledge::PathEnd {
             // The motion ends earlier, with a lock.
             self.knowledge = Knowledge::Singularities;
-            let until = Instant::now() + PATIENCE;
-            let mut progress =
-                |_| if Instant::now() < until { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
             let timeline = self.exact.ensemble.timeline_without_contact(&mut progress);
-            self.moments = Moments::new(&self.exact, timeline);
+            *moments = Moments::new(&self.exact, timeline);
         }
-        let frame = self.moments.frame(time)?;
+        let frame = moments.frame(time)?;
         let stamps = Stamps { run_id: self.run, sequence: id, stamp_ns: 0, deadline_ns: 0 };
         Some((frame_header(frame, stamps), handle_poses(&frame.chain).collect()))
     }
 }
 
-/// Returns a scene in exact motion, whose solvers make no tables: to make one takes as long as hundreds of frames, and
-/// nothing can stop it.
+/// Returns a scene in exact motion, whose solvers make no tables: to make one takes as long as hundreds of frames.
 pub fn without_tables(scene: &Scene) -> Scene {
     // The paper's rules stay: only a change to them can fail.
     let exact = scene.ensemble.try_map(|motion| match motion.method() {
@@ -95,4 +117,19 @@ fn path_end(scene: &Scene) -> Timeline {
     let (time, travelled) = ends.max_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or_default();
     let event = Event { kind: EventKind::PathEnd, travelled, bench_a: None, bench_b: None, place: None };
     Timeline::new(vec![TimedEvent { event, time }], None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_dragon_motion::event::unreported;
+
+    #[test]
+    fn a_frame_that_waits_is_there_once_another_search_has_found_the_branches() {
+        let scene = Scene::parse(include_str!("../../../config/turnaround.toml"), "test", "test").unwrap();
+        let mut frames = Frames { waits: true, ..Frames::new(&scene, 1, None) };
+        assert!(frames.at(0.0, 1).is_none() && frames.waits());
+        scene.ensemble.timeline_without_contact(&mut unreported);
+        assert!(frames.at(0.0, 2).is_some() && !frames.waits());
+    }
 }

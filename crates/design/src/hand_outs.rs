@@ -2,6 +2,8 @@
 //!
 //! In: a scene with its text. Out: a file with its name.
 
+use std::ops::ControlFlow;
+
 use serde::Serialize;
 
 use crate::scene::DesignedScene;
@@ -31,10 +33,13 @@ pub struct HandOut {
     pub text: String,
 }
 
-/// Follows all benches and writes their hand-outs. Those of a search that `progress` stops are of no use.
+/// The answer of a search that was stopped.
+const STOPPED: &str = "the making of the hand-outs was stopped";
+
+/// Follows all benches and writes their hand-outs.
 ///
 /// # Errors
-/// One sentence for a motion that is not exact.
+/// One sentence for a motion that is not exact, and if `progress` stops a search.
 pub fn hand_outs(designed: &DesignedScene, form: Form, progress: Progress<'_>) -> Result<HandOut, String> {
     let scene = &designed.scene;
     let ensemble = &scene.ensemble;
@@ -46,9 +51,11 @@ pub fn hand_outs(designed: &DesignedScene, form: Form, progress: Progress<'_>) -
     let timeline = ensemble.timeline(&mut |share| progress(0.2 * share));
     let obstacles = ensemble.obstacle_clearances(timeline.end(), &mut |share| progress(0.2 + 0.1 * share));
     let least = ensemble.least_clearances(&timeline, timeline.end(), &mut |share| progress(0.3 + 0.2 * share));
+    go_on(progress(0.5))?;
     let searched = Searched { boards: least.of_show, obstacles: &obstacles };
     let benches: Vec<_> = ensemble.dragons().iter().map(|dragon| 0..dragon.motion.team().benches).collect();
-    let walk = followed(scene, &timeline, &searched, &benches, &mut |share| progress(0.5 + 0.5 * share));
+    let walk = followed(scene, &timeline, &searched, &benches, &mut |share| progress(0.5 + 0.4 * share));
+    go_on(progress(0.9))?;
     let name = |end: &str| {
         let letters = scene.name.chars();
         let name: String = letters.map(|letter| if letter.is_alphanumeric() { letter } else { '-' }).collect();
@@ -61,8 +68,43 @@ pub fn hand_outs(designed: &DesignedScene, form: Form, progress: Progress<'_>) -
             HandOut { name: name(".html"), kind: "text/html", text }
         }
         Form::Csv => {
-            let text = csv(&walk, Language::English, &benches, &minutes_and_seconds);
+            let progress = &mut |share| progress(0.9 + 0.1 * share);
+            let text = csv(&walk, Language::English, &benches, &minutes_and_seconds, progress).ok_or(STOPPED)?;
             HandOut { name: name(".csv"), kind: "text/csv", text }
         }
     })
+}
+
+/// Converts the answer of a progress's receiver.
+fn go_on(answer: ControlFlow<()>) -> Result<(), String> {
+    if answer.is_break() { Err(STOPPED.to_owned()) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_dragon_motion::event::unreported;
+
+    #[test]
+    fn hand_outs_that_are_stopped_are_none() {
+        let text = include_str!("../../../config/turnaround.toml").replace("benches = 223", "benches = 40");
+        let made = |form: Form, most: usize| {
+            let mut calls = 0;
+            let mut progress = |_| {
+                calls += 1;
+                if calls > most { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let made = hand_outs(&DesignedScene::read(&text, "scene").unwrap(), form, &mut progress);
+            (made.map(|file| file.text), calls)
+        };
+        let scene = DesignedScene::read(&text, "scene").unwrap();
+        for form in [Form::Csv, Form::Pages(Language::English)] {
+            let (whole, calls) = made(form, usize::MAX);
+            assert_eq!(hand_outs(&scene, form, &mut unreported).unwrap().text, whole.unwrap());
+            for share in [0.0, 0.2, 0.5, 0.8, 0.95] {
+                let (stopped, _) = made(form, (share * calls as f64) as usize);
+                assert_eq!(stopped, Err(STOPPED.to_owned()), "stopped after {share} of {calls} calls");
+            }
+        }
+    }
 }

@@ -5,7 +5,8 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
@@ -21,6 +22,9 @@ use bench_dragon_messages::{FrameHeader, HandlePose, StageMessage};
 
 /// The requests of a page that may wait. A page waits for an answer before its next change.
 const MOST_WAITING: usize = 512;
+
+/// The time after which a picture that waits for a search is tried again.
+const NEXT_TRIAL: Duration = Duration::from_millis(50);
 
 /// An answer to a page.
 #[derive(Debug, Clone)]
@@ -113,7 +117,7 @@ struct Desk {
     at: f64,
     /// Grows with every scene.
     run: u64,
-    /// The request whose scene is not shown yet, and the request of a time whose picture is not.
+    /// The request whose scene is not shown yet, and the request whose picture is not drawn yet.
     shown_later: Option<u64>,
     drawn_later: Option<u64>,
 }
@@ -122,8 +126,16 @@ impl Desk {
     fn serve(mut self, requests: &Receiver<String>) {
         self.answer(0, Wish::File);
         self.show();
-        while let Ok(request) = requests.recv() {
-            self.read(&request);
+        loop {
+            let request = match self.drawn_later {
+                Some(_) => requests.recv_timeout(NEXT_TRIAL),
+                None => requests.recv().map_err(RecvTimeoutError::from),
+            };
+            match request {
+                Ok(request) => self.read(&request),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
             // Pictures may take longer than changes: only the newest of those that wait is drawn.
             requests.try_iter().take(MOST_WAITING).for_each(|request| self.read(&request));
             self.show();
@@ -264,8 +276,10 @@ impl Desk {
             self.frames = Some(Frames::new(&scene.scene, self.run, Some(timeline)));
         }
         let frames = self.frames.get_or_insert_with(|| Frames::new(&scene.scene, self.run, None));
-        if let Some((header, poses)) = frames.at(self.at, id) {
-            (self.answers)(Answer::Frame(header, poses));
+        match frames.at(self.at, id) {
+            Some((header, poses)) => (self.answers)(Answer::Frame(header, poses)),
+            None if frames.waits() => self.drawn_later = Some(id),
+            None => {}
         }
     }
 }

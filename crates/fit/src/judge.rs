@@ -192,8 +192,7 @@ impl Sampler {
         let fastest = self.ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).fold(0.0, f64::max);
         let samples = (end * fastest / STEP).clamp(1.0, MOST_SAMPLES).ceil();
         let mut ask = |_| if is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        self.ensemble.dragons().iter().for_each(|dragon| dragon.motion.search_branches(&mut ask));
-        if is_stopped() {
+        if !self.ensemble.dragons().iter().all(|dragon| dragon.motion.search_branches(&mut ask)) {
             return None;
         }
         let mut solver = self.ensemble.solver(Velocities::Omitted);

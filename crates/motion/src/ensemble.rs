@@ -340,10 +340,20 @@ impl Ensemble {
 
     /// Makes a solver of all dragons, for the show's time. Its chains are placed on the stage.
     pub fn solver(&self, velocities: Velocities) -> Box<dyn Solver> {
-        let dancer = |(k, dragon): (usize, &Dragon)| {
-            (dragon.clone(), dragon.motion.solver(velocities).solver, self.handles_of(k))
-        };
-        Box::new(EnsembleSolver { dancers: self.dragons.iter().enumerate().map(dancer).collect() })
+        self.of_choices(self.dragons.iter().map(|dragon| dragon.motion.solver(velocities)))
+    }
+
+    /// Makes the same solver, unless `progress`, whose share stays 0, stops the making.
+    pub fn solver_unless_stopped(&self, velocities: Velocities, progress: Progress<'_>) -> Option<Box<dyn Solver>> {
+        let choice = |dragon: &Dragon| dragon.motion.solver_unless_stopped(velocities, progress);
+        let choices: Vec<Choice> = self.dragons.iter().map(choice).collect::<Option<_>>()?;
+        Some(self.of_choices(choices))
+    }
+
+    fn of_choices(&self, choices: impl IntoIterator<Item = Choice>) -> Box<dyn Solver> {
+        let dancers = self.dragons.iter().zip(choices).enumerate();
+        let dancers = dancers.map(|(k, (dragon, choice))| (dragon.clone(), choice.solver, self.handles_of(k)));
+        Box::new(EnsembleSolver { dancers: dancers.collect() })
     }
 }
 

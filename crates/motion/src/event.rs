@@ -1,6 +1,9 @@
 //! Events of a motion and the budget of a search. The searches return events; the timeline gives them times.
 
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
 
 use bench_dragon_messages::state::EventKind;
 
@@ -64,6 +67,9 @@ pub struct Spent;
 /// Work after which a search asks whether it is to stop: less than 10 ms also on a path of many pieces.
 const WORK_BETWEEN_REPORTS: u64 = 2_000;
 
+/// The time after which a thread asks again whether its search is to stop, while it waits for another thread.
+const BETWEEN_REPORTS: Duration = Duration::from_millis(10);
+
 /// Work that a search may still do, and the receiver of its progress. One unit of work is one link solved or one pair
 /// of boards tested.
 pub struct Budget<'a> {
@@ -101,6 +107,35 @@ impl<'a> Budget<'a> {
         if !self.is_stopped && (self.progress)(self.share).is_break() {
             (self.left, self.is_stopped) = (0, true);
         }
+    }
+
+    /// Does both parts of a work at once, the second on a thread of its own. If the search is stopped, the budgets of
+    /// both parts are empty.
+    pub(crate) fn both<A, B: Send>(
+        &mut self,
+        first: impl FnOnce(&mut Self) -> A,
+        second: impl FnOnce(&mut Budget<'_>) -> B + Send,
+    ) -> (A, B) {
+        let is_stopped = AtomicBool::new(false);
+        let (running, ended) = channel::<()>();
+        std::thread::scope(|scope| {
+            let second = scope.spawn(|| {
+                // Dropped where the thread ends, with a panic, too.
+                let _running = running;
+                let mut told = |_| match is_stopped.load(Ordering::Relaxed) {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                };
+                second(&mut Budget::new(u64::MAX, &mut told))
+            });
+            let first = first(self);
+            is_stopped.store(self.is_stopped, Ordering::Relaxed);
+            while ended.recv_timeout(BETWEEN_REPORTS) == Err(RecvTimeoutError::Timeout) {
+                self.report(self.share);
+                is_stopped.store(self.is_stopped, Ordering::Relaxed);
+            }
+            (first, second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        })
     }
 
     /// Returns true if the receiver of the progress has stopped the search.

@@ -31,12 +31,14 @@ impl Motion {
         self.searched_path()
     }
 
-    /// Searches for the branches of this team's followers, if they are not known yet. [`Motion::path`] does the same, but
-    /// cannot be stopped.
-    pub fn search_branches(&self, progress: Progress<'_>) {
-        if self.path.as_spiral().is_none() && self.followed.0.get().is_none() {
+    /// Searches for the branches of this team's followers, if they are not known yet. Returns false if `progress` stops
+    /// the search. [`Motion::path`] does the same, but cannot be stopped.
+    pub fn search_branches(&self, progress: Progress<'_>) -> bool {
+        let is_known = || self.path.as_spiral().is_some() || self.followed.0.get().is_some();
+        if !is_known() {
             self.singularities(progress);
         }
+        is_known()
     }
 
     /// Returns the same path without branches, and without a search for them.

@@ -33,7 +33,7 @@ use crate::solve::{Solver, Velocities};
 
 use clearance::{ClearanceMonitor, Pairs, Precision};
 use contact::{Found, LeastClearance, ObstacleClearance, Touch};
-use event::{Budget, Event, Progress};
+use event::{Budget, Event, Progress, unreported};
 use followed::Followed;
 use ground::Ground;
 use placement::{Placed, Placement};
@@ -265,24 +265,37 @@ impl Motion {
         self.path.outline().into_iter().map(|segment| self.placement.outline(segment)).collect()
     }
 
-    /// Makes the solver. Its chains are placed on the stage.
+    /// Makes the solver, as [`Motion::solver_unless_stopped`] does, but cannot be stopped.
     pub fn solver(&self, velocities: Velocities) -> Choice {
-        let choice = self.solver_in_own_frame(velocities);
-        if self.placement.is_identity() {
-            return choice;
-        }
-        Choice { solver: Box::new(Placed { solver: choice.solver, placement: self.placement }), ..choice }
+        let made = self.solver_unless_stopped(velocities, &mut unreported);
+        // `unreported` stops nothing.
+        made.unwrap_or_else(|| self.newton(velocities, "newton".to_owned()))
     }
 
-    fn solver_in_own_frame(&self, velocities: Velocities) -> Choice {
-        let newton = |reason: String| {
-            let newton = Newton::new(self.path().clone(), self.team, self.head_speed, velocities);
-            Choice { solver: Box::new(newton), reason, accuracy: 0.0 }
-        };
-        match (self.method, self.path.as_spiral()) {
+    /// Makes the solver, with its table if it has one. Its chains are placed on the stage. Returns `None` if `progress`,
+    /// whose share stays 0, stops the making.
+    pub fn solver_unless_stopped(&self, velocities: Velocities, progress: Progress<'_>) -> Option<Choice> {
+        let choice = self.solver_in_own_frame(velocities, progress)?;
+        if self.placement.is_identity() {
+            return Some(choice);
+        }
+        Some(Choice { solver: Box::new(Placed { solver: choice.solver, placement: self.placement }), ..choice })
+    }
+
+    fn newton(&self, velocities: Velocities, reason: String) -> Choice {
+        let newton = Newton::new(self.path().clone(), self.team, self.head_speed, velocities);
+        Choice { solver: Box::new(newton), reason, accuracy: 0.0 }
+    }
+
+    fn solver_in_own_frame(&self, velocities: Velocities, progress: Progress<'_>) -> Option<Choice> {
+        if !self.search_branches(&mut |_| progress(0.0)) {
+            return None;
+        }
+        let newton = |reason: String| self.newton(velocities, reason);
+        let choice = match (self.method, self.path.as_spiral()) {
             (Method::Accuracy(accuracy), _) => {
                 let (team, head_speed, with) = (self.team, self.head_speed, self.instructions);
-                match selection::cheapest_with(self.path(), team, head_speed, velocities, accuracy, with) {
+                match selection::cheapest_with(self.path(), team, head_speed, velocities, accuracy, with, progress) {
                     Some(selection) => {
                         let why = measured(&selection, accuracy);
                         self.chosen_table(selection.table, &why)
@@ -293,7 +306,7 @@ impl Motion {
                 }
             }
             (Method::FollowerTable, _) => {
-                let table = FollowerTable::new(self.path(), self.team, self.head_speed, velocities);
+                let table = FollowerTable::new(self.path(), self.team, self.head_speed, velocities, progress);
                 match table.and_then(|table| table.with_instructions(self.instructions)) {
                     Some(table) => self.chosen_table(table, "named by the scene"),
                     None => newton(format!("newton: the scene names follower_table, but {NO_TABLE}")),
@@ -305,7 +318,9 @@ impl Motion {
                 Choice { solver: Box::new(paper), reason, accuracy: 0.0 }
             }
             (Method::Newton | Method::Paper(_), _) => newton("newton: named by the scene".to_owned()),
-        }
+        };
+        // Without a table because it was stopped, the choice is another one.
+        progress(0.0).is_continue().then_some(choice)
     }
 
     fn chosen_table(&self, table: FollowerTable, why: &str) -> Choice {

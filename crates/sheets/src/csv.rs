@@ -8,6 +8,7 @@ use std::fmt::Write;
 use std::ops::Range;
 
 use bench_dragon_messages::sentence::rounded;
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::solve::Chain;
 use bench_dragon_show::solve_at_or_just_before;
 
@@ -15,8 +16,14 @@ use crate::stop::Teller;
 use crate::walk::{Walk, middle};
 use crate::words::Language;
 
-/// Returns the CSV of some benches of each dragon.
-pub fn csv(walk: &Walk<'_>, language: Language, benches: &[Range<usize>], clock: &dyn Fn(f64) -> String) -> String {
+/// Returns the CSV of some benches of each dragon; `None` if `progress` stops it.
+pub fn csv(
+    walk: &Walk<'_>,
+    language: Language,
+    benches: &[Range<usize>],
+    clock: &dyn Fn(f64) -> String,
+    progress: Progress<'_>,
+) -> Option<String> {
     let teller = Teller::new(walk, language);
     let mut at: BTreeMap<u64, Vec<(usize, usize, String)>> = BTreeMap::new();
     let mut add = |time: f64, of: (usize, usize), what: String| {
@@ -38,9 +45,13 @@ pub fn csv(walk: &Walk<'_>, language: Language, benches: &[Range<usize>], clock:
         }
     }
     let ensemble = walk.ensemble();
-    let (mut solver, mut chain) = (walk.solver(), Chain::new(ensemble.handles()));
+    let (mut solver, mut chain) = (walk.solver(progress)?, Chain::new(ensemble.handles()));
+    let times = at.len() as f64;
     let mut lines: Vec<((usize, usize), String)> = Vec::new();
-    for (hundredths, rows) in at {
+    for (index, (hundredths, rows)) in at.into_iter().enumerate() {
+        if progress(index as f64 / times).is_break() {
+            return None;
+        }
         let time = (hundredths as f64 / 100.0).min(walk.end);
         if solve_at_or_just_before(solver.as_mut(), time, &mut chain).is_err() {
             continue;
@@ -63,5 +74,5 @@ pub fn csv(walk: &Walk<'_>, language: Language, benches: &[Range<usize>], clock:
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{line}");
     }
-    text
+    Some(text)
 }

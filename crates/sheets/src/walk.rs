@@ -131,7 +131,7 @@ impl<'a> Walk<'a> {
     fn follow(&mut self, searched: &Searched<'_>, is_drawn: &dyn Fn(usize) -> bool, progress: Progress<'_>) {
         let ensemble = &self.scene.ensemble;
         // Speeds stand on the sheets, even if the scene publishes none.
-        let mut solver = self.solver();
+        let Some(mut solver) = self.solver(&mut |_| progress(0.0)) else { return };
         let mut chain = Chain::new(ensemble.handles());
         let mut nearest = Nearest::new(ensemble);
         let fastest = ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).fold(0.0, f64::max);
@@ -170,9 +170,9 @@ impl<'a> Walk<'a> {
         &self.scene.ensemble
     }
 
-    /// Returns the solver of the show, with speeds.
-    pub(crate) fn solver(&self) -> Box<dyn Solver> {
-        self.ensemble().solver(Velocities::Computed)
+    /// Returns the solver of the show, with speeds; `None` if `progress` stops the making of its tables.
+    pub(crate) fn solver(&self, progress: Progress<'_>) -> Option<Box<dyn Solver>> {
+        self.ensemble().solver_unless_stopped(Velocities::Computed, progress)
     }
 }
 

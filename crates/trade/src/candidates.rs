@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use super::{Candidate, ContactErrors, Subject, WARM_UP_FRAMES};
+use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::solve::newton::Newton;
 use bench_dragon_motion::solve::paper::{Paper, PaperRules};
 use bench_dragon_motion::solve::selection;
@@ -12,16 +13,16 @@ use bench_dragon_motion::solve::table::{FollowerTable, Instructions};
 /// The requested accuracies, in metres. The last selects the most exact table.
 const REQUESTED_ACCURACIES: [f64; 5] = [1e-4, 1e-6, 1e-7, 1e-9, 1e-18];
 
-/// Returns all candidates for a dragon, the most exact table on the fastest instructions first.
-pub(super) fn candidates(subject: &Subject, contact: Option<ContactErrors>) -> Vec<Candidate> {
+/// Returns all candidates for a dragon, the most exact table on the fastest instructions first. Some are missing if
+/// `progress`, whose share stays 0, stops their making.
+pub(super) fn candidates(subject: &Subject, contact: Option<ContactErrors>, progress: Progress<'_>) -> Vec<Candidate> {
     let (path, team, head_speed) = (subject.motion.path(), *subject.motion.team(), subject.motion.head_speed());
     let exact_contact = contact.map(|errors| errors.exact);
     let mut candidates = Vec::new();
     for accuracy in REQUESTED_ACCURACIES.into_iter().rev() {
         // A large team may only have memory for the tables of lower accuracies.
-        let Some(selection) = selection::cheapest(path, team, head_speed, subject.velocities, accuracy) else {
-            continue;
-        };
+        let selection = selection::cheapest(path, team, head_speed, subject.velocities, accuracy, progress);
+        let Some(selection) = selection else { continue };
         let (table, make_s) = (selection.table.for_frames(), selection.made_in.as_secs_f64());
         let requested = if accuracy < REQUESTED_ACCURACIES[REQUESTED_ACCURACIES.len() - 2] {
             "best".to_owned()

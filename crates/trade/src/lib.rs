@@ -129,7 +129,8 @@ pub fn measure(subject: &Subject, timeline: &Timeline, progress: Progress<'_>) -
     let samples = truth(subject, end, &mut |share| progress(0.5 * share))?;
     let contact = contact_errors(subject, timeline)?;
     let noise = noise(subject, &samples);
-    let candidates = candidates::candidates(subject, contact);
+    let candidates = candidates::candidates(subject, contact, &mut |_| progress(0.5));
+    go_on(progress(0.5))?;
     let count = candidates.len() as f64;
     let mut measurements = Vec::new();
     for (index, candidate) in candidates.into_iter().enumerate() {

@@ -1,17 +1,23 @@
 //! The report of `check` on a scene without its motion: teams, paths, placements, solvers, alerts and outputs.
 
+use bench_dragon::motion::Motion;
 use bench_dragon::motion::ensemble::Dragon;
 use bench_dragon::motion::model::segment::SegmentOutline;
 use bench_dragon::motion::model::team::{Ends, Team};
 use bench_dragon::motion::placement::Placement;
 use bench_dragon::motion::solve::Velocities;
-use bench_dragon::motion::{Choice, Motion};
 use bench_dragon::show::scene::{AtEnd, OnContact, Scene};
 
-use super::super::{CommandError, Output, figure, number};
+use super::super::signals::report;
+use super::super::{CommandError, Common, Output, figure, number, table_bar};
 
 /// Prints the description of a scene.
-pub(super) fn describe(scene: &Scene, warnings: &[String], output: &mut Output) -> Result<(), CommandError> {
+pub(super) fn describe(
+    scene: &Scene,
+    warnings: &[String],
+    common: &Common,
+    output: &mut Output,
+) -> Result<(), CommandError> {
     let judged = if warnings.is_empty() { "is valid." } else { "can be played, but probably not as it is meant:" };
     output.line(&format!("Scene \"{}\" {judged}", scene.name))?;
     warnings.iter().try_for_each(|warning| output.line(&format!("  Warning: {warning}")))?;
@@ -23,9 +29,7 @@ pub(super) fn describe(scene: &Scene, warnings: &[String], output: &mut Output) 
     if !scene.ensemble.ground().is_empty() {
         output.line(&format!("  Stage: {}.", ground(scene)))?;
     }
-    let choices: Vec<Choice> =
-        scene.ensemble.dragons().iter().map(|dragon| dragon.motion.solver(scene.velocities)).collect();
-    solvers(scene, &choices, output)?;
+    solvers(scene, common, output)?;
     alerts(scene, output)?;
     publishing(scene, output)
 }
@@ -46,10 +50,14 @@ fn dragons(scene: &Scene, output: &mut Output) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Prints the solver of each dragon, and whether velocities are computed.
-fn solvers(scene: &Scene, choices: &[Choice], output: &mut Output) -> Result<(), CommandError> {
-    for (dragon, choice) in scene.ensemble.dragons().iter().zip(choices) {
-        output.line(&format!("  {}: {}.", dragon.titled("Solver"), choice.reason))?;
+/// Makes and prints the solver of each dragon, and prints whether velocities are computed.
+fn solvers(scene: &Scene, common: &Common, output: &mut Output) -> Result<(), CommandError> {
+    for dragon in scene.ensemble.dragons() {
+        let bar = table_bar(common);
+        let made = dragon.motion.solver_unless_stopped(scene.velocities, &mut |share| report(&bar, share));
+        bar.finish_and_clear();
+        let reason = made.map_or_else(|| "not known, because making its table was stopped".to_owned(), |of| of.reason);
+        output.line(&format!("  {}: {reason}.", dragon.titled("Solver")))?;
     }
     output.line(match scene.velocities {
         Velocities::Computed => "  Velocities: computed for every handle.",

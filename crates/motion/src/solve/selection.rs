@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use super::newton::Newton;
 use super::table::{Allowed, FollowerTable, Instructions, Tolerance};
 use super::{Chain, Solver, Velocities};
+use crate::event::{Budget, Progress};
 use crate::model::elementary::hypot;
 use crate::model::path::Path;
 use crate::model::team::Team;
@@ -95,12 +96,20 @@ impl Selection {
 }
 
 /// Returns the cheapest table for `accuracy` metres, or `None` if there is no table for this team and path, or none
-/// that keeps the promise below.
+/// that keeps the promise below. Returns `None` also if `progress`, whose share stays 0, stops the making.
 ///
 /// Positions are within max(accuracy, 8 eps (r + distance travelled)), headings within 2 accuracy / link, and
 /// velocities within 10 accuracy / link of a handle's speed. So extrapolation over a tenth of a link adds one accuracy.
-pub fn cheapest(path: &Path, team: Team, head_speed: f64, velocities: Velocities, accuracy: f64) -> Option<Selection> {
-    cheapest_with(path, team, head_speed, velocities, accuracy, Instructions::fastest(team.handles()))
+pub fn cheapest(
+    path: &Path,
+    team: Team,
+    head_speed: f64,
+    velocities: Velocities,
+    accuracy: f64,
+    progress: Progress<'_>,
+) -> Option<Selection> {
+    let instructions = Instructions::fastest(team.handles());
+    cheapest_with(path, team, head_speed, velocities, accuracy, instructions, progress)
 }
 
 /// Returns [`cheapest`] with other instructions; also `None` if this processor lacks them.
@@ -111,20 +120,23 @@ pub fn cheapest_with(
     velocities: Velocities,
     accuracy: f64,
     instructions: Instructions,
+    progress: Progress<'_>,
 ) -> Option<Selection> {
     let began = Instant::now();
+    let budget = &mut Budget::new(u64::MAX, progress);
     let accuracy = accuracy.min(COARSEST * team.shortest_link());
-    let make = |tolerance: Tolerance| {
-        let table = FollowerTable::with_tolerance(path, team, head_speed, velocities, tolerance)?;
+    let make = |tolerance: Tolerance, budget: &mut Budget| {
+        let table = FollowerTable::with_tolerance(path, team, head_speed, velocities, tolerance, budget)?;
         table.with_instructions(instructions)
     };
     let tolerance = tolerance(&team, accuracy);
-    let rows = make(tolerance)?;
-    let measurement = ErrorMeasurement::new(path, team, head_speed, velocities, &rows);
-    let select = |table: FollowerTable| {
-        let Measured { error, allowed, speed_error } = measurement.measure(&table, accuracy);
+    let rows = make(tolerance, budget)?;
+    let measurement = ErrorMeasurement::new(path, team, head_speed, velocities, &rows, budget)?;
+    let select = |table: FollowerTable, budget: &mut Budget| {
+        let Measured { error, allowed, speed_error } = measurement.measure(&table, accuracy, budget)?;
         let (test_points, made_in) = (measurement.test_points.len(), began.elapsed());
-        Selection { table: table.promising(accuracy), accuracy, error, allowed, speed_error, test_points, made_in }
+        let table = table.promising(accuracy);
+        Some(Selection { table, accuracy, error, allowed, speed_error, test_points, made_in })
     };
     if accuracy > EXACT_LINKS {
         let link = team.shortest_link();
@@ -133,14 +145,15 @@ pub fn cheapest_with(
             Velocities::Omitted => f64::INFINITY,
         };
         let allowed = Allowed { place: SHARE_OF_FORMAT * accuracy, heading: 1.5 * accuracy / link, speed };
-        let packed = FollowerTable::formats().into_iter().filter_map(|format| rows.packed(format, allowed));
-        if let Some(selection) = packed.map(select).find(Selection::meets) {
+        let packed = |format| select(rows.packed(format, allowed, budget)?, budget);
+        if let Some(selection) = FollowerTable::formats().into_iter().filter_map(packed).find(Selection::meets) {
             return Some(selection);
         }
     }
-    let selection = select(rows);
-    let selection =
-        if selection.meets() || tolerance == Tolerance::EXACT { selection } else { select(make(Tolerance::EXACT)?) };
+    let mut selection = select(rows, budget)?;
+    if !selection.meets() && tolerance != Tolerance::EXACT {
+        selection = select(make(Tolerance::EXACT, budget)?, budget)?;
+    }
     (selection.error <= selection.allowed.max(accuracy)).then_some(selection)
 }
 
@@ -175,36 +188,45 @@ struct Measured {
 }
 
 impl ErrorMeasurement {
-    fn new(path: &Path, team: Team, head_speed: f64, velocities: Velocities, table: &FollowerTable) -> Self {
-        let times = times(path, &team, head_speed, table.valid_until());
+    /// Returns `None` if the budget is spent.
+    fn new(
+        path: &Path,
+        team: Team,
+        head_speed: f64,
+        velocities: Velocities,
+        table: &FollowerTable,
+        budget: &mut Budget,
+    ) -> Option<Self> {
+        let times = times(path, &team, head_speed, table.valid_until(), budget)?;
         let newton = Newton::new(path.clone(), team, head_speed, velocities);
-        let solve = |times: &[f64]| -> Vec<(f64, Chain)> {
-            let solved = times.iter().filter_map(|&time| {
+        let solve = |times: &[f64], budget: &mut Budget| -> Option<Vec<(f64, Chain)>> {
+            let mut test_points = Vec::with_capacity(times.len());
+            for &time in times {
+                budget.spend(team.handles() as u64).ok()?;
                 let mut chain = Chain::new(team.handles());
-                newton.solve_at(head_speed * time, &mut chain).ok()?;
-                Some((time, chain))
-            });
-            solved.collect()
+                if newton.solve_at(head_speed * time, &mut chain).is_ok() {
+                    test_points.push((time, chain));
+                }
+            }
+            Some(test_points)
         };
         let (first, second) = times.split_at(times.len() / 2);
-        let test_points = std::thread::scope(|scope| {
-            let second = scope.spawn(|| solve(second));
-            let mut test_points = solve(first);
-            test_points.extend(second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            test_points
-        });
-        Self { link: team.shortest_link(), head_speed, velocities, test_points }
+        let (first, second) = budget.both(|budget| solve(first, budget), |budget| solve(second, budget));
+        let mut test_points = first?;
+        test_points.extend(second?);
+        Some(Self { link: team.shortest_link(), head_speed, velocities, test_points })
     }
 
     /// Returns the error and the allowed error, metres, of the handle with the largest ratio of the first to the
-    /// second. Returns also the largest ratio for a velocity.
-    fn measure(&self, table: &FollowerTable, accuracy: f64) -> Measured {
+    /// second. Returns also the largest ratio for a velocity. Returns `None` if the budget is spent.
+    fn measure(&self, table: &FollowerTable, accuracy: f64, budget: &mut Budget) -> Option<Measured> {
         let mut table = table.clone();
         let mut worst = Measured { error: 0.0, allowed: SHARE_MEASURED * accuracy, speed_error: 0.0 };
         for (time, safe) in &self.test_points {
+            budget.spend(safe.handles() as u64).ok()?;
             let mut chain = Chain::new(safe.handles());
             if table.solve(*time, &mut chain).is_err() {
-                return Measured { error: f64::INFINITY, ..worst };
+                return Some(Measured { error: f64::INFINITY, ..worst });
             }
             for handle in 0..safe.handles() {
                 let (x, y) = (safe.x[handle], safe.y[handle]);
@@ -220,7 +242,7 @@ impl ErrorMeasurement {
                 }
             }
         }
-        worst
+        Some(worst)
     }
 
     /// Returns the error of a handle's velocity, as a part of the error allowed where positions are within `accuracy`
@@ -233,8 +255,8 @@ impl ErrorMeasurement {
     }
 }
 
-/// Returns the times of the test points, seconds, all within the table.
-fn times(path: &Path, team: &Team, head_speed: f64, end: f64) -> Vec<f64> {
+/// Returns the times of the test points, seconds, all within the table; `None` if the budget is spent.
+fn times(path: &Path, team: &Team, head_speed: f64, end: f64, budget: &mut Budget) -> Option<Vec<f64>> {
     let most = (MOST_HANDLES / team.handles()).max(FEWEST_TEST_POINTS);
     let spread = SPREAD_TEST_POINTS.min(most.div_ceil(2));
     let mut times: Vec<f64> = (0..spread).map(|k| end * k as f64 / spread as f64).collect();
@@ -250,11 +272,11 @@ fn times(path: &Path, team: &Team, head_speed: f64, end: f64) -> Vec<f64> {
     let wanted = JUNCTION_TEST_POINTS.min(most.div_ceil(4));
     let step = crossings.len().div_ceil(wanted).max(1);
     times.extend(crossings.into_iter().step_by(step));
-    let kinks = FollowerTable::kinks(path, team).into_iter().map(|metres| metres / head_speed);
+    let kinks = FollowerTable::kinks(path, team, budget)?.into_iter().map(|metres| metres / head_speed);
     let kinks: Vec<f64> = kinks.filter(|time| (0.0..end).contains(time)).collect();
     let left = most.saturating_sub(times.len()).clamp(1, KINK_TEST_POINTS);
     let step = kinks.len().div_ceil(left).max(1);
     times.extend(kinks.into_iter().step_by(step));
     times.sort_by(f64::total_cmp);
-    times
+    Some(times)
 }

@@ -34,6 +34,7 @@ use track::Track;
 
 use super::newton::Newton;
 use super::{ChainMut, Solver, Velocities};
+use crate::event::{Budget, Progress};
 use crate::linkage::NoFollower;
 use crate::model::path::Path;
 use crate::model::team::{Ends, Team};
@@ -135,9 +136,16 @@ impl FollowerTable {
     /// solver is as exact as doubles allow and uses the fastest instructions of this processor.
     ///
     /// Returns `None` for a single bench, and for a team so long that the table would exceed its limit. Returns `None`
-    /// also if the table is not exact even at the start.
-    pub fn new(path: &Path, team: Team, head_speed: f64, velocities: Velocities) -> Option<Self> {
-        Self::with_tolerance(path, team, head_speed, velocities, Tolerance::EXACT)
+    /// also if the table is not exact even at the start, and if `progress`, whose share stays 0, stops the making.
+    pub fn new(
+        path: &Path,
+        team: Team,
+        head_speed: f64,
+        velocities: Velocities,
+        progress: Progress<'_>,
+    ) -> Option<Self> {
+        let budget = &mut Budget::new(u64::MAX, progress);
+        Self::with_tolerance(path, team, head_speed, velocities, Tolerance::EXACT, budget)
     }
 
     /// Does the same at the requested accuracy.
@@ -147,6 +155,7 @@ impl FollowerTable {
         head_speed: f64,
         velocities: Velocities,
         tolerance: Tolerance,
+        budget: &mut Budget,
     ) -> Option<Self> {
         if team.benches < 2 {
             return None;
@@ -158,8 +167,8 @@ impl FollowerTable {
             ends: Ends { tail_length: tail.as_ref().map_or(team.ends.tail_length, |_| None), ..team.ends },
             ..team
         };
-        let mut rows = band::rows(&track, &chain, tolerance, tail.is_some())?;
-        let head = HeadBuilder::new(&track, &chain, &rows).build()?;
+        let mut rows = band::rows(&track, &chain, tolerance, tail.is_some(), budget)?;
+        let head = HeadBuilder::new(&track, &chain, &rows).build(budget)?;
         if tail.is_none() {
             rows.bands.iter_mut().for_each(|band| band.centres = Vec::new());
         }
@@ -184,9 +193,9 @@ impl FollowerTable {
         })
     }
 
-    /// Returns the metres that the head has travelled where frames have kinks.
-    pub(crate) fn kinks(path: &Path, team: &Team) -> Vec<f64> {
-        layout::crossings(&Track::new(path), team)
+    /// Returns the metres that the head has travelled where frames have kinks; `None` if the budget is spent.
+    pub(crate) fn kinks(path: &Path, team: &Team, budget: &mut Budget) -> Option<Vec<f64>> {
+        layout::crossings(&Track::new(path), team, budget)
     }
 
     /// Returns the same solver with other instructions, or `None` if this processor lacks them.
@@ -195,9 +204,9 @@ impl FollowerTable {
     }
 
     /// Returns the same solver with its frames read from another format; `None` if that would lose more than is
-    /// allowed.
-    pub(crate) fn packed(&self, format: Format, allowed: Allowed) -> Option<Self> {
-        let packed = PackedRows::new(&self.rows, self.head.foremost_row(), format, allowed)?;
+    /// allowed, and if the budget is spent.
+    pub(crate) fn packed(&self, format: Format, allowed: Allowed, budget: &mut Budget) -> Option<Self> {
+        let packed = PackedRows::new(&self.rows, self.head.foremost_row(), format, allowed, budget)?;
         Some(Self { packed: Some(Arc::new(packed)), ..self.clone() })
     }
 

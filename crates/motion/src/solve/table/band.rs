@@ -13,6 +13,7 @@ use super::layout::{bands, between_kinks, foremost, kinks, longest_reach};
 use super::polynomial::{economise, from_slopes, horner};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, Tolerance};
 use super::track::{Node, Track};
+use crate::event::Budget;
 use crate::linkage;
 use crate::model::Vector;
 use crate::model::curve::Curve;
@@ -63,7 +64,7 @@ struct BandBuilder<'a> {
     /// True if the second handle can come here.
     with_centres: bool,
     /// The number of bytes that the band may take.
-    budget: usize,
+    most_bytes: usize,
 }
 
 /// The finished part of a band.
@@ -98,56 +99,66 @@ struct Errors {
 }
 
 impl BandBuilder<'_> {
-    fn node_chain(&self, phase: f64) -> NodeChain {
+    /// Returns `None` if the budget is spent.
+    fn node_chain(&self, phase: f64, budget: &mut Budget) -> Option<NodeChain> {
         let mut nodes = Vec::with_capacity(self.rows);
         let mut gap = self.link;
         let mut rear = self.behind.node(phase);
         while let Some(node) = rear
             && nodes.len() < self.rows
         {
+            budget.spend(1).ok()?;
             rear = self.track.ahead(&node, &mut gap, self.link);
             nodes.extend(rear);
         }
-        Arc::new(nodes)
+        Some(Arc::new(nodes))
     }
 
-    fn quintet(&self, piece: Piece) -> Quintet {
-        std::array::from_fn(|k| self.node_chain(piece.begin + 0.25 * k as f64 * (piece.end - piece.begin)))
+    fn quintet(&self, piece: Piece, budget: &mut Budget) -> Option<Quintet> {
+        let mut at = |quarter: f64| self.node_chain(piece.begin + 0.25 * quarter * (piece.end - piece.begin), budget);
+        Some([at(0.0)?, at(1.0)?, at(2.0)?, at(3.0)?, at(4.0)?])
     }
 
     /// Cuts a piece until its parts are exact, and adds these to the band. Returns `None` if the table becomes too
-    /// large.
-    fn refine(&self, made: &mut Made, piece: Piece, chains: Quintet, halvings: usize, parent: f64) -> Option<()> {
-        let errors = self.errors(piece, &chains, halvings);
+    /// large, or the budget is spent.
+    fn refine(
+        &self,
+        made: &mut Made,
+        piece: Piece,
+        chains: Quintet,
+        (halvings, parent): (usize, f64),
+        budget: &mut Budget,
+    ) -> Option<()> {
+        let errors = self.errors(piece, &chains, halvings, budget)?;
         if errors.worst <= 1.0 || !errors.curable || halvings == 0 || errors.worst > LEAST_GAIN * parent {
             if errors.worst > 1.0 {
                 made.valid_from = made.valid_from.max(errors.valid_from);
             }
-            return self.keep(made, piece, &chains);
+            return self.keep(made, piece, &chains, budget);
         }
         let middle = 0.5 * (piece.begin + piece.end);
         let [a, b, c, d, e] = chains;
-        let refine = |made: &mut Made, part: Piece, [front, centre, rear]: [NodeChain; 3]| {
+        let refine = |made: &mut Made, part: Piece, [front, centre, rear]: [NodeChain; 3], budget: &mut Budget| {
             let quarter = 0.25 * (part.end - part.begin);
-            let (first, second) = (self.node_chain(part.begin + quarter), self.node_chain(part.end - quarter));
-            self.refine(made, part, [front, first, centre, second, rear], halvings - 1, errors.worst)
+            let first = self.node_chain(part.begin + quarter, budget)?;
+            let second = self.node_chain(part.end - quarter, budget)?;
+            self.refine(made, part, [front, first, centre, second, rear], (halvings - 1, errors.worst), budget)
         };
         let (first, second) = (Piece { end: middle, ..piece }, Piece { begin: middle, ..piece });
         let (first_chains, second_chains) = ([a, b, c.clone()], [c, d, e]);
         if halvings < MOST_HALVINGS || self.rows < PARALLEL_ROWS {
-            refine(made, first, first_chains)?;
-            return refine(made, second, second_chains);
+            refine(made, first, first_chains, budget)?;
+            return refine(made, second, second_chains, budget);
         }
         // One and two threads give the same result.
         let mut later = self.nothing(0.0);
-        let (first, second) = std::thread::scope(|scope| {
-            let second = scope.spawn(|| refine(&mut later, second, second_chains));
-            (refine(made, first, first_chains), second.join())
-        });
-        first?;
-        second.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        let (first, second) = budget.both(
+            |budget| refine(made, first, first_chains, budget),
+            |budget| refine(&mut later, second, second_chains, budget),
+        );
+        (first?, second?);
         made.append(later);
-        self.is_within_budget(made, piece.end)
+        self.is_small_enough(made, piece.end)
     }
 
     /// Creates a band without pieces.
@@ -158,13 +169,13 @@ impl BandBuilder<'_> {
 
     /// Returns `None` if the first phases take too many bytes: then all phases will. A part of the phases may take more
     /// than its share.
-    fn is_within_budget(&self, made: &Made, phases: f64) -> Option<()> {
+    fn is_small_enough(&self, made: &Made, phases: f64) -> Option<()> {
         let bytes = size_of_val(made.band.coefficients.as_slice()) as f64;
-        (bytes <= self.budget as f64 * phases.max(LEAST_SHARE)).then_some(())
+        (bytes <= self.most_bytes as f64 * phases.max(LEAST_SHARE)).then_some(())
     }
 
-    fn keep(&self, made: &mut Made, piece: Piece, chains: &Quintet) -> Option<()> {
-        self.tabulate(&mut made.band.coefficients, piece, chains);
+    fn keep(&self, made: &mut Made, piece: Piece, chains: &Quintet, budget: &mut Budget) -> Option<()> {
+        self.tabulate(&mut made.band.coefficients, piece, chains, budget)?;
         if self.with_centres {
             let middle = &chains[2];
             let missing = std::iter::repeat_n(None, self.rows - middle.len());
@@ -172,17 +183,24 @@ impl BandBuilder<'_> {
         }
         made.front_row.extend(quintet_at(chains, self.rows - 1).map(|nodes| (piece, nodes.map(|node| *node))));
         made.band.pieces.push(piece);
-        self.is_within_budget(made, piece.end)
+        self.is_small_enough(made, piece.end)
     }
 
-    /// Adds the polynomials of a piece.
-    fn tabulate(&self, coefficients: &mut Vec<Lanes>, piece: Piece, chains: &Quintet) {
+    /// Adds the polynomials of a piece; `None` if the budget is spent.
+    fn tabulate(
+        &self,
+        coefficients: &mut Vec<Lanes>,
+        piece: Piece,
+        chains: &Quintet,
+        budget: &mut Budget,
+    ) -> Option<()> {
         let Lengths { coordinate, heading } = self.lengths;
         let half = 0.5 * (piece.end - piece.begin);
         let (rows, per_row) = (self.rows, self.lengths.per_row());
         let begin = coefficients.len();
         coefficients.resize(begin + rows / LANES * per_row, Lanes([0.0; LANES]));
         for (index, nodes) in (0..rows).map_while(|index| Some((index, quintet_at(chains, index)?))) {
+            budget.spend(1).ok()?;
             let row = rows - 1 - index;
             let block = &mut coefficients[begin + row / LANES * per_row..][..per_row];
             let mut polynomials = polynomials(half, nodes);
@@ -199,13 +217,16 @@ impl BandBuilder<'_> {
                 }
             }
         }
+        Some(())
     }
 
-    /// Returns the errors of the polynomials of a piece, infinite if the piece is certain to be cut.
-    fn errors(&self, piece: Piece, chains: &Quintet, halvings: usize) -> Errors {
+    /// Returns the errors of the polynomials of a piece, infinite if the piece is certain to be cut. Returns `None` if
+    /// the budget is spent.
+    fn errors(&self, piece: Piece, chains: &Quintet, halvings: usize, budget: &mut Budget) -> Option<Errors> {
         let half = 0.5 * (piece.end - piece.begin);
         let mut errors = Errors { worst: 0.0, valid_from: 0.0, curable: false };
         for index in 0..self.end_row - self.needed.max(self.first_row).min(self.end_row) {
+            budget.spend(1).ok()?;
             let row = self.end_row - 1 - index;
             let error = match quintet_at(chains, index) {
                 Some(nodes) => self.error(half, nodes, index, &chains[1]),
@@ -221,7 +242,7 @@ impl BandBuilder<'_> {
                 break;
             }
         }
-        errors
+        Some(errors)
     }
 
     /// Returns the error of one row of a piece `2 half` long, as a part of the allowed error. This error is the largest
@@ -312,10 +333,17 @@ const MANY_JUNCTIONS: usize = 16;
 /// The number of times by which a table may seem too large before it is made: bands further back have fewer kinks.
 const ROUGHLY: f64 = 4.0;
 
-/// Makes the table for `team` on `path`; `None` if there is none, or it would be too large. On a path of many junctions
-/// it covers as much of the beginning as its limit allows.
+/// Makes the table for `team` on `path`; `None` if there is none, it would be too large, or the budget is spent. On a
+/// path of many junctions it covers as much of the beginning as its limit allows.
 /// `all_centres`: the places of the pieces' centres are for frames, too, in every row.
-pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance, all_centres: bool) -> Option<Rows> {
+pub(super) fn rows(
+    track: &Track,
+    team: &Team,
+    tolerance: Tolerance,
+    all_centres: bool,
+    budget: &mut Budget,
+) -> Option<Rows> {
+    let mut rows_up_to = |reach: f64| rows_up_to(track, team, (tolerance, all_centres), reach, budget);
     let junctions = |reach: f64| track.path.junctions().take_while(|at| *at <= reach).count();
     // Each junction cuts all rows.
     let bytes = |reach: f64| {
@@ -325,20 +353,26 @@ pub(super) fn rows(track: &Track, team: &Team, tolerance: Tolerance, all_centres
     let mut reach = longest_reach(track, team);
     while junctions(reach) > MANY_JUNCTIONS {
         if bytes(reach) < ROUGHLY * MOST_BYTES as f64
-            && let Some(rows) = rows_up_to(track, team, tolerance, all_centres, reach)
+            && let Some(rows) = rows_up_to(reach)
         {
             return Some(rows);
         }
         reach *= 0.5;
     }
-    rows_up_to(track, team, tolerance, all_centres, reach)
+    rows_up_to(reach)
 }
 
 /// Makes the table for the first `reach` metres of the head's travel.
-fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, all_centres: bool, reach: f64) -> Option<Rows> {
+fn rows_up_to(
+    track: &Track,
+    team: &Team,
+    (tolerance, all_centres): (Tolerance, bool),
+    reach: f64,
+    budget: &mut Budget,
+) -> Option<Rows> {
     let beginning = Beginning::new(track, team)?;
     let link = team.link(1);
-    let foremost = foremost(track, team, reach)?;
+    let foremost = foremost(track, team, reach, budget)?;
     let second = track.follower(track.path.param_at(0.0), team.link(0))?;
     // One chain of nodes determines the number of rows, with a margin; it is least if each takes half a turn.
     let mut node = beginning.node(track, 0.0);
@@ -349,6 +383,7 @@ fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, all_centres: boo
     }
     let (mut gap, mut steps, mut behind_second) = (link, 0, 0);
     while track.path.arc_length(foremost, node.at) < 0.0 {
+        budget.spend(1).ok()?;
         steps += 1;
         if track.path.arc_length(second, node.at) < 0.0 {
             behind_second = steps;
@@ -360,7 +395,7 @@ fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, all_centres: boo
         }
     }
     let end = (steps + 2).next_multiple_of(LANES);
-    let kinks = kinks(track, &beginning, link, end, foremost);
+    let kinks = kinks(track, &beginning, link, end, foremost, budget);
     let phases = kinks.iter().map(|kink| kink.fract()).collect();
     let mut table = Rows { tolerance, bands: Vec::new(), kinks: phases, valid_from: 0.0 };
     // So far behind, one piece suffices. It is smoother than the beginning computed for each phase.
@@ -380,12 +415,12 @@ fn rows_up_to(track: &Track, team: &Team, tolerance: Tolerance, all_centres: boo
             end_row,
             needed: end - steps - 2,
             with_centres: all_centres || first_row <= end - behind_second,
-            budget: MOST_BYTES.saturating_sub(table.memory_bytes()),
+            most_bytes: MOST_BYTES.saturating_sub(table.memory_bytes()),
         };
         let mut made = builder.nothing(table.valid_from);
         for piece in between_kinks(&kinks, first_row) {
-            let quintet = builder.quintet(piece);
-            builder.refine(&mut made, piece, quintet, MOST_HALVINGS, f64::INFINITY)?;
+            let quintet = builder.quintet(piece, budget)?;
+            builder.refine(&mut made, piece, quintet, (MOST_HALVINGS, f64::INFINITY), budget)?;
         }
         let Made { mut band, front_row, valid_from } = made;
         band.index();

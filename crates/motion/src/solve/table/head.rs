@@ -6,6 +6,7 @@
 use super::polynomial::SlopeFit;
 use super::rows::{Alpha, Rows};
 use super::track::Track;
+use crate::event::Budget;
 use crate::model::Vector;
 use crate::model::elementary::{hypot, pow};
 use crate::model::path::Param;
@@ -40,6 +41,9 @@ const SHORTEST: f64 = 1e-7;
 /// Promised error in metres for a short travel, and promised relative error of speeds.
 const MOST_ERROR: f64 = 1e-13;
 const SPEED_ERROR: f64 = 1e-12;
+
+/// Units of work of a piece: two links for each node, and as many again to find where the piece ends.
+const WORK_OF_PIECE: u64 = 4 * NODES.len() as u64;
 
 /// A kink this near the end of a piece, in links, does not cut the piece.
 const AT_END: f64 = 1e-11;
@@ -170,8 +174,9 @@ impl<'a> HeadBuilder<'a> {
         Self { track, team, rows, fit: SlopeFit::new(&NODES) }
     }
 
-    /// Makes the table from the start on as far as it is exact; `None` if it is not exact at the start.
-    pub(super) fn build(&self) -> Option<HeadTable> {
+    /// Makes the table from the start on as far as it is exact; `None` if it is not exact at the start, or the budget is
+    /// spent.
+    pub(super) fn build(&self, budget: &mut Budget) -> Option<HeadTable> {
         let link = self.team.link(1);
         let mut table = HeadTable { begins: vec![0.0], ..HeadTable::default() };
         let mut reached = self.start()?;
@@ -181,6 +186,7 @@ impl<'a> HeadBuilder<'a> {
         let mut travelled = 0.0;
         let mut length = LONGEST * link;
         while table.pieces.len() < MOST_PIECES {
+            budget.spend(WORK_OF_PIECE).ok()?;
             let short = length.min(LONGEST_METRES + 4.0 * travelled);
             let end = self.end_before_junction(travelled, travelled + short);
             if end <= travelled {

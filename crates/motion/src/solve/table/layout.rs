@@ -4,6 +4,7 @@
 use super::beginning::Beginning;
 use super::rows::{LANES, Piece};
 use super::track::{Node, Track};
+use crate::event::Budget;
 use crate::linkage;
 use crate::model::curve::Curve;
 use crate::model::path::Param;
@@ -38,8 +39,9 @@ pub(super) fn longest_reach(track: &Track, team: &Team) -> f64 {
     track.path.length().min(MOST_ROWS_AHEAD as f64 * team.link(1))
 }
 
-/// Returns the foremost place of the second handle while the head travels `reach` metres.
-pub(super) fn foremost(track: &Track, team: &Team, reach: f64) -> Option<Param> {
+/// Returns the foremost place of the second handle while the head travels `reach` metres; `None` if there is none, or
+/// the budget is spent.
+pub(super) fn foremost(track: &Track, team: &Team, reach: f64, budget: &mut Budget) -> Option<Param> {
     let second = |travelled: f64| linkage::follower(track.path, track.path.param_at(travelled), team.link(0)).ok();
     let mut foremost = second(0.0)?;
     let mut farther = |place: Param| {
@@ -50,6 +52,7 @@ pub(super) fn foremost(track: &Track, team: &Team, reach: f64) -> Option<Param> 
     let step = team.link(0).max(team.link(1));
     let (mut good, mut bad) = (0.0, f64::INFINITY);
     while bad == f64::INFINITY && good < reach {
+        budget.spend(1).ok()?;
         let next = (good + step).min(reach);
         match second(next) {
             Some(place) => {
@@ -73,8 +76,15 @@ pub(super) fn foremost(track: &Track, team: &Team, reach: f64) -> Option<Param> 
 }
 
 /// Returns alpha of every junction at which the path's curvature changes, in order of phase. None is further ahead than
-/// `furthest`.
-pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize, furthest: Param) -> Vec<f64> {
+/// `furthest`. Some are missing if the budget is spent.
+pub(super) fn kinks(
+    track: &Track,
+    beginning: &Beginning,
+    link: f64,
+    end: usize,
+    furthest: Param,
+    budget: &mut Budget,
+) -> Vec<f64> {
     let path = track.path;
     let margin = 2.0 * (LANES + 4) as f64 * link;
     let is_covered =
@@ -92,6 +102,7 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize,
                 if let Some(alpha) = beginning.alpha(place) {
                     break Some(end as f64 + alpha - links);
                 }
+                budget.spend(1).ok()?;
                 place = track.follower(place, link)?;
                 links += 1.0;
             }
@@ -104,18 +115,23 @@ pub(super) fn kinks(track: &Track, beginning: &Beginning, link: f64, end: usize,
 
 /// Returns the places of the head, in metres of travel, at which a handle behind it crosses a junction, because frames
 /// have kinks there. The list covers every junction and all handles that have only one place each. It does not depend
-/// on a table.
-pub(super) fn crossings(track: &Track, team: &Team) -> Vec<f64> {
+/// on a table. Returns `None` if the budget is spent.
+pub(super) fn crossings(track: &Track, team: &Team, budget: &mut Budget) -> Option<Vec<f64>> {
     let path = track.path;
-    let of_segment = |segment: usize| {
+    let mut crossings = Vec::new();
+    for segment in 1..path.segments() {
         let at = Param { segment, at: path.first(segment) };
         let first = Node { at, tangent: path.tangent(at), spacing: 1.0, heading: 0.0, heading_rate: 0.0 };
         let (mut gap, mut head_gap) = (team.link(1), team.link(0));
         let second_handles = std::iter::successors(Some(first), move |rear| track.ahead(rear, &mut gap, team.link(1)));
-        let heads = second_handles.map_while(move |second| track.ahead(&second, &mut head_gap, team.link(0)));
-        heads.take(team.benches).map(|head| path.travelled(head.at)).take_while(|travelled| *travelled < path.length())
-    };
-    (1..path.segments()).flat_map(of_segment).collect()
+        let heads = second_handles.map_while(|second| track.ahead(&second, &mut head_gap, team.link(0)));
+        let travelled = heads.take(team.benches).map(|head| path.travelled(head.at));
+        for travelled in travelled.take_while(|travelled| *travelled < path.length()) {
+            budget.spend(2).ok()?;
+            crossings.push(travelled);
+        }
+    }
+    Some(crossings)
 }
 
 /// Returns the pieces into which the kinks of a band cut the phases.

@@ -8,6 +8,7 @@
 
 use super::polynomial::{economise, on_part};
 use super::rows::{Band, LANES, Lanes, Lengths, Piece, Rows, piece_at, piece_of_share};
+use crate::event::Budget;
 use crate::model::elementary::hypot;
 
 /// One coefficient of neighbouring rows in single precision.
@@ -105,9 +106,16 @@ impl PackedRows {
         [format(Precision::Single, three), format(Precision::Mixed, three), format(Precision::Mixed, four)]
     };
 
-    /// Packs the rows from `foremost` on. Returns `None` if that would lose more than is allowed, or save nothing.
-    pub(super) fn new(rows: &Rows, foremost: usize, format: Format, allowed: Allowed) -> Option<Self> {
-        let mut budget = MOST_GROWTH * rows.memory_bytes() + SMALL;
+    /// Packs the rows from `foremost` on. Returns `None` if that would lose more than is allowed, or save nothing, and if
+    /// the budget is spent.
+    pub(super) fn new(
+        rows: &Rows,
+        foremost: usize,
+        format: Format,
+        allowed: Allowed,
+        budget: &mut Budget,
+    ) -> Option<Self> {
+        let mut bytes_left = MOST_GROWTH * rows.memory_bytes() + SMALL;
         let mut bands = Vec::with_capacity(rows.bands.len());
         for band in &rows.bands {
             let first = foremost.max(rows.valid_from as usize).clamp(band.first_row, band.first_row + band.rows);
@@ -117,13 +125,13 @@ impl PackedRows {
                 valid_from: rows.valid_from,
                 format,
                 allowed,
-                budget,
+                bytes_left,
                 packed: PackedBand::of(band),
             };
             for (index, piece) in band.pieces.iter().enumerate() {
-                builder.refine(index, *piece, *piece, MOST_HALVINGS)?;
+                builder.refine(index, *piece, *piece, MOST_HALVINGS, budget)?;
             }
-            budget = builder.budget;
+            bytes_left = builder.bytes_left;
             let mut packed = builder.packed;
             packed.piece_of_share = piece_of_share(&packed.pieces);
             bands.push(packed);
@@ -177,8 +185,7 @@ struct Builder<'a> {
     valid_from: f64,
     format: Format,
     allowed: Allowed,
-    /// The number of bytes left.
-    budget: usize,
+    bytes_left: usize,
     packed: PackedBand,
 }
 
@@ -187,16 +194,18 @@ type Polynomials = [[f64; 6]; 3];
 
 impl Builder<'_> {
     /// Adds `part` of a piece of the band, halved until the loss is within the allowed loss.
-    fn refine(&mut self, index: usize, piece: Piece, part: Piece, halvings: usize) -> Option<()> {
+    fn refine(&mut self, index: usize, piece: Piece, part: Piece, halvings: usize, budget: &mut Budget) -> Option<()> {
         let first = self.first.max((self.valid_from - part.end).ceil().max(0.0) as usize);
         let end = self.band.first_row + self.band.rows;
-        if (first..end).all(|row| self.loss(&mut self.polynomials(index, piece, part, row)) <= 1.0) {
-            return self.add(index, piece, part);
+        let mut is_kept =
+            |row: usize| budget.spend(1).is_ok() && self.loss(&mut self.polynomials(index, piece, part, row)) <= 1.0;
+        if (first..end).all(&mut is_kept) {
+            return self.add(index, piece, part, budget);
         }
         let halvings = halvings.checked_sub(1)?;
         let middle = 0.5 * (part.begin + part.end);
-        self.refine(index, piece, Piece { end: middle, ..part }, halvings)?;
-        self.refine(index, piece, Piece { begin: middle, ..part }, halvings)
+        self.refine(index, piece, Piece { end: middle, ..part }, halvings, budget)?;
+        self.refine(index, piece, Piece { begin: middle, ..part }, halvings, budget)
     }
 
     /// Returns the band's polynomials over a part of a piece.
@@ -232,19 +241,20 @@ impl Builder<'_> {
         (place / self.allowed.place).max(turn / self.allowed.heading).max(speed)
     }
 
-    /// Adds the polynomials of a part. Returns `None` if the table becomes too large.
-    fn add(&mut self, index: usize, piece: Piece, part: Piece) -> Option<()> {
+    /// Adds the polynomials of a part. Returns `None` if the table becomes too large, or the budget is spent.
+    fn add(&mut self, index: usize, piece: Piece, part: Piece, budget: &mut Budget) -> Option<()> {
         let Lengths { coordinate, heading } = self.format.lengths;
         let mixed = self.format.precision == Precision::Mixed;
         let skipped = usize::from(mixed);
         let per_block = 2 * (coordinate - skipped) + heading;
         let blocks = self.band.rows / LANES;
         let bytes = self.band.rows * self.format.bytes_per_handle();
-        self.budget = self.budget.checked_sub(bytes)?;
+        self.bytes_left = self.bytes_left.checked_sub(bytes)?;
         let (begin, begin_constants) = (self.packed.coefficients.len(), self.packed.constants.len());
         self.packed.coefficients.resize(begin + blocks * per_block, Singles([0.0; LANES]));
         self.packed.constants.resize(begin_constants + if mixed { 2 * blocks } else { 0 }, Lanes([0.0; LANES]));
         for row in 0..self.band.rows {
+            budget.spend(1).ok()?;
             let mut polynomials = self.polynomials(index, piece, part, self.band.first_row + row);
             self.loss(&mut polynomials);
             let (block, lane) = (row / LANES, row % LANES);

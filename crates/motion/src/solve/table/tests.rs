@@ -1,6 +1,9 @@
 //! The table, exact and in every format, against the safe solver.
 
+use std::ops::ControlFlow;
+
 use super::*;
+use crate::event::unreported;
 use crate::model::curve::Side;
 use crate::model::path::Route;
 use crate::solve::Chain;
@@ -13,6 +16,16 @@ fn paths() -> [Path; 3] {
     let route = route.arc(Side::Right, 5.0, 0.5).line(10.0).arc(Side::Left, 5.0, 0.5).line(120.0);
     let turnaround = Path::turnaround(1.7, 4.5, 2.0, 100.0, 100.0).unwrap();
     [Path::spiral(0.55, 16.0), turnaround, route.build().unwrap()]
+}
+
+fn with_tolerance(path: &Path, team: Team, tolerance: Tolerance) -> FollowerTable {
+    let mut ask = unreported;
+    let budget = &mut Budget::new(u64::MAX, &mut ask);
+    FollowerTable::with_tolerance(path, team, 1.0, Velocities::Computed, tolerance, budget).unwrap()
+}
+
+fn packed(table: &FollowerTable, format: Format, allowed: Allowed) -> Option<FollowerTable> {
+    table.packed(format, allowed, &mut Budget::new(u64::MAX, &mut unreported))
 }
 
 /// Returns the largest differences of place, metres, of heading and of speed, relative to the head's or the handle's
@@ -35,7 +48,7 @@ fn differences(one: &Chain, other: &Chain) -> [f64; 3] {
 fn the_table_agrees_with_the_safe_solver_on_every_code_path_and_across_junctions() {
     for path in paths() {
         let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
-        let table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed).unwrap();
+        let table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed, &mut unreported).unwrap();
         let end = table.valid_until();
         assert!(end > 200.0, "{end}");
         let around = |junction: f64| [-1e-3, -1e-9, 0.0, 1e-9, 1e-3].map(|by| junction + by);
@@ -64,7 +77,7 @@ fn the_table_agrees_with_the_safe_solver_on_every_code_path_and_across_junctions
 #[test]
 fn a_frame_does_not_depend_on_the_ones_before_and_past_the_table_the_safe_solver_works() {
     let path = &paths()[0];
-    let mut table = FollowerTable::new(path, TEAM, 1.0, Velocities::Omitted).unwrap();
+    let mut table = FollowerTable::new(path, TEAM, 1.0, Velocities::Omitted, &mut unreported).unwrap();
     let [mut first, mut again] = [Chain::new(TEAM.handles()), Chain::new(TEAM.handles())];
     table.solve(123.4, &mut first).unwrap();
     assert_eq!(table.solve(440.0, &mut again), Err(NoFollower));
@@ -79,9 +92,10 @@ fn a_tail_of_its_own_length_is_as_exact_in_every_format() {
         let team = Team { ends: Ends { tail_length: Some(tail_length), ..Ends::NONE }, ..TEAM };
         for path in paths() {
             let newton = Newton::new(path.clone(), team, 1.0, Velocities::Computed);
-            let exact = FollowerTable::new(&path, team, 1.0, Velocities::Computed).unwrap();
+            let exact = FollowerTable::new(&path, team, 1.0, Velocities::Computed, &mut unreported).unwrap();
             let allowed = Allowed { place: 1e-4, heading: 1e-4, speed: 1e-3 };
-            let packed = FollowerTable::formats().into_iter().find_map(|format| exact.packed(format, allowed)).unwrap();
+            let packed =
+                FollowerTable::formats().into_iter().find_map(|format| packed(&exact, format, allowed)).unwrap();
             for (mut table, most) in [(exact.for_frames(), 1e-13), (packed.for_frames(), 1e-3)] {
                 let (mut found, mut wanted) = (Chain::new(team.handles()), Chain::new(team.handles()));
                 for time in (0..=200).map(f64::from) {
@@ -104,9 +118,9 @@ fn a_coarser_table_and_its_packed_formats_are_as_exact_as_requested() {
     let allowed = Allowed { place: accuracy, heading: accuracy, speed: 10.0 * accuracy };
     for path in paths() {
         let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
-        let table = FollowerTable::with_tolerance(&path, TEAM, 1.0, Velocities::Computed, tolerance).unwrap();
+        let table = with_tolerance(&path, TEAM, tolerance);
         assert_eq!(table.relative_cost(), 1.0);
-        let packed = FollowerTable::formats().into_iter().map(|format| table.packed(format, allowed).unwrap());
+        let packed = FollowerTable::formats().into_iter().map(|format| packed(&table, format, allowed).unwrap());
         let mut cost = 0.0;
         for packed in packed.chain([table.clone()]) {
             assert!(packed.bytes_per_handle() > cost, "the cheapest first");
@@ -133,9 +147,9 @@ fn a_coarser_table_and_its_packed_formats_are_as_exact_as_requested() {
 
 #[test]
 fn what_cannot_be_packed_is_refused() {
-    let table = FollowerTable::new(&paths()[0], TEAM, 1.0, Velocities::Computed).unwrap();
+    let table = FollowerTable::new(&paths()[0], TEAM, 1.0, Velocities::Computed, &mut unreported).unwrap();
     let allowed = Allowed { place: 1e-9, heading: 1e-9, speed: 1e-7 };
-    assert!(FollowerTable::formats().into_iter().all(|format| table.packed(format, allowed).is_none()));
+    assert!(FollowerTable::formats().into_iter().all(|format| packed(&table, format, allowed).is_none()));
 }
 
 /// A case so small that miri runs it too (`tests/run`), on each instruction set. The calls of code that needs an
@@ -146,9 +160,9 @@ fn a_small_table_is_read_as_exactly() {
     let team = Team { benches: 2, ..TEAM };
     let newton = Newton::new(path.clone(), team, 1.0, Velocities::Computed);
     let tolerance = Tolerance { place: 1e-3, relative: f64::INFINITY, speed: 1e-2 };
-    let table = FollowerTable::with_tolerance(&path, team, 1.0, Velocities::Computed, tolerance).unwrap();
+    let table = with_tolerance(&path, team, tolerance);
     let allowed = Allowed { place: 1e-2, heading: 1e-2, speed: 1e-1 };
-    let packed = FollowerTable::formats().into_iter().filter_map(|format| table.packed(format, allowed));
+    let packed = FollowerTable::formats().into_iter().filter_map(|format| packed(&table, format, allowed));
     let tables: Vec<FollowerTable> = packed.chain([table.clone()]).collect();
     for instructions in Instructions::available() {
         for (table, velocities) in tables.iter().zip([Velocities::Computed, Velocities::Omitted].into_iter().cycle()) {
@@ -169,7 +183,7 @@ fn a_route_of_thousands_of_bends_has_a_table_for_its_beginning() {
     let bends = |route: Route, _| route.arc(Side::Left, 6.0, 0.11).arc(Side::Right, 5.0, 0.13);
     let path = (0..2048).fold(Path::route(0.0), bends).build().unwrap();
     let newton = Newton::new(path.clone(), TEAM, 1.0, Velocities::Computed);
-    let mut table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed).unwrap();
+    let mut table = FollowerTable::new(&path, TEAM, 1.0, Velocities::Computed, &mut unreported).unwrap();
     let end = table.valid_until();
     assert!(end > 200.0 && end < 0.9 * path.length() && table.memory_bytes() < 200 << 20, "{end}");
     let (mut found, mut wanted) = (Chain::new(TEAM.handles()), Chain::new(TEAM.handles()));
@@ -184,4 +198,29 @@ fn a_route_of_thousands_of_bends_has_a_table_for_its_beginning() {
         );
     }
     assert_eq!(table.fallbacks(), 0);
+}
+
+#[test]
+fn a_large_table_that_is_given_up_is_none_and_asks_often() {
+    let path = Path::spiral(0.55, 16.0);
+    let made = |benches: usize, most: usize| {
+        let mut calls = 0;
+        let mut ask = |_| {
+            calls += 1;
+            if calls > most { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let team = Team { benches, ..TEAM };
+        let table = FollowerTable::new(&path, team, 1.0, Velocities::Computed, &mut ask);
+        (table, calls)
+    };
+    let ([small, large], [(one, few), (other, many)]) = ([2_000, 20_000], [2_000, 20_000].map(|n| made(n, usize::MAX)));
+    assert!(one.is_some() && other.is_some());
+    // A call for every 2,000 links, of which each row has more than 20: less than a millisecond.
+    assert!(few > small / 100 && many > large / 100, "{few} and {many} calls");
+    assert_eq!(made(large, 0).1, 1, "one answer ends it");
+    for share in [0.0, 0.2, 0.5, 0.8] {
+        let most = (share * many as f64) as usize;
+        let (table, calls) = made(large, most);
+        assert!(table.is_none() && calls == most + 1, "{calls} of {many}, stopped after {most}");
+    }
 }
