@@ -204,8 +204,8 @@ fn a_solver_is_made_whole_or_not_at_all() {
         };
         let (whole, calls) = made(u32::MAX);
         assert!(calls > 50, "{name}: {calls} calls");
-        for share in [0.0, 0.02, 0.2, 0.5, 0.8] {
-            let most = (share * f64::from(calls)) as u32;
+        // Not shares of the calls: a thread that waits for another one asks, too.
+        for most in [0, 1, 5, 20] {
             let (part, asked) = made(most);
             assert!(part.is_none() && asked <= most + 2, "{name}: {asked} of {calls} calls, stopped after {most}");
         }

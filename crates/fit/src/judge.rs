@@ -75,10 +75,11 @@ impl Judgement {
 
 impl Rules {
     /// Creates the rules of a search that begins with a scene. A boundary outside which a board stands at the start does
-    /// not count: a shortfall that hardly depends on the numbers would hide all other distances.
-    pub fn new(scene: &Scene, clearance: f64) -> Self {
+    /// not count: a shortfall that hardly depends on the numbers would hide all other distances. It counts if `progress`
+    /// stops the search for the start.
+    pub fn new(scene: &Scene, clearance: f64, progress: Progress<'_>) -> Self {
         let rules = Self { clearance, with_boundary: true };
-        let with_boundary = Sampler::new(scene, rules).is_none_or(|mut sampler| sampler.is_inside_at_start());
+        let with_boundary = Sampler::new(scene, rules).is_none_or(|mut sampler| sampler.is_inside_at_start(progress));
         Self { with_boundary, ..rules }
     }
 
@@ -178,8 +179,9 @@ impl Sampler {
         (0..self.ensemble.dragons().len()).flat_map(of).collect()
     }
 
-    fn is_inside_at_start(&mut self) -> bool {
-        let mut solver = self.ensemble.solver(Velocities::Omitted);
+    fn is_inside_at_start(&mut self, progress: Progress<'_>) -> bool {
+        let solver = self.ensemble.solver_unless_stopped(Velocities::Omitted, progress);
+        let Some(mut solver) = solver else { return true };
         let solved = solver.solve(0.0, &mut self.chain).is_ok();
         let boards = self.boards();
         let boundary =
@@ -192,10 +194,7 @@ impl Sampler {
         let fastest = self.ensemble.dragons().iter().map(|dragon| dragon.motion.head_speed()).fold(0.0, f64::max);
         let samples = (end * fastest / STEP).clamp(1.0, MOST_SAMPLES).ceil();
         let mut ask = |_| if is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        if !self.ensemble.dragons().iter().all(|dragon| dragon.motion.search_branches(&mut ask)) {
-            return None;
-        }
-        let mut solver = self.ensemble.solver(Velocities::Omitted);
+        let mut solver = self.ensemble.solver_unless_stopped(Velocities::Omitted, &mut ask)?;
         let mut parts: Vec<Part> = Vec::new();
         for sample in 0..=samples as usize {
             let time = end * sample as f64 / samples;
@@ -281,7 +280,7 @@ mod tests {
     fn samples_bound_every_exact_margin_from_above() {
         for text in [include_str!("../../../config/village.toml"), include_str!("../../../config/square.toml")] {
             let scene = Scene::parse(text, "scene.toml", "scene").unwrap();
-            let rules = Rules::new(&scene, 0.2);
+            let rules = Rules::new(&scene, 0.2, &mut unreported);
             let (exact, sampled) =
                 (rules.exact(&scene, &mut unreported), rules.sampled(&scene, f64::NEG_INFINITY, &mut || false));
             let (exact, sampled) = (exact.unwrap(), sampled.unwrap());

@@ -100,7 +100,7 @@ pub fn fit(
     let scene = text.parse().map_err(FitError::Refused)?;
     let of_text = Values::of(&text.text);
     let fields = vary.iter().map(|vary| field(&of_text, vary)).collect::<Result<Vec<_>, _>>()?;
-    let rules = Rules::new(&scene, clearance);
+    let rules = Rules::new(&scene, clearance, &mut |_| progress(0.0, f64::NEG_INFINITY));
     let dimensions = fields.len();
     let scattered = SCATTERED + SCATTERED_MORE * dimensions;
     let per_step = 2;
@@ -222,7 +222,7 @@ impl Search<'_, '_> {
         (0..scattered).any(|_| {
             let place: Vec<f64> = self.fields.iter().map(|_| random.f64()).collect();
             let scene = self.scene(&self.values(&place));
-            scene.is_some_and(|scene| Rules::new(&scene, self.rules.clearance).with_boundary)
+            scene.is_some_and(|scene| Rules::new(&scene, self.rules.clearance, &mut |_| self.told(0.0)).with_boundary)
         })
     }
 
