@@ -156,7 +156,8 @@ impl BandBuilder<'_> {
             |budget| refine(made, first, first_chains, budget),
             |budget| refine(&mut later, second, second_chains, budget),
         );
-        (first?, second?);
+        first?;
+        second?;
         made.append(later);
         self.is_small_enough(made, piece.end)
     }
