@@ -6,10 +6,10 @@
     .venv/bin/python benches/fit.py known           # the margins of the numbers that each village was designed with
     .venv/bin/python benches/fit.py write DIRECTORY # the scenes with their bad starts, and a list of them
 
-Every village was designed with numbers that keep everything that is required. They were then changed by decimetres, so
-that boards overlap, come into keep-outs or lock. The search knows neither the numbers of the design nor that they exist:
-it is given ranges as an organiser would give them. `check` judges the answer. In two villages four numbers have to be
-right at once within few decimetres: the courtyard, and the coil between two trees. Uses the release build alone.
+Every village was designed with numbers that keep everything that is required. They were then changed, so that boards
+overlap, come into keep-outs or lock. The search knows neither the numbers of the design nor that they exist: it is
+given ranges as an organiser would give them. `check` judges the answer. In two villages four numbers have to be right
+at once within few decimetres: the courtyard, and the coil between two trees. Uses the release build alone.
 """
 
 import json

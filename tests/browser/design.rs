@@ -1,5 +1,5 @@
-//! The page of `design` in a real browser: `tests/python/design_page.py`, and `design_files.py` about files. No test
-//! asserts a speed.
+//! The page of `design` in a real browser: `tests/python/design_page.py`, and `design_files.py` beside files and
+//! commands. No test asserts a speed.
 
 use crate::run_scenario;
 
@@ -50,6 +50,11 @@ fn gestures() {
 #[test]
 fn saving() {
     played("design_files.py", "saving");
+}
+
+#[test]
+fn numbers_that_fit() {
+    played("design_files.py", "numbers_that_fit");
 }
 
 #[test]

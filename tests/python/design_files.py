@@ -1,4 +1,4 @@
-"""The files of the page of designs in Debian's Chromium: saving, the token beyond loopback, hand-outs.
+"""The page of designs beside commands and files in Debian's Chromium: saving, the token, numbers that fit, hand-outs.
 
     design_files.py SCENARIO PROGRAM NAME FOLDER
 
@@ -105,6 +105,31 @@ def token():
         child.wait()
 
 
+def numbers_that_fit():
+    """*Fit* gives the marked numbers alone the values that `plan fit` finds."""
+    text = (CONFIG / "turnaround.toml").read_text(encoding="utf-8").replace("benches = 223", "benches = 20")
+    scene, answer = FOLDER / "fit.toml", FOLDER / "fitted.toml"
+    scene.write_text(f"{text}\n[require]\nclearance = 0.5\n", encoding="utf-8")
+    with chromium() as browser, server(scene) as (url, _):
+        page = opened(browser, url)
+        assert page.is_disabled("#plan-fit"), "no number is marked"
+        for name in ["path.pitch", "path.turn_radius", "path.arc_ratio"]:
+            page.check(f'[data-vary="{name}"]')
+        page.uncheck('[data-vary="path.arc_ratio"]')
+        # The marks stay where the fields are built again.
+        page.select_option("#add", "cue")
+        exact(page)
+        scene.write_text(text_of(page), encoding="utf-8")
+        page.click("#plan-fit")
+        until(lambda: page.is_visible("#plan-use"), "numbers that fit")
+        page.click("#plan-use")
+        exact(page)
+        vary = ["--vary", "path.pitch", "--vary", "path.turn_radius"]
+        subprocess.run([PROGRAM, "plan", "fit", scene, *vary, "-o", answer], check=True, stdout=subprocess.DEVNULL)
+        assert text_of(page) == answer.read_text(encoding="utf-8")
+        no_complaints(page)
+
+
 def hand_outs():
     """The button downloads what `sheets` writes of the text as it stands."""
     with chromium() as browser, server(CONFIG / "procession.toml") as (url, _):
@@ -129,4 +154,4 @@ def hand_outs():
 
 signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"{SCENARIO} did not end within {WATCHDOG} s"))
 signal.alarm(WATCHDOG)
-{scenario.__name__: scenario for scenario in [saving, token, hand_outs]}[SCENARIO]()
+{scenario.__name__: scenario for scenario in [saving, token, numbers_that_fit, hand_outs]}[SCENARIO]()

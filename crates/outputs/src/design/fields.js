@@ -74,11 +74,11 @@ function rounded(value, [low, high]) {
 
 export class Fields {
   /**
-   * `acts` has set(name, value, gesture), remove(item), show(line) and focus(field). A gesture has a key of its own,
-   * which a slider keeps while it is dragged.
+   * `acts` has set(name, value, gesture), remove(item), show(line), focus(field) and vary(names of the marked numbers).
+   * A gesture has a key of its own, which a slider keeps while it is dragged.
    */
   constructor(root, acts) {
-    Object.assign(this, { root, acts, key: null, rows: new Map(), gestures: 0 });
+    Object.assign(this, { root, acts, key: null, rows: new Map(), marked: new Set(), gestures: 0 });
   }
 
   /** Shows the fields of a scene. The field that has the focus keeps what the user types. */
@@ -112,6 +112,8 @@ export class Fields {
       return details;
     });
     this.root.replaceChildren(...built);
+    this.marked = new Set([...this.marked].filter((name) => this.root.querySelector(`[data-vary="${CSS.escape(name)}"]`)));
+    this.acts.vary([...this.marked]);
     if (focus) this.root.querySelector(`[data-field="${CSS.escape(focus)}"]`)?.focus();
   }
 
@@ -135,10 +137,22 @@ export class Fields {
       "aria-label": `${full}, slider`, tabindex: "-1" } }) : null;
     const row = { field, input, slider, node: made("label", { className: "field" },
         made("span", { textContent: label, title: name }), ...(slider ? [slider] : []), input,
-        made("i", { textContent: unitOf(unit) })) };
+        made("i", { textContent: unitOf(unit) }), ...(field.slider && !field.integer ? [this.mark(name, full)] : [])) };
     this.rows.set(name, row);
     this.listen(row);
     return row.node;
+  }
+
+  /** Returns the mark of a number that *Fit* may change. */
+  mark(name, full) {
+    const mark = made("input", { type: "checkbox", checked: this.marked.has(name), title: "Fit may change this number",
+      attributes: { "data-vary": name, "aria-label": `${full}: Fit may change it` } });
+    mark.onchange = () => {
+      if (mark.checked) this.marked.add(name);
+      else this.marked.delete(name);
+      this.acts.vary([...this.marked]);
+    };
+    return mark;
   }
 
   listen(row) {

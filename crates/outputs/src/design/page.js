@@ -80,10 +80,8 @@ const fields = new Fields(element("fields"), {
   set: (name, value, gesture) => change({ set: { [name]: value } }, gesture, name),
   remove: (item) => change({ remove: item }, null),
   show: (number) => text.show(number),
-  focus: ({ name, line: number, value, integer }) => {
-    text.show(number);
-    if (typeof value === "number" && !integer) plans.vary(name);
-  },
+  focus: ({ line: number }) => text.show(number),
+  vary: (names) => plans.vary(names),
 });
 const handles = new Handles(element("handles"), { camera, canvas,
   drag: (handle, to, how, gesture) => change({ drag: { handle: handle.name, to, ...how } }, gesture, handle.name),

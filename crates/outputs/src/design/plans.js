@@ -6,7 +6,7 @@ const element = (id) => document.getElementById(id);
 export class Plans {
   /** `session` sends requests; `use` is called with the text of a result, `keep` with a file. */
   constructor(session, use, keep) {
-    Object.assign(this, { session, use, keep, running: null, text: null, varied: null });
+    Object.assign(this, { session, use, keep, running: null, text: null, varied: [] });
     for (const button of document.querySelectorAll("[data-plan], [data-action=sheets]")) button.onclick = () => this.start(button);
     element("plan-stop").onclick = () => this.stop();
     element("plan-use").onclick = () => {
@@ -16,7 +16,7 @@ export class Plans {
     };
     element("plan-discard").onclick = () => this.clear();
     this.clear();
-    this.vary(null);
+    this.vary([]);
   }
 
   start(button) {
@@ -25,17 +25,17 @@ export class Plans {
     this.clear();
     // Hand-outs have a list of their forms.
     const plan = button.dataset.plan ?? element("sheets-form").value;
-    this.running = this.id = this.session.send(plan === "fit" ? { plan, vary: [this.varied] } : { plan });
+    this.running = this.id = this.session.send(plan === "fit" ? { plan, vary: this.varied } : { plan });
     this.put(`${button.textContent} …`, { isRunning: true });
     element("plan-progress").removeAttribute("value");
   }
 
-  /** Names the field that a fit changes: the one that was used last. */
-  vary(name) {
-    this.varied = name;
+  /** Names the fields that a fit changes: those that are marked. */
+  vary(names) {
+    this.varied = names;
     const fit = element("plan-fit");
-    fit.disabled = name === null;
-    fit.textContent = name === null ? "Fit" : `Fit ${name}`;
+    fit.disabled = names.length === 0;
+    fit.textContent = names.length > 1 ? `Fit ${names.length} numbers` : `Fit ${names[0] ?? ""}`.trim();
   }
 
   stop() {
