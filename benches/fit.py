@@ -1,7 +1,7 @@
 """Villages for `plan fit`: ten scenes from a bad start, how many it solves, and how long it takes.
 
     cargo build --release
-    .venv/bin/python benches/fit.py                 # the table of docs/paths-and-plans.md
+    .venv/bin/python benches/fit.py                 # the figures of docs/paths-and-plans.md
     .venv/bin/python benches/fit.py 2               # with another seed
     .venv/bin/python benches/fit.py known           # the margins of the numbers that each village was designed with
     .venv/bin/python benches/fit.py write DIRECTORY # the scenes with their bad starts, and a list of them
@@ -212,11 +212,13 @@ def fitted(name, seed, directory):
     """Returns the margins of the start and of the answer, and the processor time of the search, s."""
     start, answer = (pathlib.Path(directory) / f"{kind}.toml" for kind in ("start", "answer"))
     start.write_text(filled(name, 2))
+    # A search that finds nothing writes nothing.
+    answer.unlink(missing_ok=True)
     begin = processor()
     subprocess.run([PROGRAM, "plan", "fit", start, "--json", "--seed", seed, "-o", answer]
                    + [word for one in ranges(name) for word in ("--vary", one)], stdout=subprocess.DEVNULL)
     seconds = processor() - begin
-    return margin(start), margin(answer), seconds
+    return margin(start), margin(answer) if answer.exists() else float("-inf"), seconds
 
 
 def table(seed="1"):

@@ -108,7 +108,7 @@ fn a_check_that_is_interrupted_while_it_makes_a_table_ends_without_one() {
         let (code, told, shown) = interrupted_at("making the table", &["check".as_ref(), scene.as_os_str()]);
         assert_eq!(code, Some(1), "{told}{shown}");
         assert!(shown.contains("stopped by a signal before the end: the results are not complete"), "{shown}");
-        told.contains("Solver: not known, because making its table was stopped.")
+        told.contains("Solver: not known, because the command was stopped.")
     });
     assert!(is_given_up);
 }

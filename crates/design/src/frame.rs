@@ -62,24 +62,28 @@ impl Frames {
         self.knowledge == Knowledge::All
     }
 
-    /// Returns true if the search for the branches of the followers has taken too long for the first frame. The search
-    /// of another thread finds them, too, and frames do not search again.
+    /// Returns true if the first frame waits for the branches of the followers, whose search has taken too long for it.
     pub fn waits(&self) -> bool {
         self.waits
     }
 
     /// Returns the frame at a time, or at the end of the motion before that, for the request of a number; `None`
-    /// without a solution, and if it [`waits`](Self::waits).
-    pub fn at(&mut self, time: f64, id: u64) -> Option<(FrameHeader, Vec<HandlePose>)> {
+    /// without a solution, and if it [`waits`](Self::waits). `is_searched` is true if another thread searches the scene,
+    /// and finds the branches of the followers, too.
+    pub fn at(&mut self, time: f64, id: u64, is_searched: bool) -> Option<(FrameHeader, Vec<HandlePose>)> {
         let until = Instant::now() + PATIENCE;
-        let waits = self.waits;
-        let mut progress =
-            |_| if !waits && Instant::now() < until { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+        let mut progress = |_| if Instant::now() < until { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let moments = match &mut self.moments {
             Some(moments) => moments,
             None => {
+                let (waits, is_searched) = (self.waits, is_searched && self.knowledge != Knowledge::All);
+                let mut beside = |share| match (is_searched, waits) {
+                    (false, _) => ControlFlow::Continue(()),
+                    (true, true) => ControlFlow::Break(()),
+                    (true, false) => progress(share),
+                };
                 let mut dragons = self.exact.ensemble.dragons().iter();
-                self.waits = !dragons.all(|dragon| dragon.motion.search_branches(&mut progress));
+                self.waits = !dragons.all(|dragon| dragon.motion.search_branches(&mut beside));
                 if self.waits {
                     return None;
                 }
@@ -128,8 +132,19 @@ mod tests {
     fn a_frame_that_waits_is_there_once_another_search_has_found_the_branches() {
         let scene = Scene::parse(include_str!("../../../config/turnaround.toml"), "test", "test").unwrap();
         let mut frames = Frames { waits: true, ..Frames::new(&scene, 1, None) };
-        assert!(frames.at(0.0, 1).is_none() && frames.waits());
+        assert!(frames.at(0.0, 1, true).is_none() && frames.waits());
         scene.ensemble.timeline_without_contact(&mut unreported);
-        assert!(frames.at(0.0, 2).is_some() && !frames.waits());
+        assert!(frames.at(0.0, 2, true).is_some() && !frames.waits());
+    }
+
+    #[test]
+    fn a_frame_that_waits_searches_where_no_search_is_beside() {
+        // Each has motions of its own, whose branches are not known.
+        let scene = || Scene::parse(include_str!("../../../config/turnaround.toml"), "test", "test").unwrap();
+        let mut of_refused = Frames { waits: true, ..Frames::new(&scene(), 1, None) };
+        assert!(of_refused.at(0.0, 1, false).is_some() && !of_refused.waits());
+        let timeline = scene().ensemble.timeline_without_contact(&mut unreported);
+        let mut of_ended = Frames { waits: true, ..Frames::new(&scene(), 1, Some(timeline)) };
+        assert!(of_ended.at(0.0, 1, true).is_some() && !of_ended.waits());
     }
 }

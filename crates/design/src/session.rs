@@ -276,7 +276,7 @@ impl Desk {
             self.frames = Some(Frames::new(&scene.scene, self.run, Some(timeline)));
         }
         let frames = self.frames.get_or_insert_with(|| Frames::new(&scene.scene, self.run, None));
-        match frames.at(self.at, id) {
+        match frames.at(self.at, id, !self.is_refused) {
             Some((header, poses)) => (self.answers)(Answer::Frame(header, poses)),
             None if frames.waits() => self.drawn_later = Some(id),
             None => {}

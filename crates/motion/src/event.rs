@@ -109,8 +109,8 @@ impl<'a> Budget<'a> {
         }
     }
 
-    /// Does both parts of a work at once, the second on a thread of its own. If the search is stopped, the budgets of
-    /// both parts are empty.
+    /// Does both parts of a work at once, the second on a thread of its own, whose work does not count. If the search is
+    /// stopped, the budgets of both parts are empty.
     pub(crate) fn both<A, B: Send>(
         &mut self,
         first: impl FnOnce(&mut Self) -> A,

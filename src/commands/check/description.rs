@@ -56,7 +56,7 @@ fn solvers(scene: &Scene, common: &Common, output: &mut Output) -> Result<(), Co
         let bar = table_bar(common);
         let made = dragon.motion.solver_unless_stopped(scene.velocities, &mut |share| report(&bar, share));
         bar.finish_and_clear();
-        let reason = made.map_or_else(|| "not known, because making its table was stopped".to_owned(), |of| of.reason);
+        let reason = made.map_or_else(|| "not known, because the command was stopped".to_owned(), |of| of.reason);
         output.line(&format!("  {}: {reason}.", dragon.titled("Solver")))?;
     }
     output.line(match scene.velocities {

@@ -8,6 +8,8 @@ const UNITS = { metres: "m", "metres per second": "m/s", seconds: "s", turns: "t
 /** The part of a field's name that names a thing among several. */
 const ITEM = /^(?:dragons\[\d+\]\.)?(?:path\.pieces|stage\.obstacles|cues)\[\d+\]|^dragons\[\d+\]/;
 const NOUNS = { pieces: "Piece", obstacles: "Obstacle", cues: "Cue", dragons: "Dragon" };
+/** The groups whose numbers *Fit* may change. */
+const FITTED = ["path", "placement", "team"];
 /** The number of fields of a group above which it is closed at first. */
 const MANY = 80;
 
@@ -86,6 +88,10 @@ export class Fields {
     const fields = fieldsOf(scene);
     const key = JSON.stringify([fields.map(({ name }) => name), scene.pieces, scene.obstacles, scene.dragons,
       scene.cues?.map(({ name }) => name)]);
+    const items = JSON.stringify([scene.pieces, scene.obstacles, scene.dragons]);
+    // A name with a number may be that of another piece now.
+    if (items !== this.items) this.marked.clear();
+    this.items = items;
     if (key !== this.key) this.build(fields, scene);
     this.key = key;
     for (const field of fields) this.update(field);
@@ -137,7 +143,7 @@ export class Fields {
       "aria-label": `${full}, slider`, tabindex: "-1" } }) : null;
     const row = { field, input, slider, node: made("label", { className: "field" },
         made("span", { textContent: label, title: name }), ...(slider ? [slider] : []), input,
-        made("i", { textContent: unitOf(unit) }), ...(field.slider && !field.integer ? [this.mark(name, full)] : [])) };
+        made("i", { textContent: unitOf(unit) }), ...(field.slider && !field.integer && FITTED.includes(groupOf(name)) ? [this.mark(name, full)] : [])) };
     this.rows.set(name, row);
     this.listen(row);
     return row.node;
