@@ -180,7 +180,10 @@ impl Screen<'_> {
                 };
                 write_json(&mut output, &line)?;
             }
-            Display::Lines => folded(&self.lines(report)).iter().try_for_each(|line| writeln!(output, "{line}"))?,
+            Display::Lines => {
+                let mut lines = folded(&self.lines(report)).into_iter();
+                lines.try_for_each(|line| writeln!(output, "{}", folded::folded(&line, COLUMNS)))?;
+            }
             Display::Terminal => {
                 self.clear_previous(&mut output)?;
                 self.drawn = self.lines(report);

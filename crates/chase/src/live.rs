@@ -24,8 +24,8 @@ use crate::track::{Following, Track};
 
 /// The interval of the status.
 const STATUS_INTERVAL: Duration = Duration::from_millis(200);
-/// The time limit of the answer to the last command of a chase that ends.
-const LAST_COMMAND: Duration = Duration::from_millis(500);
+/// The time limit of the answer to the last command of a chase that ends: a show on a busy machine may take a second.
+const LAST_COMMAND: Duration = Duration::from_secs(3);
 
 /// The source of a chase.
 #[expect(clippy::large_enum_variant, reason = "there is one for each process")]
