@@ -86,6 +86,8 @@ fn a_boundary_without_the_street_is_kept_neither_by_the_fit_nor_by_the_check() {
         assert_eq!(found.status.code(), Some(i32::from(!is_kept)), "{printed}");
         assert_eq!(checked.status.code(), Some(i32::from(!is_kept)), "{verdict}");
         assert_eq!(line["status"], if is_kept { "found" } else { "not_found" });
+        let of_rest = line["without_boundary"].as_f64();
+        assert!(if is_kept { of_rest.is_none() } else { (of_rest.unwrap() - 1.55).abs() < 1e-3 }, "{line}");
         assert_eq!(printed.contains("has left out the boundary"), !is_kept, "{printed}");
         if !is_kept {
             // By hand: 3 m, both links, and the part of the board behind its hole.

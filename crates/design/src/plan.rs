@@ -21,6 +21,7 @@ use bench_dragon_certify::plan::{
     self, PitchLine, Spaced, SpeedLine, Stage, TurnLine, greatest_speed, least_pitch, least_turn,
 };
 use bench_dragon_certify::{CertifiedEvent, MOST_STEPS, Status, certify};
+use bench_dragon_fit::line::FitLine;
 use bench_dragon_fit::search::{Vary, fit};
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::event::Progress;
@@ -305,15 +306,7 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
         )
     });
     let sentence = sentence + of_rest.as_deref().unwrap_or_default();
-    let fields: BTreeMap<&str, f64> = found.fields.iter().map(|(name, value)| (name.as_str(), *value)).collect();
-    let answer = json!({
-        "plan": "fit",
-        "status": if found.is_found() { "found" } else { "not_found" },
-        "fields": fields,
-        "clearance": clearance,
-        "margin": margin,
-        "sentence": sentence,
-    });
+    let answer = json!(Told { line: FitLine::new(&found, clearance), sentence });
     let has_text = found.is_found() || found.without_boundary.is_some_and(|rest| rest >= 0.0);
     Ok(Planned::numbers(answer, has_text.then_some(found.text)))
 }

@@ -7,4 +7,5 @@
 #![deny(missing_docs)]
 
 pub mod judge;
+pub mod line;
 pub mod search;

@@ -1,14 +1,13 @@
 //! `plan fit`: numbers of the scene with which the show keeps what it must.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use bench_dragon::fit::judge::{Part, What};
+use bench_dragon::fit::line::FitLine;
 use bench_dragon::fit::search::{FitError, Fitted, Vary, fit};
 use bench_dragon::motion::ground::BOUNDARY;
 use bench_dragon::show::scene::{Scene, SceneText, printable};
-use serde::Serialize;
 
 use super::super::events::bench_name;
 use super::super::signals::{are_searches_stopped, report, unstopped};
@@ -34,18 +33,6 @@ pub struct FitArguments {
 
 /// The greatest number of fields that may change.
 const MOST_FIELDS: usize = 8;
-
-/// The line of `plan fit --json`.
-#[derive(Serialize)]
-struct FitLine<'a> {
-    plan: &'static str,
-    status: &'static str,
-    fields: BTreeMap<&'a str, f64>,
-    /// The clearance that is required of boards, in metres.
-    clearance: f64,
-    /// The least margin of all that is required, in metres.
-    margin: f64,
-}
 
 /// Returns a number that may change, from text such as `path.pitch=0.5..0.7`.
 ///
@@ -95,9 +82,7 @@ pub fn plan_fit(common: &Common, arguments: &FitArguments) -> Result<(), Command
     }
     let mut output = Output::standard();
     if common.json {
-        let status = if fitted.is_found() { "found" } else { "not_found" };
-        let fields = fitted.fields.iter().map(|(name, value)| (name.as_str(), *value)).collect();
-        output.json(&FitLine { plan: "fit", status, fields, clearance, margin: fitted.judgement.margin() })?;
+        output.json(&FitLine::new(&fitted, clearance))?;
     } else {
         print(&text, &fitted, clearance, &mut output)?;
     }
