@@ -4,7 +4,7 @@
 mod curve;
 
 use super::elementary::{atan, pi};
-use super::interval::{Interval, Vector, minus, plus, scaled};
+use super::interval::{Interval, Vector, minus, scaled};
 use super::place::{Place, Span};
 use bench_dragon_motion::model::curve::Side;
 use bench_dragon_motion::model::description::{PathDescription, RouteStep};
