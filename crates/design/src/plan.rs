@@ -299,10 +299,11 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
         }
     };
     let of_rest = found.without_boundary.map(|rest| {
+        let spare = if rest >= 0.0 { "to spare" } else { "too little" };
         format!(
-            " The team stands outside the boundary at the start; all else has {} m to spare with these numbers. Draw the \
+            " The team stands outside the boundary at the start; all else has {} m {spare} with these numbers. Draw the \
              boundary round the street in which the team waits.",
-            figure(rest)
+            figure(rest.abs())
         )
     });
     let sentence = sentence + of_rest.as_deref().unwrap_or_default();

@@ -86,9 +86,8 @@ export class Fields {
   /** Shows the fields of a scene. The field that has the focus keeps what the user types. */
   show(scene) {
     const fields = fieldsOf(scene);
-    const key = JSON.stringify([fields.map(({ name }) => name), scene.pieces, scene.obstacles, scene.dragons,
-      scene.cues?.map(({ name }) => name)]);
     const items = JSON.stringify([scene.pieces, scene.obstacles, scene.dragons]);
+    const key = JSON.stringify([fields.map(({ name }) => name), items, scene.cues?.map(({ name }) => name)]);
     // A name with a number may be that of another piece now.
     if (items !== this.items) this.marked.clear();
     this.items = items;
@@ -141,9 +140,10 @@ export class Fields {
     if (value === null) input.placeholder = "none";
     const slider = isNumber ? made("input", { type: "range", attributes: { "data-slider": name,
       "aria-label": `${full}, slider`, tabindex: "-1" } }) : null;
+    const isFitted = field.slider && !field.integer && FITTED.includes(groupOf(name));
     const row = { field, input, slider, node: made("label", { className: "field" },
         made("span", { textContent: label, title: name }), ...(slider ? [slider] : []), input,
-        made("i", { textContent: unitOf(unit) }), ...(field.slider && !field.integer && FITTED.includes(groupOf(name)) ? [this.mark(name, full)] : [])) };
+        made("i", { textContent: unitOf(unit) }), ...(isFitted ? [this.mark(name, full)] : [])) };
     this.rows.set(name, row);
     this.listen(row);
     return row.node;
