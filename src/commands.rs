@@ -65,7 +65,7 @@ use bench_dragon::messages::state::Severity;
 use bench_dragon::motion::solve::{Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::results::figure;
-use bench_dragon::show::scene::{Scene, SceneError, SceneText};
+use bench_dragon::show::scene::{RangeError, Scene, SceneError, SceneText};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -160,6 +160,12 @@ pub enum CommandError {
 
 impl From<SceneError> for CommandError {
     fn from(error: SceneError) -> Self {
+        Self::BadInput(error.to_string())
+    }
+}
+
+impl From<RangeError> for CommandError {
+    fn from(error: RangeError) -> Self {
         Self::BadInput(error.to_string())
     }
 }

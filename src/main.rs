@@ -120,8 +120,8 @@ fn main() -> ExitCode {
             None => error.format(&mut definition).exit(),
         },
     };
-    if let Err(sentence) = scene_argument::resolve(&mut common.scene, &definition, &matches) {
-        return exit_code(Err(CommandError::BadInput(sentence)));
+    if let Err(error) = scene_argument::resolve(&mut common.scene, &definition, &matches) {
+        return exit_code(Err(error));
     }
     if matches!(command, Command::Soak(_)) && matches.value_source("names") == Some(ValueSource::DefaultValue) {
         common.names = vec![commands::soak::NAME.to_owned()];

@@ -22,7 +22,7 @@ use bench_dragon::client::polling::poll_until;
 use bench_dragon::messages::ChaseStatus;
 use bench_dragon::messages::chase::{ChaseSource, ChaseState};
 use bench_dragon::messages::json::ChaseObject;
-use bench_dragon::messages::sentence::chase_sentence;
+use bench_dragon::messages::sentence::{Expected, chase_sentence};
 use bench_dragon::motion::Motion;
 use bench_dragon::outputs::send::axes::Axes;
 use bench_dragon::proof::scene_hash;
@@ -147,17 +147,17 @@ fn usual_group() -> SocketAddrV4 {
     SocketAddrV4::new(USUAL_GROUP.0, USUAL_GROUP.1)
 }
 
-fn group(text: &str) -> Result<SocketAddrV4, String> {
+fn group(text: &str) -> Result<SocketAddrV4, Expected> {
     let address = text.parse().or_else(|_| text.parse().map(|address| SocketAddrV4::new(address, USUAL_GROUP.1)));
-    address.map_err(|_| "expected an IPv4 address such as 236.10.10.10 or 127.0.0.1:56565".to_owned())
+    address.map_err(|_| Expected("an IPv4 address such as 236.10.10.10 or 127.0.0.1:56565".into()))
 }
 
-fn speed(text: &str) -> Result<f64, String> {
+fn speed(text: &str) -> Result<f64, Expected> {
     let speed = text.trim().parse::<f64>().ok().filter(|speed| (1e-3..=1e3).contains(speed));
-    speed.ok_or_else(|| "expected simulated seconds a second of timecode, from 0.001 to 1000".to_owned())
+    speed.ok_or(Expected("simulated seconds a second of timecode, from 0.001 to 1000".into()))
 }
 
-fn fps(text: &str) -> Result<Fps, String> {
+fn fps(text: &str) -> Result<Fps, Expected> {
     if text == "auto" { Ok(Fps(None)) } else { text.parse().map(|rate| Fps(Some(rate))) }
 }
 

@@ -8,6 +8,7 @@ use bench_dragon::client::control::command_client::Action as StateAction;
 use bench_dragon::client::control::{ControlError, Controller, refusal, standing};
 use bench_dragon::messages::ControlResponse;
 use bench_dragon::messages::control::{Code, Command, MOST_PERIODS, RATES};
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::messages::state::PlaybackState;
 use serde::Serialize;
 
@@ -68,9 +69,9 @@ enum Action {
     Go,
 }
 
-fn periods(text: &str) -> Result<u64, String> {
+fn periods(text: &str) -> Result<u64, Expected> {
     let periods = text.parse().ok().filter(|periods| (1..=MOST_PERIODS).contains(periods));
-    periods.ok_or_else(|| format!("expected a whole number from 1 to {MOST_PERIODS}"))
+    periods.ok_or_else(|| Expected(format!("a whole number from 1 to {MOST_PERIODS}").into()))
 }
 
 /// The line of `control --json`.

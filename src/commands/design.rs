@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bench_dragon::design::session::{self, DesignFile, Session, greeting};
-use bench_dragon::outputs::design::{Answer, Answers, DesignSession, SaveError, Studio, serve};
+use bench_dragon::outputs::design::{Answer, Answers, Busy, DesignSession, SaveError, Studio, serve};
 use bench_dragon::outputs::view::Ready;
-use bench_dragon::show::scene::SceneText;
+use bench_dragon::show::scene::{SceneError, SceneText};
 
 use super::view::{ReadyLine, own_addresses};
 use super::{CommandError, Common, NewFile, Output, stop_on_signals};
@@ -55,19 +55,15 @@ struct SavedFile {
 
 impl SavedFile {
     /// Returns the text with the line ends that a text has in a browser.
-    fn read(&self) -> Result<String, String> {
-        Ok(self.text()?.replace("\r\n", "\n"))
-    }
-
-    fn text(&self) -> Result<String, String> {
-        Ok(SceneText::load(&self.path).map_err(|error| error.to_string())?.text)
+    fn read(&self) -> Result<String, SceneError> {
+        Ok(SceneText::load(&self.path)?.text.replace("\r\n", "\n"))
     }
 
     /// Writes a text, unless the file is another one than `base`.
     fn save(&self, base: &str, text: &str) -> Result<(), SaveError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         let shown = self.path.display();
-        let file = self.text().map_err(SaveError::Failed)?;
+        let file = SceneText::load(&self.path).map_err(|error| SaveError::Failed(error.to_string()))?.text;
         let known = file.replace("\r\n", "\n");
         // The answer of an earlier save may have been lost.
         if known == text {
@@ -134,8 +130,8 @@ impl Studio for Desk {
 struct Open(Session);
 
 impl DesignSession for Open {
-    fn request(&self, json: String) -> Result<(), String> {
-        self.0.request(json).map_err(|busy| busy.to_string())
+    fn request(&self, json: String) -> Result<(), Busy> {
+        self.0.request(json).ok_or(Busy)
     }
 }
 

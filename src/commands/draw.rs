@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use bench_dragon::drawing::dragons::Dragons;
 use bench_dragon::drawing::swept::SweptArea;
 use bench_dragon::drawing::{Drawing, Extent, Framing, Length, Look, Seat, Style, Surroundings, Theme, mean_speeds};
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::motion::model::Point;
 use bench_dragon::motion::solve::{Chain, Solver, Velocities};
 use bench_dragon::motion::timeline::Timeline;
-use bench_dragon::show::scene::{Accepted, Scene};
+use bench_dragon::show::scene::{Accepted, RangeError, Scene};
 use bench_dragon::show::solve_at_or_just_before;
 use serde::Serialize;
 
@@ -331,7 +332,7 @@ impl Pattern {
 impl LookArguments {
     fn look(&self) -> Result<Look, CommandError> {
         let framing = match (self.radius, self.view) {
-            (Some(radius), _) => Framing::Radius(VIEW.check("--radius", radius).map_err(CommandError::BadInput)?),
+            (Some(radius), _) => Framing::Radius(VIEW.check("--radius", radius)?),
             (None, Some(view)) => view,
             (None, None) => Framing::Everything,
         };
@@ -341,40 +342,50 @@ impl LookArguments {
     }
 }
 
-fn style(text: &str) -> Result<Style, String> {
+fn style(text: &str) -> Result<Style, Expected> {
     match text {
         "plan" => Ok(Style::Plan),
         "lanterns" => Ok(Style::Lanterns),
         "seat" => seat("0"),
         _ => match text.strip_prefix("seat=") {
             Some(numbers) => seat(numbers),
-            None => Err("expected plan, lanterns, seat or seat=TURNS,DISTANCE,HEIGHT".to_owned()),
+            None => Err(Expected("plan, lanterns, seat or seat=TURNS,DISTANCE,HEIGHT".into())),
         },
     }
 }
 
-fn seat(text: &str) -> Result<Style, String> {
+fn seat(text: &str) -> Result<Style, Expected> {
     let numbers: Vec<f64> = text.split(',').map(|number| number.trim().parse().unwrap_or(f64::NAN)).collect();
     let within = |at: usize, (least, most): (f64, f64)| numbers.get(at).is_none_or(|one| (least..=most).contains(one));
     if numbers.len() > 3 || !within(0, (-1e6, 1e6)) || !within(1, (2.0, 5000.0)) || !within(2, (0.3, 1000.0)) {
-        let expected =
-            "expected turns, a distance from 2 to 5000 m and a height from 0.3 to 1000 m, as in seat=0.25,19,4.4";
-        return Err(expected.to_owned());
+        let expected = "turns, a distance from 2 to 5000 m and a height from 0.3 to 1000 m, as in seat=0.25,19,4.4";
+        return Err(Expected(expected.into()));
     }
     let height = numbers.get(2).copied().unwrap_or(4.4);
     Ok(Style::Seat(Seat { turns: numbers[0], distance: numbers.get(1).copied(), height }))
 }
 
-fn theme(text: &str) -> Result<Theme, String> {
+fn theme(text: &str) -> Result<Theme, Expected> {
     match text {
         "light" => Ok(Theme::Light),
         "dark" => Ok(Theme::Dark),
         "auto" => Ok(Theme::Auto),
-        _ => Err("expected light, dark or auto".to_owned()),
+        _ => Err(Expected("light, dark or auto".into())),
     }
 }
 
-fn view(text: &str) -> Result<Framing, String> {
+/// A text that names no view.
+#[derive(Debug, thiserror::Error)]
+enum FramingError {
+    #[error(transparent)]
+    Form(#[from] Expected),
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    #[error("the width is {}, expected at least {} metres there", number(*.across), number(*.least))]
+    Narrow { across: f64, least: f64 },
+}
+
+fn view(text: &str) -> Result<Framing, FramingError> {
     let numbers: Vec<f64> = text.split(',').map(|number| number.trim().parse().unwrap_or(f64::NAN)).collect();
     match numbers[..] {
         [x, y, across, ..] if numbers.len() <= 4 => {
@@ -386,23 +397,19 @@ fn view(text: &str) -> Result<Framing, String> {
             // Fewer digits would be left of the coordinates in the picture.
             let least = 1e-9 * x.abs().max(y.abs());
             if across < least {
-                return Err(format!(
-                    "the width is {}, expected at least {} metres there",
-                    number(across),
-                    number(least)
-                ));
+                return Err(FramingError::Narrow { across, least });
             }
             Ok(Framing::View(Point::new(x, y), across, high))
         }
-        _ => Err("expected a point, a width and perhaps a height in metres, as in 1.5,2,4".to_owned()),
+        _ => Err(Expected("a point, a width and perhaps a height in metres, as in 1.5,2,4".into()).into()),
     }
 }
 
-fn length(text: &str) -> Result<Length, String> {
+fn length(text: &str) -> Result<Length, Expected> {
     let parse = |digits: &str| digits.trim().parse::<f64>().ok().filter(|length| (1.0..=1e5).contains(length));
     let found = match text.strip_suffix("mm") {
         Some(digits) => parse(digits).map(Length::Millimetres),
         None => parse(text.strip_suffix("px").unwrap_or(text)).map(Length::Pixels),
     };
-    found.ok_or_else(|| "expected a length from 1 to 100000 such as 210mm, 1920px or 1920".to_owned())
+    found.ok_or(Expected("a length from 1 to 100000 such as 210mm, 1920px or 1920".into()))
 }

@@ -1,22 +1,24 @@
 //! Times on the command line, `90`, `90s`, `1:30` or `1h30m`: one notation for wall time and simulated time.
 
+use bench_dragon::messages::sentence::Expected;
+
 /// Parses a time to seconds. The range is left to the command.
 ///
 /// # Errors
-/// One sentence for other texts, for clap to print.
-pub fn seconds(text: &str) -> Result<f64, String> {
+/// The text has another form.
+pub fn seconds(text: &str) -> Result<f64, Expected> {
     let text = text.trim();
     let parsed = text.parse().ok().or_else(|| of_clock(text)).or_else(|| in_units(text));
-    parsed.ok_or_else(|| "expected seconds, or a time such as 90s, 1:30, 5m or 1h30m".to_owned())
+    parsed.ok_or(Expected("seconds, or a time such as 90s, 1:30, 5m or 1h30m".into()))
 }
 
 /// Parses a wall time to seconds, above 0.
 ///
 /// # Errors
-/// One sentence for other texts, for clap to print.
-pub fn wall_seconds(text: &str) -> Result<f64, String> {
+/// The text has another form.
+pub fn wall_seconds(text: &str) -> Result<f64, Expected> {
     let seconds = seconds(text).ok().filter(|seconds| *seconds > 0.0 && *seconds <= 1e9);
-    seconds.ok_or_else(|| "expected a time above 0 such as 60, 90s, 1:30, 5m or 1h30m".to_owned())
+    seconds.ok_or(Expected("a time above 0 such as 60, 90s, 1:30, 5m or 1h30m".into()))
 }
 
 /// Parses `minutes:seconds` or `hours:minutes:seconds`.

@@ -78,7 +78,7 @@ impl Spacing {
     /// Returns the clearance that is required of a scene, in metres.
     fn required(&self, scene: &Scene) -> Result<f64, CommandError> {
         if let Some(metres) = self.clearance {
-            Accepted::KEEP_OUT.check("--clearance", metres).map_err(CommandError::BadInput)?;
+            Accepted::KEEP_OUT.check("--clearance", metres)?;
         }
         let of_scene = scene.require.and_then(|require| require.clearance);
         // No sentence has a sign of 0.
@@ -115,7 +115,7 @@ pub fn plan(common: &Common, arguments: &PlanArguments) -> Result<(), CommandErr
 }
 
 fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Path>) -> Result<(), CommandError> {
-    Accepted::LENGTH.check("--reach-radius", radius).map_err(CommandError::BadInput)?;
+    Accepted::LENGTH.check("--reach-radius", radius)?;
     let text = common.scene_text()?;
     let (scene, motion) = text.parse_only()?;
     warn_of_route(&scene, "its route", "the boards of its team on an inward spiral");
@@ -179,7 +179,7 @@ fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Pat
 }
 
 fn plan_speed(common: &Common, limit: f64, file: Option<&Path>) -> Result<(), CommandError> {
-    Accepted::SPEED.check("--max-handle-speed", limit).map_err(CommandError::BadInput)?;
+    Accepted::SPEED.check("--max-handle-speed", limit)?;
     let text = common.scene_text()?;
     let (scene, _) = text.parse_only()?;
     expect_exact_motion(&scene)?;

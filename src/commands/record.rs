@@ -11,7 +11,7 @@ use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedEvent, FeedOptions};
 use bench_dragon::client::polling::Obstacle;
 use bench_dragon::client::shows;
-use bench_dragon::messages::sentence::rounded;
+use bench_dragon::messages::sentence::{Expected, rounded};
 use bench_dragon::recording::mcap::recorder::{
     DEFAULT_TOPICS, Recorded, RecordedCounts, Recorder, RecorderConfig, Split,
 };
@@ -286,14 +286,13 @@ fn refused(file: &Path, error: &io::Error) -> CommandError {
 }
 
 /// Parses a topic's name, for clap.
-fn topic(text: &str) -> Result<Topic, String> {
-    let names = || Topic::ALL.map(Topic::name).join(", ");
+fn topic(text: &str) -> Result<Topic, Expected> {
     let found = Topic::ALL.into_iter().find(|topic| topic.name() == text.trim());
-    found.ok_or_else(|| format!("expected topics of {}", names()))
+    found.ok_or_else(|| Expected(format!("topics of {}", Topic::ALL.map(Topic::name).join(", ")).into()))
 }
 
 /// Parses the size or time of a file, for clap.
-fn split(text: &str) -> Result<Split, String> {
+fn split(text: &str) -> Result<Split, Expected> {
     let text = text.trim();
     let units = [("KB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];
     let upper = text.to_uppercase();
@@ -305,9 +304,8 @@ fn split(text: &str) -> Result<Split, String> {
     let has_unit = text.ends_with(['s', 'm', 'h']);
     match wall_seconds(text).ok().filter(|seconds| has_unit && *seconds >= 1.0) {
         Some(seconds) => Ok(Split::Nanoseconds((seconds * 1e9) as u64)),
-        None => {
-            Err("expected a size of at least 1MB, such as 500MB or 1GB, or a time of at least 1s, such as 90s or 1h"
-                .to_owned())
-        }
+        None => Err(Expected(
+            "a size of at least 1MB, such as 500MB or 1GB, or a time of at least 1s, such as 90s or 1h".into(),
+        )),
     }
 }

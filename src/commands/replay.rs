@@ -83,9 +83,9 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
     let shown = arguments.file.display().to_string();
     let refused = |error: ReadError| CommandError::BadInput(format!("{shown}: {error}"));
     let prepared = Prepared::open(&arguments.file, options).map_err(refused)?;
-    let rate = Accepted::RATE.check("the rate of the replay", prepared.rate()).map_err(|sentence| {
-        CommandError::BadInput(format!("{shown}: {sentence}: choose another --rate or --time-scale"))
-    })?;
+    let rate = Accepted::RATE
+        .check("the rate of the replay", prepared.rate())
+        .map_err(|error| CommandError::BadInput(format!("{shown}: {error}: choose another --rate or --time-scale")))?;
     let show = Ros2Show {
         loop_rate: prepared.rate(),
         alerts: prepared.contents().topics.contains(&Topic::Alerts),
@@ -144,10 +144,9 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
 
 impl ReplayArguments {
     fn options(&self) -> Result<ReplayOptions, CommandError> {
-        let checked = |accepted: Accepted, name, value| accepted.check(name, value).map_err(CommandError::BadInput);
         let pace = match self.rate {
-            Some(rate) => Pace::Even(checked(Accepted::RATE, "--rate", rate)?),
-            None => Pace::Recorded(checked(Accepted::TIME_SCALE, "--time-scale", self.time_scale)?),
+            Some(rate) => Pace::Even(Accepted::RATE.check("--rate", rate)?),
+            None => Pace::Recorded(Accepted::TIME_SCALE.check("--time-scale", self.time_scale)?),
         };
         if let Some(start) = self.start.filter(|start| !start.is_finite()) {
             return Err(CommandError::BadInput(format!("--start is {}, expected simulated seconds", number(start))));

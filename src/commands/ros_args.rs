@@ -117,7 +117,7 @@ impl NodeArguments {
             }
             ("-p" | "--param", _) => self.parameters.add_rule(value).ok_or_else(refused)?,
             ("--params-file", _) => {
-                let bad = |sentence| CommandError::BadInput(format!("{BEGIN} --params-file: {sentence}"));
+                let bad = |error| CommandError::BadInput(format!("{BEGIN} --params-file: {error}"));
                 self.parameters.add_file(value).map_err(bad)?;
             }
             ("--log-level", None) => {

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use bench_dragon::client::clock::realtime_ns;
 use bench_dragon::client::shared_memory::service_name;
+use bench_dragon::messages::sentence;
 use bench_dragon::messages::state::EventKind;
 use bench_dragon::motion::event::unreported;
 use bench_dragon::motion::timeline::Timeline;
@@ -197,7 +198,9 @@ impl RunSession<'_> {
     fn open_histograms(&self) -> Result<Option<HistogramLog>, CommandError> {
         let Some(file) = &self.arguments.histograms else { return Ok(None) };
         let log = HistogramLog::create(file, self.playback.rate, realtime_ns());
-        log.map(Some).map_err(|sentence| CommandError::BadInput(format!("--histograms: {sentence}")))
+        let refused =
+            |error| CommandError::BadInput(format!("--histograms: {}", sentence::not_writable(file.display(), &error)));
+        log.map(Some).map_err(refused)
     }
 
     /// Prints the description of the run on standard error: standard output is for the summary.
@@ -246,11 +249,10 @@ impl RunSession<'_> {
 
 impl RunArguments {
     fn playback(&self, scene: &Scene) -> Result<Playback, CommandError> {
-        let checked = |accepted: Accepted, name, value| accepted.check(name, value).map_err(CommandError::BadInput);
         if let Some(rate) = self.rate {
-            checked(Accepted::RATE, "--rate", rate)?;
+            Accepted::RATE.check("--rate", rate)?;
         }
-        checked(Accepted::TIME_SCALE, "--time-scale", self.time_scale)?;
+        Accepted::TIME_SCALE.check("--time-scale", self.time_scale)?;
         Ok(Playback {
             start: self.start,
             time_scale: self.time_scale,

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Arg, ArgMatches, Command, value_parser};
 
+use super::CommandError;
+
 /// The name of the argument.
 const SCENE: &str = "SCENE";
 
@@ -18,8 +20,8 @@ pub fn scene_argument() -> Arg {
 /// Sets the file of `--scene` from the argument.
 ///
 /// # Errors
-/// One sentence for a scene that is given twice, or to a command that reads none.
-pub fn resolve(scene: &mut Option<PathBuf>, definition: &Command, matches: &ArgMatches) -> Result<(), String> {
+/// Bad input: the scene is given twice, or to a command that reads none.
+pub fn resolve(scene: &mut Option<PathBuf>, definition: &Command, matches: &ArgMatches) -> Result<(), CommandError> {
     let (mut command, mut matches, mut names) = (definition, matches, Vec::new());
     while let Some((name, inner)) = matches.subcommand() {
         // A name that was matched is defined.
@@ -30,12 +32,14 @@ pub fn resolve(scene: &mut Option<PathBuf>, definition: &Command, matches: &ArgM
     let takes = takes_scene(command);
     let argument = takes.then(|| matches.get_one::<PathBuf>(SCENE)).flatten();
     match (&*scene, argument) {
-        (Some(option), Some(argument)) => Err(format!(
+        (Some(option), Some(argument)) => Err(CommandError::BadInput(format!(
             "the scene is given twice, {} and --scene {}, expected one of them",
             argument.display(),
             option.display()
-        )),
-        (Some(option), None) if !takes => Err(takes_none(&names, &option.display().to_string())),
+        ))),
+        (Some(option), None) if !takes => {
+            Err(CommandError::BadInput(takes_none(&names, &option.display().to_string())))
+        }
         (_, argument) => {
             *scene = argument.cloned().or(scene.take());
             Ok(())

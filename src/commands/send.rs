@@ -10,8 +10,9 @@ use std::sync::atomic::Ordering;
 
 use bench_dragon::client::feed::Delivery;
 use bench_dragon::client::polling::poll_until;
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::outputs::send::axes::Axes;
-use bench_dragon::outputs::send::network::{NetworkError, Outlet, Route, destination};
+use bench_dragon::outputs::send::network::{DestinationError, NetworkError, Outlet, Route, destination};
 use bench_dragon::outputs::send::osc::{Addresses, Packing};
 use bench_dragon::outputs::send::osc_map::OscMap;
 use bench_dragon::outputs::send::osc_sender::{MOST_RATE, OscOptions, OscSender, OscSenders};
@@ -111,22 +112,22 @@ struct Ros2Arguments {
     parent: Parent,
 }
 
-fn osc_destination(text: &str) -> Result<SocketAddrV4, String> {
+fn osc_destination(text: &str) -> Result<SocketAddrV4, DestinationError> {
     destination(text, None)
 }
 
-fn psn_destination(text: &str) -> Result<SocketAddrV4, String> {
+fn psn_destination(text: &str) -> Result<SocketAddrV4, DestinationError> {
     destination(text, Some(USUAL_PORT))
 }
 
 /// Parses a rate of 0.01 to `MOST` frames per second.
-fn rate<const MOST: u32>(text: &str) -> Result<f64, String> {
+fn rate<const MOST: u32>(text: &str) -> Result<f64, Expected> {
     let rate = text.trim().parse::<f64>().ok().filter(|rate| *rate >= 0.01 && *rate <= f64::from(MOST));
-    rate.ok_or_else(|| format!("expected frames per second from 0.01 to {MOST}"))
+    rate.ok_or_else(|| Expected(format!("frames per second from 0.01 to {MOST}").into()))
 }
 
-fn system_name(text: &str) -> Result<String, String> {
-    if (1..=128).contains(&text.len()) { Ok(text.to_owned()) } else { Err("expected 1 to 128 bytes".to_owned()) }
+fn system_name(text: &str) -> Result<String, Expected> {
+    if (1..=128).contains(&text.len()) { Ok(text.to_owned()) } else { Err(Expected("1 to 128 bytes".into())) }
 }
 
 /// Sends until a signal comes.

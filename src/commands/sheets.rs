@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use bench_dragon::chase::timecode::{FrameRate, Label};
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::proof::scene_hash;
 use bench_dragon::sheets::page::{Wishes, html};
 use bench_dragon::sheets::walk::{MOST_BENCHES, Searched};
@@ -92,10 +93,10 @@ impl SheetsArguments {
     }
 }
 
-fn language(text: &str) -> Result<Language, String> {
+fn language(text: &str) -> Result<Language, Expected> {
     match text {
         "en" => Ok(Language::English),
         "zh" => Ok(Language::Chinese),
-        _ => Err("expected en or zh".to_owned()),
+        _ => Err(Expected("en or zh".into())),
     }
 }

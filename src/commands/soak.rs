@@ -10,6 +10,7 @@ use bench_dragon::client::clock::{monotonic_ns, realtime_ns};
 use bench_dragon::client::connection::Wake;
 use bench_dragon::client::feed::{Delivery, Feed, FeedOptions};
 use bench_dragon::client::shared_memory::service_name;
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::show::scene::Accepted;
 use bench_dragon::soak::causes::causes;
 use bench_dragon::soak::figures;
@@ -233,7 +234,7 @@ impl SoakArguments {
         let admitted = scene.subscribers;
         service_name(common.name(), "poses")?;
         if let Some(rate) = self.rate {
-            Accepted::RATE.check("--rate", rate).map_err(CommandError::BadInput)?;
+            Accepted::RATE.check("--rate", rate)?;
         }
         if self.flaky_clients > MOST_FLAKY_CLIENTS {
             return Err(CommandError::BadInput(format!(
@@ -377,6 +378,6 @@ pub fn subscribe(common: &Common, arguments: &SoakSubscriberArguments) -> Result
 }
 
 /// The seed of random commands.
-fn seed(text: &str) -> Result<u64, String> {
-    text.trim().parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
+fn seed(text: &str) -> Result<u64, Expected> {
+    text.trim().parse().map_err(|_| Expected(format!("a whole number from 0 to {}", u64::MAX).into()))
 }

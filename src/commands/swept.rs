@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use bench_dragon::drawing::swept::{Ring, SweptArea, SweptStretch, TOLERANCE};
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::motion::ensemble::Dragon;
 use bench_dragon::motion::timeline::Timeline;
 use bench_dragon::show::scene::Scene;
@@ -36,8 +37,8 @@ pub struct Benches {
 /// Returns the benches that `text` names, as in `200-223` or `7`, with several dragons as in `gold:1-20`.
 ///
 /// # Errors
-/// A sentence about text of another form.
-pub fn benches(text: &str) -> Result<Benches, String> {
+/// The text has another form.
+pub fn benches(text: &str) -> Result<Benches, Expected> {
     let (dragon, numbers) = text.split_once(':').map_or((None, text), |(name, rest)| (Some(name.trim()), rest));
     let (first, last) = numbers.split_once('-').unwrap_or((numbers, numbers));
     match (first.trim().parse(), last.trim().parse()) {
@@ -45,8 +46,7 @@ pub fn benches(text: &str) -> Result<Benches, String> {
             Ok(Benches { dragon: dragon.map(str::to_owned), range: (first, last) })
         }
         _ => {
-            Err("expected benches counted from 1, as in 200-223, or of one of several dragons, as in gold:1-20"
-                .to_owned())
+            Err(Expected("benches counted from 1, as in 200-223, or of one of several dragons, as in gold:1-20".into()))
         }
     }
 }

@@ -4,10 +4,13 @@ use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
 
 use bench_dragon::drawing::palette::{LIGHT, SERIES, channels, with_dark_rules};
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::motion::ensemble::{Dragon, Ensemble};
 use bench_dragon::show::scene::Scene;
 use bench_dragon::trade::display::{self, Display, DisplayMeasurement, Precision, Reader};
-use bench_dragon::trade::{LAST_SECOND_SAMPLES, Measurement, SPREAD_SAMPLES, Subject, measure, publisher_frame_ns};
+use bench_dragon::trade::{
+    LAST_SECOND_SAMPLES, Measurement, SPREAD_SAMPLES, Subject, TradeError, measure, publisher_frame_ns,
+};
 use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 use serde::Serialize;
@@ -42,14 +45,14 @@ impl TradeArguments {
     }
 }
 
-fn display_rate(text: &str) -> Result<f64, String> {
+fn display_rate(text: &str) -> Result<f64, Expected> {
     let rate = text.parse().unwrap_or(f64::NAN);
-    if rate > 0.0 && rate < f64::INFINITY { Ok(rate) } else { Err("expected a rate above 0, in hertz".to_owned()) }
+    if rate > 0.0 && rate < f64::INFINITY { Ok(rate) } else { Err(Expected("a rate above 0, in hertz".into())) }
 }
 
-fn delay(text: &str) -> Result<f64, String> {
+fn delay(text: &str) -> Result<f64, Expected> {
     let delay = seconds(text)?;
-    if (0.0..f64::INFINITY).contains(&delay) { Ok(delay) } else { Err("expected at least 0, in seconds".to_owned()) }
+    if (0.0..f64::INFINITY).contains(&delay) { Ok(delay) } else { Err(Expected("at least 0, in seconds".into())) }
 }
 
 /// Measures every solver, and readers at every rate, and prints tables or JSON lines.
@@ -88,7 +91,7 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
         bar.set_message("measuring");
         let measured = measure(subject, &timeline, &mut |done| progress(SOLVERS * done));
         unstopped()?;
-        let measurements = measured.map_err(CommandError::Failed)?;
+        let measurements = measured?;
         let displayed = if common.json && !arguments.wants_display() {
             Vec::new()
         } else {
@@ -97,7 +100,7 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
             let mut progress = |done| progress(SOLVERS + (1.0 - SOLVERS) * done);
             let displayed = display::measure(subject, &timeline, display, &mut progress);
             unstopped()?;
-            displayed.map_err(CommandError::Failed)?
+            displayed?
         };
         if k + 1 == parts.len() {
             bar.finish_and_clear();
@@ -111,6 +114,12 @@ pub fn trade(common: &Common, arguments: &TradeArguments) -> Result<(), CommandE
         }
     }
     output.finish()
+}
+
+impl From<TradeError> for CommandError {
+    fn from(error: TradeError) -> Self {
+        Self::Failed(error.to_string())
+    }
 }
 
 /// One dragon, measured alone.

@@ -55,7 +55,7 @@ pub fn verify(common: &Common, arguments: &VerifyArguments) -> Result<(), Comman
     bar.finish_and_clear();
     let verdict = verdict.map_err(|error| match error {
         VerifyError::Line { line, problem } => CommandError::BadInput(format!("{shown}, line {line}: {problem}")),
-        VerifyError::Scene(sentence) => CommandError::BadInput(sentence),
+        VerifyError::Scene(error) => error.into(),
         VerifyError::Read(error) => unread(error),
     })?;
     print(common, &verdict)?;

@@ -6,6 +6,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use bench_dragon_messages::sentence::Expected;
+
 /// Frames in ten minutes of drop frame: 600 seconds of 30 labels, without two labels in nine minutes.
 const DROP_TEN_MINUTES: u32 = 17_982;
 /// Frames in a minute of drop frame that has no label 00 and 01.
@@ -158,11 +160,11 @@ impl fmt::Display for FrameRate {
 }
 
 impl FromStr for FrameRate {
-    type Err = String;
+    type Err = Expected;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, Expected> {
         let named = Self::ALL.into_iter().find(|rate| rate.name() == text);
-        named.ok_or_else(|| "expected auto, 23.976, 24, 25, 29.97, 29.97df or 30".to_owned())
+        named.ok_or(Expected("auto, 23.976, 24, 25, 29.97, 29.97df or 30".into()))
     }
 }
 
@@ -173,9 +175,9 @@ impl fmt::Display for Label {
 }
 
 impl FromStr for Label {
-    type Err = String;
+    type Err = Expected;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, Expected> {
         let part = |word: &str, below: u8| {
             let is_number = (1..=2).contains(&word.len()) && word.bytes().all(|byte| byte.is_ascii_digit());
             word.parse::<u8>().ok().filter(|number| is_number && *number < below)
@@ -191,7 +193,7 @@ impl FromStr for Label {
                 frames: part(frames, 30)?,
             })
         };
-        label(&words).ok_or_else(|| "expected a label hours:minutes:seconds:frames such as 01:00:00:00".to_owned())
+        label(&words).ok_or(Expected("a label hours:minutes:seconds:frames such as 01:00:00:00".into()))
     }
 }
 
@@ -242,10 +244,10 @@ mod tests {
     fn labels_and_rates_are_read_or_refused_with_a_sentence() {
         assert_eq!(label("1:02:03:04").to_string(), "01:02:03:04");
         for text in ["", "1:2:3", "24:00:00:00", "00:60:00:00", "00:00:00:30", "a:b:c:d", "+1:0:0:0", "001:0:0:0"] {
-            assert!(text.parse::<Label>().unwrap_err().contains("01:00:00:00"), "{text}");
+            assert!(text.parse::<Label>().unwrap_err().to_string().contains("01:00:00:00"), "{text}");
         }
         assert!(FrameRate::ALL.iter().all(|rate| rate.name().parse() == Ok(*rate)));
-        assert!("23.98".parse::<FrameRate>().unwrap_err().contains("29.97df"));
+        assert!("23.98".parse::<FrameRate>().unwrap_err().to_string().contains("29.97df"));
         assert_eq!(
             [0, 1, 2, 3, 4].map(FrameRate::of_type).map(|rate| rate.map(FrameRate::name)),
             [Some("24"), Some("25"), Some("29.97df"), Some("30"), None]

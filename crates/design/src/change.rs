@@ -25,7 +25,7 @@ pub fn changed(
         Wish::Remove(name) => additions::remove(scene, name),
         Wish::GeoJson(text) => match geojson::polygons(text) {
             Ok(polygons) => additions::add_polygons(scene, polygons),
-            Err(sentence) => Err(sentence.into()),
+            Err(error) => Err(error.to_string().into()),
         },
         Wish::Text(_) | Wish::At(_) | Wish::Plan(..) | Wish::Cancel | Wish::Template(_) | Wish::File => return None,
     })
@@ -36,7 +36,7 @@ pub fn changed(
 /// # Errors
 /// [`Fault`] for what is no request, and for one that the scene cannot have.
 pub fn requested(scene: &DesignedScene, json: &str) -> Result<DesignedScene, Fault> {
-    let (_, wish) = Request::read(json)?;
+    let (_, wish) = Request::read(json).map_err(|error| error.to_string())?;
     let text = match wish {
         Wish::Text(text) => text,
         wish => changed(scene, &wish, 0.0, None).ok_or_else(|| "the request changes no text".to_owned())??,

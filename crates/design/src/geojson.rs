@@ -16,17 +16,27 @@ const MOST_DEGREES: f64 = 0.1;
 /// A polygon and its name.
 pub type Named = (Option<String>, Vec<Point>);
 
+/// A text without polygons.
+#[derive(Debug, thiserror::Error)]
+pub enum GeoJsonError {
+    /// The text is no JSON.
+    #[error("{0}: expected a GeoJSON file with polygons")]
+    Json(#[from] serde_json::Error),
+    /// The JSON has no polygon.
+    #[error("the file has no polygon, expected a GeoJSON file with polygons")]
+    NoPolygon,
+}
+
 /// Returns the polygons of a text.
 ///
 /// # Errors
-/// One sentence for a text that is not GeoJSON, or has no polygon.
-pub fn polygons(text: &str) -> Result<Vec<Named>, String> {
-    let expected = "expected a GeoJSON file with polygons";
-    let root: Value = serde_json::from_str(text).map_err(|error| format!("{error}: {expected}"))?;
+/// [`GeoJsonError`]
+pub fn polygons(text: &str) -> Result<Vec<Named>, GeoJsonError> {
+    let root: Value = serde_json::from_str(text)?;
     let mut found = Vec::new();
     add(&root, None, &mut found);
     if found.is_empty() {
-        return Err(format!("the file has no polygon, {expected}"));
+        return Err(GeoJsonError::NoPolygon);
     }
     let places = || found.iter().flat_map(|(_, corners)| corners);
     let least = places().copied().reduce(|one, other| one.inf(&other)).unwrap_or_default();

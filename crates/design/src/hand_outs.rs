@@ -33,20 +33,26 @@ pub struct HandOut {
     pub text: String,
 }
 
-/// The answer of a search that was stopped.
-const STOPPED: &str = "the making of the hand-outs was stopped";
+/// The reason for missing hand-outs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum HandOutError {
+    /// The motion is not exact.
+    #[error("the scene names the solver \"paper\", whose head is too fast: hand-outs are for exact motion")]
+    NotExact,
+    /// The receiver of the progress has stopped a search.
+    #[error("the making of the hand-outs was stopped")]
+    Stopped,
+}
 
 /// Follows all benches and writes their hand-outs.
 ///
 /// # Errors
-/// One sentence for a motion that is not exact, and if `progress` stops a search.
-pub fn hand_outs(designed: &DesignedScene, form: Form, progress: Progress<'_>) -> Result<HandOut, String> {
+/// [`HandOutError`]
+pub fn hand_outs(designed: &DesignedScene, form: Form, progress: Progress<'_>) -> Result<HandOut, HandOutError> {
     let scene = &designed.scene;
     let ensemble = &scene.ensemble;
     if !ensemble.is_exact() {
-        return Err(
-            "the scene names the solver \"paper\", whose head is too fast: hand-outs are for exact motion".to_owned()
-        );
+        return Err(HandOutError::NotExact);
     }
     let timeline = ensemble.timeline(&mut |share| progress(0.2 * share));
     let obstacles = ensemble.obstacle_clearances(timeline.end(), &mut |share| progress(0.2 + 0.1 * share));
@@ -69,15 +75,16 @@ pub fn hand_outs(designed: &DesignedScene, form: Form, progress: Progress<'_>) -
         }
         Form::Csv => {
             let progress = &mut |share| progress(0.9 + 0.1 * share);
-            let text = csv(&walk, Language::English, &benches, &minutes_and_seconds, progress).ok_or(STOPPED)?;
+            let text =
+                csv(&walk, Language::English, &benches, &minutes_and_seconds, progress).ok_or(HandOutError::Stopped)?;
             HandOut { name: name(".csv"), kind: "text/csv", text }
         }
     })
 }
 
 /// Converts the answer of a progress's receiver.
-fn go_on(answer: ControlFlow<()>) -> Result<(), String> {
-    if answer.is_break() { Err(STOPPED.to_owned()) } else { Ok(()) }
+fn go_on(answer: ControlFlow<()>) -> Result<(), HandOutError> {
+    if answer.is_break() { Err(HandOutError::Stopped) } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -99,7 +106,7 @@ mod tests {
         for form in [Form::Csv, Form::Pages(Language::English)] {
             assert!(stopped_at(form, f64::INFINITY).is_ok());
             for most in [0.0, 0.1, 0.35, 0.5, 0.7, 0.9] {
-                assert_eq!(stopped_at(form, most), Err(STOPPED.to_owned()), "stopped at {most}");
+                assert_eq!(stopped_at(form, most), Err(HandOutError::Stopped), "stopped at {most}");
             }
         }
     }

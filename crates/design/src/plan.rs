@@ -14,15 +14,15 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::edit;
-use crate::hand_outs::{Form, HandOut, hand_outs};
+use crate::hand_outs::{Form, HandOut, HandOutError, hand_outs};
 use crate::request::Setting;
 use crate::scene::DesignedScene;
 use bench_dragon_certify::plan::{
-    self, PitchLine, Spaced, SpeedLine, Stage, TurnLine, greatest_speed, least_pitch, least_turn,
+    self, PitchLine, PlanError, Spaced, SpeedLine, Stage, TurnLine, greatest_speed, least_pitch, least_turn,
 };
-use bench_dragon_certify::{CertifiedEvent, MOST_STEPS, Status, certify};
+use bench_dragon_certify::{CertifiedEvent, CertifyError, MOST_STEPS, Status, certify};
 use bench_dragon_fit::line::FitLine;
-use bench_dragon_fit::search::{Vary, fit};
+use bench_dragon_fit::search::{FitError, Vary, fit};
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::event::Progress;
 use bench_dragon_motion::model::curve::Curve;
@@ -96,18 +96,45 @@ impl RunningPlan {
             answers(&match planned {
                 _ if of_thread.load(Ordering::Relaxed) => json!({"id": id, "cancelled": true}),
                 Ok(Planned { answer, text, file }) => json!({"id": id, "plan": answer, "text": text, "file": file}),
-                Err(sentence) => json!({"id": id, "error": {"sentence": sentence, "line": null, "field": null}}),
+                Err(error) => {
+                    json!({"id": id, "error": {"sentence": error.to_string(), "line": null, "field": null}})
+                }
             });
         })?;
         Ok(Self(stop))
     }
 }
 
+/// The reason for a missing plan.
+#[derive(Debug, thiserror::Error)]
+enum Unplanned {
+    #[error("there is no plan {0:?}, expected pitch, turn, speed, fit, prove, sheets, sheets-zh or csv")]
+    Unknown(String),
+    #[error("the scene has several dragons, and this plan is for one in [team]")]
+    SeveralDragons,
+    #[error("a route has several numbers for its coil: the least pitch is for a spiral or a turnaround")]
+    PitchOfRoute,
+    #[error("the least turn is for a path of kind \"turnaround\", and for a route with one piece of kind \"turn\"")]
+    NoTurn,
+    #[error("{0} numbers are chosen to be fitted, expected 1 to {MOST_VARIED}")]
+    Varied(usize),
+    #[error("the scene names the solver \"paper\", whose head is too fast: only exact motion is proved")]
+    NotExact,
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    #[error(transparent)]
+    Certify(#[from] CertifyError),
+    #[error(transparent)]
+    HandOut(#[from] HandOutError),
+}
+
 /// Makes a plan.
 ///
 /// # Errors
-/// One sentence for a plan that the scene cannot have.
-fn plan((kind, vary): (&str, &[String]), scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
+/// The scene cannot have the plan.
+fn plan((kind, vary): (&str, &[String]), scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     match kind {
         "prove" => return prove(scene, progress),
         "fit" => return fitted(vary, scene, progress),
@@ -117,14 +144,12 @@ fn plan((kind, vary): (&str, &[String]), scene: &DesignedScene, progress: Progre
         _ => {}
     }
     let motion = scene.scene.ensemble.only();
-    let motion = motion.ok_or("the scene has several dragons, and this plan is for one in [team]")?;
+    let motion = motion.ok_or(Unplanned::SeveralDragons)?;
     match kind {
         "pitch" => pitch(scene, motion, progress),
         "turn" => turn(scene, motion, progress),
         "speed" => speed(scene, progress),
-        _ => {
-            Err(format!("there is no plan {kind:?}, expected pitch, turn, speed, fit, prove, sheets, sheets-zh or csv"))
-        }
+        _ => Err(Unplanned::Unknown(kind.to_owned())),
     }
 }
 
@@ -166,7 +191,7 @@ fn apart(clearance: f64) -> String {
 }
 
 /// Plans the pitch with which the head comes as near to the centre as it does now.
-fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Result<Planned, String> {
+fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     let radius = match motion.description() {
         PathDescription::Turnaround { turn_radius, .. } => *turn_radius,
         PathDescription::Spiral { .. } => {
@@ -174,15 +199,11 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
             let end = timeline.show_end(scene.scene.stops_at_contact());
             motion.path().point(motion.path().param_at(end.event.travelled)).coords.norm()
         }
-        PathDescription::Route { .. } => {
-            return Err(
-                "a route has several numbers for its coil: the least pitch is for a spiral or a turnaround".to_owned()
-            );
-        }
+        PathDescription::Route { .. } => return Err(Unplanned::PitchOfRoute),
     };
     let clearance = required(scene);
     let asked = Spaced { team: motion.team(), clearance };
-    let found = least_pitch(asked, radius, progress).map_err(|error| error.to_string())?;
+    let found = least_pitch(asked, radius, progress)?;
     let stage = Stage::search(motion, asked, plan::Planned::Pitch { radius }, found.value_hi, progress);
     let sentence = match found.value_hi {
         Some(pitch) => format!(
@@ -237,15 +258,13 @@ impl TurnInText {
 }
 
 /// Plans the turn with its ratio of arcs.
-fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Result<Planned, String> {
+fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     let Some(TurnInText { pitch, arc_ratio, number }) = TurnInText::of(scene, motion.description()) else {
-        return Err("the least turn is for a path of kind \"turnaround\", and for a route with one piece of kind \
-                    \"turn\""
-            .to_owned());
+        return Err(Unplanned::NoTurn);
     };
     let clearance = required(scene);
     let asked = Spaced { team: motion.team(), clearance };
-    let found = least_turn(asked, pitch, Some(arc_ratio), progress).map_err(|error| error.to_string())?;
+    let found = least_turn(asked, pitch, Some(arc_ratio), progress)?;
     let stage = Stage::search(motion, asked, plan::Planned::Turn { arc_ratio }, found.value_hi, progress);
     let sentence = match (found.value, found.length) {
         (Some(radius), Some(length)) => format!(
@@ -263,9 +282,9 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
     Ok(Planned::numbers(json!(Told { line, sentence }), text))
 }
 
-fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
+fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     let timeline = scene.scene.ensemble.timeline(&mut |_| progress(0.0));
-    let found = greatest_speed(&scene.scene, &timeline, MOST_SPEED, progress).map_err(|error| error.to_string())?;
+    let found = greatest_speed(&scene.scene, &timeline, MOST_SPEED, progress)?;
     let sentence = format!(
         "No handle is faster than {MOST_SPEED} m/s while the head moves at {} m/s. The fastest is handle {} (counting \
          from 1), at t = {} s.",
@@ -279,14 +298,14 @@ fn speed(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Strin
 }
 
 /// Fits numbers of the scene, as `plan fit` does, so that the show keeps what is required.
-fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
+fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     if vary.is_empty() || vary.len() > MOST_VARIED {
-        return Err(format!("{} numbers are chosen to be fitted, expected 1 to {MOST_VARIED}", vary.len()));
+        return Err(Unplanned::Varied(vary.len()));
     }
     let text = SceneText { text: scene.text.clone(), file: "scene".to_owned(), stem: "scene".to_owned() };
     let vary: Vec<Vary> = vary.iter().map(|field| Vary { field: field.clone(), range: None }).collect();
     let clearance = required(scene);
-    let found = fit(&text, &vary, clearance, 1, &mut |share, _| progress(share)).map_err(|error| error.to_string())?;
+    let found = fit(&text, &vary, clearance, 1, &mut |share, _| progress(share))?;
     let margin = found.judgement.margin();
     let sentence = match found.is_found() {
         true => format!(
@@ -313,17 +332,15 @@ fn fitted(vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Res
 }
 
 /// Proves the events, as `events --certify` does, without a certificate.
-fn prove(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, String> {
+fn prove(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     let ensemble = &scene.scene.ensemble;
     if !ensemble.is_exact() {
-        return Err(
-            "the scene names the solver \"paper\", whose head is too fast: only exact motion is proved".to_owned()
-        );
+        return Err(Unplanned::NotExact);
     }
     let timeline: Timeline = ensemble.timeline(&mut |_| progress(0.0));
     let mut write = |_: &bench_dragon_certify::CertificateLine| Ok(());
     let found = certify(ensemble, &timeline, &scene.text, MOST_STEPS, &mut write, progress);
-    let found = found.map_err(|error| error.to_string())?;
+    let found = found?;
     let undecided = found.iter().filter(|event| matches!(event.status, Status::Undecided { .. })).count();
     let sentence = match undecided {
         0 => "Every event is proved, and that there is no earlier one.".to_owned(),
@@ -336,7 +353,7 @@ fn prove(scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Strin
 }
 
 /// Makes the hand-outs.
-fn handed_out(scene: &DesignedScene, form: Form, progress: Progress<'_>) -> Result<Planned, String> {
+fn handed_out(scene: &DesignedScene, form: Form, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     let file = hand_outs(scene, form, progress)?;
     let sentence = format!("{} is for {} benches.", file.name, scene.scene.ensemble.benches());
     Ok(Planned { answer: json!({"plan": "sheets", "sentence": sentence}), text: None, file: Some(file) })

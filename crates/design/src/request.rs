@@ -1,10 +1,24 @@
 //! The requests of a page.
 //!
-//! In: JSON. Out: a [`Request`], or one sentence.
+//! In: JSON. Out: a [`Request`], or a [`RequestError`].
 
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
+
+const EXPECTED: &str = "expected JSON with an id and one of text, set, drag, add, remove, at, plan, cancel, template, \
+                        geojson and file";
+
+/// A text that is no request.
+#[derive(Debug, thiserror::Error)]
+pub enum RequestError {
+    /// The text is no JSON, or has other keys.
+    #[error("{0}: {EXPECTED}")]
+    Json(#[from] serde_json::Error),
+    /// The request has no wish, or several.
+    #[error("{EXPECTED}")]
+    Wishes,
+}
 
 /// A request with its number.
 #[derive(Debug, Deserialize)]
@@ -103,11 +117,9 @@ impl Request {
     /// Reads a request.
     ///
     /// # Errors
-    /// One sentence.
-    pub fn read(json: &str) -> Result<(u64, Wish), String> {
-        let expected = "expected JSON with an id and one of text, set, drag, add, remove, at, plan, cancel, template, \
-                        geojson and file";
-        let request: Self = serde_json::from_str(json).map_err(|error| format!("{error}: {expected}"))?;
+    /// [`RequestError`]
+    pub fn read(json: &str) -> Result<(u64, Wish), RequestError> {
+        let request: Self = serde_json::from_str(json)?;
         let id = request.id;
         let vary = request.vary.unwrap_or_default();
         let wishes = [
@@ -126,7 +138,7 @@ impl Request {
         let mut given = wishes.into_iter().flatten();
         match (given.next(), given.next()) {
             (Some(wish), None) => Ok((id, wish)),
-            _ => Err(expected.to_owned()),
+            _ => Err(RequestError::Wishes),
         }
     }
 }

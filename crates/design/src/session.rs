@@ -19,6 +19,7 @@ use crate::scene::{DesignedScene, Fault};
 use crate::search::{Job, Searcher};
 use crate::templates::{TEMPLATES, template};
 use bench_dragon_messages::{FrameHeader, HandlePose, StageMessage};
+use bench_dragon_show::scene::SceneError;
 
 /// The requests of a page that may wait. A page waits for an answer before its next change.
 const MOST_WAITING: usize = 512;
@@ -40,8 +41,8 @@ pub enum Answer {
 /// Receives the answers of a session, from any of its threads.
 pub type Answers = Arc<dyn Fn(Answer) + Send + Sync>;
 
-/// Reads the file of a design again, or says in one sentence why that is impossible.
-pub type ReadFile = Arc<dyn Fn() -> Result<String, String> + Send + Sync>;
+/// Reads the file of a design again.
+pub type ReadFile = Arc<dyn Fn() -> Result<String, SceneError> + Send + Sync>;
 
 /// The file of a design.
 #[derive(Clone)]
@@ -58,11 +59,6 @@ pub struct DesignFile {
 pub struct Session {
     requests: SyncSender<String>,
 }
-
-/// A request that does not fit, since too many are waiting.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("too many requests are waiting")]
-pub struct Busy;
 
 impl Session {
     /// Starts a session with the text of the file, or of the first template.
@@ -93,12 +89,9 @@ impl Session {
         Ok(Self { requests })
     }
 
-    /// Takes a request; its answers come later.
-    ///
-    /// # Errors
-    /// [`Busy`]
-    pub fn request(&self, json: String) -> Result<(), Busy> {
-        self.requests.try_send(json).map_err(|_| Busy)
+    /// Takes a request; its answers come later. Returns `None` if too many requests are waiting.
+    pub fn request(&self, json: String) -> Option<()> {
+        self.requests.try_send(json).ok()
     }
 }
 
@@ -145,7 +138,7 @@ impl Desk {
     fn read(&mut self, request: &str) {
         match Request::read(request) {
             Ok((id, wish)) => self.answer(id, wish),
-            Err(sentence) => self.refuse(0, &sentence.into()),
+            Err(error) => self.refuse(0, &error.to_string().into()),
         }
     }
 
@@ -166,7 +159,7 @@ impl Desk {
             },
             Wish::File => match self.file_text() {
                 Ok(text) => return self.take(id, &text),
-                Err(sentence) => Err(sentence.into()),
+                Err(error) => Err(error.to_string().into()),
             },
             Wish::At(time) => {
                 self.at = if time.is_finite() { time.max(0.0) } else { 0.0 };
@@ -205,7 +198,7 @@ impl Desk {
         self.file.as_ref().map_or("scene", |file| &file.shown).to_owned()
     }
 
-    fn file_text(&self) -> Result<String, String> {
+    fn file_text(&self) -> Result<String, SceneError> {
         self.file.as_ref().map_or_else(|| Ok(TEMPLATES[0].text.to_owned()), |file| (file.read)())
     }
 

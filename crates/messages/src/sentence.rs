@@ -3,7 +3,9 @@
 //! In: a [`CollisionAlert`] and the [`Stage`] with the names. Out: a sentence, the same for the terminal and for the
 //! page.
 
-use std::fmt::Display;
+use std::borrow::Cow;
+use std::error::Error;
+use std::fmt::{self, Display};
 use std::io;
 
 use super::layouts::{ChaseStatus, CollisionAlert, Cue, OBSTACLE_BOUNDARY, Stage};
@@ -145,6 +147,18 @@ pub fn number(value: f64) -> String {
     let is_plain = value == 0.0 || !value.is_finite() || (1e-6..1e15).contains(&value.abs());
     if is_plain { value.to_string() } else { format!("{value:e}") }
 }
+
+/// A text of another form than the one that is expected, such as `seconds, or a time such as 90s`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Expected(pub Cow<'static, str>);
+
+impl Display for Expected {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "expected {}", self.0)
+    }
+}
+
+impl Error for Expected {}
 
 /// Returns the sentence for a file that cannot be created.
 pub fn not_writable(file: impl Display, error: &io::Error) -> String {

@@ -60,13 +60,18 @@ pub enum Answer {
 /// Receives the answers to a page, from any thread. It waits while the page is behind.
 pub type Answers = Arc<dyn Fn(Answer) + Send + Sync>;
 
+/// A request that does not fit, since too many are waiting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("too many requests are waiting")]
+pub struct Busy;
+
 /// A page's session. It ends when it is dropped.
 pub trait DesignSession: Send {
-    /// Takes a request, or says in one sentence why not; the answers come later.
+    /// Takes a request; the answers come later.
     ///
     /// # Errors
-    /// Too many requests are waiting.
-    fn request(&self, json: String) -> Result<(), String>;
+    /// [`Busy`]
+    fn request(&self, json: String) -> Result<(), Busy>;
 }
 
 /// The reason why a text is not saved.

@@ -61,7 +61,8 @@ pub fn compare(
         for bytes in read {
             let of = frame_of(&bytes)?;
             frames += 1;
-            if let Err(what) = reference.compare_frame(of.frame.sim_time, &of.poses) {
+            if let Err(error) = reference.compare_frame(of.frame.sim_time, &of.poses) {
+                let what = error.to_string();
                 let (sequence, tick, sim_time) = (of.frame.sequence, of.frame.tick, of.frame.sim_time);
                 difference = Some(FrameDifference { sequence, tick, sim_time, what });
                 break;

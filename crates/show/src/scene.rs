@@ -24,7 +24,7 @@ use std::path::Path as FilePath;
 use serde::Deserialize;
 use toml::Spanned;
 
-pub use self::accepted::Accepted;
+pub use self::accepted::{Accepted, RangeError};
 use self::cue::{Cue, RawCue};
 pub use self::dragons::{MOST_DRAGON_NAME, MOST_DRAGONS};
 use self::dragons::{Probe, RawEnsemble};

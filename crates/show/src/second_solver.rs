@@ -1,6 +1,6 @@
 //! A second solver that judges handles computed elsewhere: by a machine with other bits, or before they were recorded.
 //!
-//! In: a time and handles. Out: a sentence for the first handle outside of the tolerance.
+//! In: a time and handles. Out: the first [`Disagreement`].
 
 use std::f64::consts::PI;
 
@@ -20,6 +20,56 @@ const MOST_GROWTH: f64 = 1e6;
 
 /// The error of an angle in (-pi, pi] from arctangents and sums, in radians.
 const ROUNDING_OF_ANGLES: f64 = 1e-14;
+
+/// A frame that the second solver refuses: its first difference outside of the tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Disagreement {
+    /// The frame has another simulated time.
+    #[error("its simulated time is {time} s, computed {shown} s")]
+    Time {
+        /// The time of the frame, in seconds.
+        time: f64,
+        /// The time of the show, in seconds.
+        shown: f64,
+    },
+    /// The chain has no solution at this simulated time, in seconds.
+    #[error("there is no solution at its simulated time of {0} s")]
+    NoSolution(f64),
+    /// The frame has another number of handles.
+    #[error("it has {found} handles, the scene {expected}")]
+    Handles {
+        /// The handles of the frame.
+        found: usize,
+        /// The handles of the scene.
+        expected: usize,
+    },
+    /// A handle has another heading.
+    #[error(
+        "the heading of handle {}, counted from 1, is {radians:.1e} rad from newton's, more than {allowed:.1e} rad",
+        handle + 1
+    )]
+    Heading {
+        /// The handle, counted from 0.
+        handle: usize,
+        /// The difference.
+        radians: f64,
+        /// The tolerance.
+        allowed: f64,
+    },
+    /// A handle is at another place.
+    #[error(
+        "handle {}, counted from 1, is {metres:.1e} m from newton's place, more than {allowed:.1e} m",
+        handle + 1
+    )]
+    Place {
+        /// The handle, counted from 0.
+        handle: usize,
+        /// The distance.
+        metres: f64,
+        /// The tolerance.
+        allowed: f64,
+    },
+}
 
 /// The second solver of a scene: one for each dragon.
 pub struct SecondSolver {
@@ -52,15 +102,15 @@ impl SecondSolver {
     /// time. A handle is its number with x and y.
     ///
     /// # Errors
-    /// A sentence for the first difference outside of the tolerance.
-    pub fn compare(&mut self, time: f64, shown: f64, handles: &[(u32, f64, f64)]) -> Result<(), String> {
+    /// The first difference outside of the tolerance.
+    pub fn compare(&mut self, time: f64, shown: f64, handles: &[(u32, f64, f64)]) -> Result<(), Disagreement> {
         let apart = (time - shown).abs();
         let allowed = self.parts.iter().map(|(_, part)| part.accuracy / part.head_speed).fold(0.0, f64::max);
         if apart.is_nan() || apart > EVENT_TIME + allowed + 8.0 * f64::EPSILON * shown {
-            return Err(format!("its simulated time is {time} s, computed {shown} s"));
+            return Err(Disagreement::Time { time, shown });
         }
         if handles.is_empty() {
-            return Err(no_solution(time));
+            return Err(Disagreement::NoSolution(time));
         }
         for (first, part) in &mut self.parts {
             let own_time = part.solve(time)?;
@@ -75,11 +125,11 @@ impl SecondSolver {
     /// Compares the position and the heading of every handle of a frame with those of the time `time`.
     ///
     /// # Errors
-    /// A sentence for the first handle outside of the tolerance.
-    pub fn compare_frame(&mut self, time: f64, poses: &[HandlePose]) -> Result<(), String> {
-        let handles: usize = self.parts.iter().map(|(_, part)| part.chain.handles()).sum();
-        if poses.len() != handles {
-            return Err(format!("it has {} handles, the scene {handles}", poses.len()));
+    /// The first difference outside of the tolerance.
+    pub fn compare_frame(&mut self, time: f64, poses: &[HandlePose]) -> Result<(), Disagreement> {
+        let (found, expected) = (poses.len(), self.parts.iter().map(|(_, part)| part.chain.handles()).sum());
+        if found != expected {
+            return Err(Disagreement::Handles { found, expected });
         }
         for (first, part) in &mut self.parts {
             part.compare_frame(*first, time, &poses[*first..*first + part.chain.handles()])?;
@@ -114,7 +164,7 @@ impl OneSolver {
     }
 
     /// Compares this dragon's handles in a frame; `first` is the number of the first one.
-    fn compare_frame(&mut self, first: usize, time: f64, poses: &[HandlePose]) -> Result<(), String> {
+    fn compare_frame(&mut self, first: usize, time: f64, poses: &[HandlePose]) -> Result<(), Disagreement> {
         let own_time = self.solve(time)?;
         let places = poses.iter().enumerate();
         let places = places.map(|(handle, pose)| self.compare_place(first, handle, own_time, pose.x, pose.y));
@@ -124,24 +174,21 @@ impl OneSolver {
             let bench = handle.min(poses.len().saturating_sub(2));
             // A bench turns by the distances of both its handles over its length.
             let allowed = (tolerances[bench] + tolerances[bench + 1]) / self.link(bench) + ROUNDING_OF_ANGLES;
-            let turned = (heading - self.chain.heading[handle] + PI).rem_euclid(2.0 * PI) - PI;
-            if turned.is_nan() || turned.abs() > allowed {
-                return Err(format!(
-                    "the heading of handle {}, counted from 1, is {turned:.1e} rad from newton's, more than {allowed:.1e} rad",
-                    first + handle + 1
-                ));
+            let radians = (heading - self.chain.heading[handle] + PI).rem_euclid(2.0 * PI) - PI;
+            if radians.is_nan() || radians.abs() > allowed {
+                return Err(Disagreement::Heading { handle: first + handle, radians, allowed });
             }
         }
         Ok(())
     }
 
     /// Solves the dragon for a time of the show, and returns the time of its own motion.
-    fn solve(&mut self, time: f64) -> Result<f64, String> {
+    fn solve(&mut self, time: f64) -> Result<f64, Disagreement> {
         let own_time = self.dragon.own_time(time).0;
         let solved = time.is_finite()
             && time >= 0.0
             && solve_at_or_just_before(self.solver.as_mut(), own_time, &mut self.chain).is_ok();
-        if solved { Ok(own_time) } else { Err(no_solution(time)) }
+        if solved { Ok(own_time) } else { Err(Disagreement::NoSolution(time)) }
     }
 
     /// Returns the metres between the holes of a bench.
@@ -151,23 +198,20 @@ impl OneSolver {
     }
 
     /// Compares the place of a handle with the solution. Returns the tolerance in metres.
-    fn compare_place(&mut self, first: usize, handle: usize, time: f64, x: f64, y: f64) -> Result<f64, String> {
+    fn compare_place(&mut self, first: usize, handle: usize, time: f64, x: f64, y: f64) -> Result<f64, Disagreement> {
         let own = self.chain.x.get(handle).zip(self.chain.y.get(handle)).map(|(x, y)| Vector::new(*x, *y));
         let metres = own.map_or(f64::INFINITY, |own| (Vector::new(x, y) - own).norm());
         // Both solutions have rounding errors. A place that is judged does not widen what is allowed.
         let far = own.map_or(0.0, |own| own.norm());
         let rounding = 8.0 * f64::EPSILON * (far + self.head_speed * time + self.placed);
-        let tolerance = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, handle);
-        if metres.is_nan() || metres > tolerance {
-            let handle = first + handle + 1;
-            return Err(format!(
-                "handle {handle}, counted from 1, is {metres:.1e} m from newton's place, more than {tolerance:.1e} m"
-            ));
+        let allowed = self.accuracy + 2.0 * rounding * growth(&self.chain.speed, handle);
+        if metres.is_nan() || metres > allowed {
+            return Err(Disagreement::Place { handle: first + handle, metres, allowed });
         }
         if self.worst.is_none_or(|(worst, _)| metres > worst) {
-            self.worst = Some((metres, tolerance));
+            self.worst = Some((metres, allowed));
         }
-        Ok(tolerance)
+        Ok(allowed)
     }
 }
 
@@ -182,10 +226,6 @@ fn accuracy_of(motion: &Motion) -> f64 {
         Method::Paper(_) => PAPER,
         Method::Newton | Method::FollowerTable => LEAST,
     }
-}
-
-fn no_solution(time: f64) -> String {
-    format!("there is no solution at its simulated time of {time} s")
 }
 
 /// Returns the growth of a position error up to a handle, from the speeds of the handles.

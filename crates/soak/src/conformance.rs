@@ -10,6 +10,15 @@ use bench_dragon_messages::{FrameHeader, HandlePose};
 /// The tolerance of a whole number of periods.
 const PERIODS_TOLERANCE: f64 = 0.01;
 
+/// A frame that does not follow from the frame before.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{fault}: {frame:?} after {previous:?}")]
+pub(super) struct FrameFault {
+    fault: &'static str,
+    frame: FrameHeader,
+    previous: Option<FrameHeader>,
+}
+
 /// The facts from the frames so far.
 #[derive(Debug, Default)]
 pub(super) struct ConformanceCheck {
@@ -27,7 +36,7 @@ impl ConformanceCheck {
     ///
     /// # Errors
     /// The fault of the frame.
-    pub fn check(&mut self, header: &FrameHeader, handles: &[HandlePose], rate: f64) -> Result<(), String> {
+    pub fn check(&mut self, header: &FrameHeader, handles: &[HandlePose], rate: f64) -> Result<(), Box<FrameFault>> {
         let previous = self.previous.replace(*header);
         let result = self.stands_as_it_says(header, handles).and_then(|()| match &previous {
             Some(before) if before.run_id == header.run_id && before.sequence + 1 == header.sequence => {
@@ -46,8 +55,7 @@ impl ConformanceCheck {
         if header.playback_state() != Some(PlaybackState::Playing) {
             self.still.extend_from_slice(handles);
         }
-        let with_frame = |fault: &str| format!("{fault}: {header:?} after {previous:?}");
-        result.map_err(with_frame)
+        result.map_err(|fault| Box::new(FrameFault { fault, frame: *header, previous }))
     }
 
     /// Checks that playback state, time scale and velocities are consistent.

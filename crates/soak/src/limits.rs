@@ -1,5 +1,7 @@
 //! The limits of a soak test, and their notation.
 
+use bench_dragon_messages::sentence::Expected;
+
 /// The limits of a soak test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
@@ -17,29 +19,29 @@ pub struct Limits {
 ///
 /// # Errors
 /// The expected notation, if the text is no share from 0 to 1.
-pub fn share(text: &str) -> Result<f64, String> {
+pub fn share(text: &str) -> Result<f64, Expected> {
     let (digits, unit) = text.trim().strip_suffix('%').map_or((text.trim(), 1.0), |digits| (digits, 0.01));
     let share = digits.trim().parse::<f64>().map_or(f64::NAN, |number| number * unit);
-    if (0.0..=1.0).contains(&share) { Ok(share) } else { Err("expected a share such as 0.01% or 0.0001".to_owned()) }
+    if (0.0..=1.0).contains(&share) { Ok(share) } else { Err(Expected("a share such as 0.01% or 0.0001".into())) }
 }
 
 /// Parses a short time: `500ns`, `200us`, `1.5ms`, `1s`. Returns nanoseconds.
 ///
 /// # Errors
 /// The expected notation, if the text is no such time.
-pub fn nanoseconds(text: &str) -> Result<u64, String> {
+pub fn nanoseconds(text: &str) -> Result<u64, Expected> {
     // Seconds come last: every other unit ends with the same letter.
     let units = [("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)];
-    quantity(text, &units).ok_or_else(|| "expected a time with its unit such as 200us or 1ms".to_owned())
+    quantity(text, &units).ok_or(Expected("a time with its unit such as 200us or 1ms".into()))
 }
 
 /// Parses a size: `800B`, `500kB`, `1MB`, `2GB`. Returns bytes.
 ///
 /// # Errors
 /// The expected notation, if the text is no such size.
-pub fn bytes(text: &str) -> Result<u64, String> {
+pub fn bytes(text: &str) -> Result<u64, Expected> {
     let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("B", 1.0)];
-    quantity(text, &units).ok_or_else(|| "expected a size with its unit such as 500kB or 1MB".to_owned())
+    quantity(text, &units).ok_or(Expected("a size with its unit such as 500kB or 1MB".into()))
 }
 
 /// Parses a number of at most 10^18 in one of these units.

@@ -186,7 +186,7 @@ impl Observer {
         self.seen.times_checked += 1;
         if let Err(fault) = self.conformance.check(header, handles, status.rate) {
             self.seen.disobedient += 1;
-            self.seen.disobedience.get_or_insert(fault);
+            self.seen.disobedience.get_or_insert_with(|| fault.to_string());
         }
     }
 

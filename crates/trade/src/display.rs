@@ -7,7 +7,7 @@
 
 use serde::Serialize;
 
-use super::{Subject, pareto_front, worse};
+use super::{Subject, TradeError, pareto_front, worse};
 use bench_dragon_client::hermite::HermiteReader;
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{FrameHeader, HandlePose};
@@ -122,13 +122,13 @@ pub struct DisplayMeasurement {
 /// Measures every reader at every rate on `subject`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A sentence for a dragon without a solution at a sample before its end, or a measurement that `progress` has stopped.
+/// The dragon has no solution at a sample before its end, or `progress` has stopped the measurement.
 pub fn measure(
     subject: &Subject,
     timeline: &Timeline,
     display: Display,
     progress: Progress<'_>,
-) -> Result<Vec<DisplayMeasurement>, String> {
+) -> Result<Vec<DisplayMeasurement>, TradeError> {
     let end = last_frame_time(timeline.show_end(subject.stops_at_contact).time);
     let truth = truth(subject, &display_times(end, display.rate))?;
     let noise = noise(subject, &truth);
@@ -195,8 +195,8 @@ struct DisplaySample {
 }
 
 /// Returns the safe solver's chains. The chains always have velocities, which correct for the rounding of the clock.
-fn truth(subject: &Subject, times: &[f64]) -> Result<Vec<DisplaySample>, String> {
-    let exact = subject.motion.with_method(Method::Newton).map_err(|error| error.to_string())?;
+fn truth(subject: &Subject, times: &[f64]) -> Result<Vec<DisplaySample>, TradeError> {
+    let exact = subject.motion.with_method(Method::Newton)?;
     let mut solver = exact.solver(Velocities::Computed).solver;
     let solved = times.iter().map(|&time| {
         let mut chain = Chain::new(subject.motion.team().handles());
@@ -206,8 +206,8 @@ fn truth(subject: &Subject, times: &[f64]) -> Result<Vec<DisplaySample>, String>
     solved.collect()
 }
 
-fn solve(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), String> {
-    solve_at_or_just_before(solver, time, chain).map(|_| ()).map_err(|none| format!("the chain at {time} s: {none}"))
+fn solve(solver: &mut dyn Solver, time: f64, chain: &mut Chain) -> Result<(), TradeError> {
+    solve_at_or_just_before(solver, time, chain).map(|_| ()).map_err(|none| TradeError::NoChain(time, none))
 }
 
 /// Returns the metres below which errors are rounding, as [`super::Measurement::noise`].
@@ -248,7 +248,7 @@ impl Stream {
     }
 
     /// Returns the greatest error of a reader over all samples, in both precisions, in metres.
-    fn errors(&mut self, reader: Reader, delay: f64, truth: &[DisplaySample]) -> Result<[f64; 2], String> {
+    fn errors(&mut self, reader: Reader, delay: f64, truth: &[DisplaySample]) -> Result<[f64; 2], TradeError> {
         let mut worst = [0.0; 2];
         let mut shown = Vec::new();
         for sample in truth {
@@ -267,7 +267,7 @@ impl Stream {
     }
 
     /// Returns the frame of a tick.
-    fn frame(&mut self, tick: u64) -> Result<Published, String> {
+    fn frame(&mut self, tick: u64) -> Result<Published, TradeError> {
         if let Some(frame) = self.latest.iter().flatten().find(|frame| frame.tick == tick) {
             return Ok(frame.clone());
         }

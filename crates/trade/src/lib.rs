@@ -15,14 +15,15 @@ use serde::Serialize;
 
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Progress;
+use bench_dragon_motion::linkage::NoFollower;
 use bench_dragon_motion::model::Point;
 use bench_dragon_motion::model::board::Board;
 use bench_dragon_motion::model::separation::separation_board_board;
 use bench_dragon_motion::solve::paper::PaperRules;
-use bench_dragon_motion::solve::reference::{Reference, ReferenceHandle};
+use bench_dragon_motion::solve::reference::{Reference, ReferenceError, ReferenceHandle};
 use bench_dragon_motion::solve::{Chain, Solver, Velocities};
 use bench_dragon_motion::timeline::Timeline;
-use bench_dragon_motion::{Method, Motion};
+use bench_dragon_motion::{Method, Motion, MotionError};
 
 /// The number of samples of the error, spread evenly over the motion before its last second.
 pub const SPREAD_SAMPLES: usize = 200;
@@ -34,6 +35,29 @@ const WARM_UP_FRAMES: usize = 4;
 const TIMED_FRAMES: usize = 26_000;
 /// Limit of the time to measure one solver, in seconds.
 const TIMING_LIMIT: f64 = 0.7;
+
+/// The reason for a missing measurement.
+#[derive(Debug, thiserror::Error)]
+pub enum TradeError {
+    /// There is no reference.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The reference has no solution at this simulated time, in seconds.
+    #[error("the reference at {0} s: {1}")]
+    NoReference(f64, NoFollower),
+    /// The second thread of the reference has panicked.
+    #[error("the reference's second thread panicked")]
+    Panicked,
+    /// The exact motion is impossible.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// A solver has no solution at this simulated time, in seconds.
+    #[error("the chain at {0} s: {1}")]
+    NoChain(f64, NoFollower),
+    /// The receiver of the progress has stopped it.
+    #[error("the measurement was stopped")]
+    Stopped,
+}
 
 /// The cost and the error of one solver.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -123,8 +147,8 @@ struct ReferenceSample {
 /// Measures every solver on `subject`. `progress` receives the share of the work that is done, from 0 to 1.
 ///
 /// # Errors
-/// A sentence if the reference has no solution, or `progress` has stopped the measurement.
-pub fn measure(subject: &Subject, timeline: &Timeline, progress: Progress<'_>) -> Result<Vec<Measurement>, String> {
+/// The reference has no solution, or `progress` has stopped the measurement.
+pub fn measure(subject: &Subject, timeline: &Timeline, progress: Progress<'_>) -> Result<Vec<Measurement>, TradeError> {
     let end = timeline.end().time;
     let samples = truth(subject, end, &mut |share| progress(0.5 * share))?;
     let contact = contact_errors(subject, timeline)?;
@@ -145,19 +169,19 @@ pub fn measure(subject: &Subject, timeline: &Timeline, progress: Progress<'_>) -
 }
 
 /// Converts the answer of a progress's receiver.
-fn go_on(answer: ControlFlow<()>) -> Result<(), String> {
-    if answer.is_break() { Err("the measurement was stopped".to_owned()) } else { Ok(()) }
+fn go_on(answer: ControlFlow<()>) -> Result<(), TradeError> {
+    if answer.is_break() { Err(TradeError::Stopped) } else { Ok(()) }
 }
 
 /// Returns the high-precision reference of a dragon.
-fn reference(subject: &Subject) -> Result<Reference, String> {
+fn reference(subject: &Subject) -> Result<Reference, TradeError> {
     let motion = &subject.motion;
-    Reference::new(*motion.team(), motion.description(), motion.head_speed())
+    Ok(Reference::new(*motion.team(), motion.description(), motion.head_speed())?)
 }
 
 /// Returns the reference at all samples. At the lock itself the solution is lost in rounding, so the last sample is a
 /// thousandth of a second earlier.
-fn truth(subject: &Subject, end: f64, progress: Progress<'_>) -> Result<Vec<ReferenceSample>, String> {
+fn truth(subject: &Subject, end: f64, progress: Progress<'_>) -> Result<Vec<ReferenceSample>, TradeError> {
     let last_second = 1f64.min(0.5 * end);
     let spread = (0..SPREAD_SAMPLES).map(|k| (end - last_second) * k as f64 / SPREAD_SAMPLES as f64);
     let last = (0..LAST_SECOND_SAMPLES)
@@ -174,16 +198,16 @@ fn truth(subject: &Subject, end: f64, progress: Progress<'_>) -> Result<Vec<Refe
         let first = samples(subject, first, progress);
         is_stopped.store(first.is_err(), Ordering::Relaxed);
         let mut all = first?;
-        all.extend(second.join().map_err(|_| "the reference's second thread panicked".to_owned())??);
+        all.extend(second.join().map_err(|_| TradeError::Panicked)??);
         Ok(all)
     })
 }
 
-fn samples(subject: &Subject, times: &[f64], progress: Progress<'_>) -> Result<Vec<ReferenceSample>, String> {
+fn samples(subject: &Subject, times: &[f64], progress: Progress<'_>) -> Result<Vec<ReferenceSample>, TradeError> {
     let mut reference = reference(subject)?;
     let mut samples = Vec::with_capacity(times.len());
     for &time in times {
-        let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
+        let handles = reference.handles(time).map_err(|none| TradeError::NoReference(time, none))?;
         samples.push(ReferenceSample { time, handles });
         go_on(progress(samples.len() as f64 / times.len() as f64))?;
     }
@@ -210,7 +234,7 @@ struct ContactErrors {
 
 /// Returns the errors of the contact's time. The exact motion's error is the gap of the two boards in the reference at
 /// that time, divided by the closing speed. Returns `None` without a contact, or if the contact is at the very start.
-fn contact_errors(subject: &Subject, timeline: &Timeline) -> Result<Option<ContactErrors>, String> {
+fn contact_errors(subject: &Subject, timeline: &Timeline) -> Result<Option<ContactErrors>, TradeError> {
     let Some(contact) = timeline.find(EventKind::Contact) else { return Ok(None) };
     let (Some(a), Some(b)) = (contact.event.bench_a, contact.event.bench_b) else { return Ok(None) };
     let time = contact.event.travelled / subject.motion.head_speed();
@@ -219,7 +243,7 @@ fn contact_errors(subject: &Subject, timeline: &Timeline) -> Result<Option<Conta
     }
     let mut reference = reference(subject)?;
     let mut gap = |time: f64| {
-        let handles = reference.handles(time).map_err(|none| format!("the reference at {time} s: {none}"))?;
+        let handles = reference.handles(time).map_err(|none| TradeError::NoReference(time, none))?;
         let board = |bench: u32| {
             let point = |handle: usize| Point::new(handles[handle].x.high, handles[handle].y.high);
             let (front, rear) = (point(bench as usize), point(bench as usize + 1));
@@ -230,7 +254,7 @@ fn contact_errors(subject: &Subject, timeline: &Timeline) -> Result<Option<Conta
                 subject.motion.team().board_width(bench as usize),
             )
         };
-        Ok::<f64, String>(separation_board_board(&board(a), &board(b)))
+        Ok::<f64, TradeError>(separation_board_board(&board(a), &board(b)))
     };
     let interval = 1e-7 * time;
     let closing = (gap(time - interval)? - gap(time)?) / interval;

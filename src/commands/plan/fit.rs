@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use bench_dragon::fit::judge::{Part, What};
 use bench_dragon::fit::line::FitLine;
 use bench_dragon::fit::search::{FitError, Fitted, Vary, fit};
+use bench_dragon::messages::sentence::Expected;
 use bench_dragon::motion::ground::BOUNDARY;
 use bench_dragon::show::scene::{Scene, SceneText, printable};
 
@@ -37,16 +38,16 @@ const MOST_FIELDS: usize = 8;
 /// Returns a number that may change, from text such as `path.pitch=0.5..0.7`.
 ///
 /// # Errors
-/// A sentence about text of another form.
-fn vary(text: &str) -> Result<Vary, String> {
+/// The text has another form.
+fn vary(text: &str) -> Result<Vary, Expected> {
     let (field, range) = text.split_once('=').map_or((text, None), |(field, range)| (field, Some(range)));
     let numbers = |range: &str| {
         let (least, greatest) = range.split_once("..")?;
         let range: (f64, f64) = (least.trim().parse().ok()?, greatest.trim().parse().ok()?);
         (range.0.is_finite() && range.1.is_finite() && range.0 < range.1).then_some(range)
     };
-    let expected = "expected a field and perhaps its range, the lesser number first, as in path.pitch=0.5..0.7";
-    let range = range.map(|range| numbers(range).ok_or_else(|| expected.to_owned())).transpose()?;
+    let expected = "a field and perhaps its range, the lesser number first, as in path.pitch=0.5..0.7";
+    let range = range.map(|range| numbers(range).ok_or(Expected(expected.into()))).transpose()?;
     Ok(Vary { field: field.trim().to_owned(), range })
 }
 

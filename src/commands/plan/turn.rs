@@ -13,7 +13,7 @@ use super::{Spacing, are_too_near, given_up, warn_of_route};
 /// Plans the turn.
 pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> Result<(), CommandError> {
     if let Some(ratio) = arc_ratio {
-        Accepted::ARC_RATIO.check("--arc-ratio", ratio).map_err(CommandError::BadInput)?;
+        Accepted::ARC_RATIO.check("--arc-ratio", ratio)?;
     }
     let (scene, motion) = common.scene_text()?.parse_only()?;
     let clearance = spacing.required(&scene)?;

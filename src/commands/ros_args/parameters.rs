@@ -57,6 +57,43 @@ impl Value {
     }
 }
 
+/// A file of parameters that is not understood.
+#[derive(Debug, thiserror::Error)]
+pub enum ParametersError {
+    /// The file of this name cannot be read.
+    #[error("{0}: {1}, expected a file of parameters (YAML)")]
+    Unread(String, #[source] std::io::Error),
+    /// The text of the file of this name is not understood.
+    #[error("{0}, {1}")]
+    Document(String, #[source] DocumentError),
+}
+
+/// A YAML text that has no parameters of nodes.
+#[derive(Debug, thiserror::Error)]
+pub enum DocumentError {
+    /// The text is no YAML.
+    #[error("line {line}: {problem}")]
+    Yaml {
+        /// The line, from 1.
+        line: usize,
+        /// The parser's words.
+        problem: String,
+    },
+    /// The YAML has another form. The line is counted from 1.
+    #[error("line {0}, expected names of nodes, below each {PARAMETERS}, and below that NAME: VALUE")]
+    Form(usize),
+    /// A key is no name of a node.
+    #[error("line {line}: \"{word}\" in \"{above}\" is no name of a node")]
+    NodeName {
+        /// The line, from 1.
+        line: usize,
+        /// The wrong word of the name.
+        word: String,
+        /// The name.
+        above: String,
+    },
+}
+
 /// A parameter of a node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
@@ -88,10 +125,11 @@ impl Parameters {
     /// Adds the parameters of a file.
     ///
     /// # Errors
-    /// A sentence on the file or its line.
-    pub fn add_file(&mut self, path: &str) -> Result<(), String> {
-        let text = read(path).map_err(|error| format!("{path}: {error}, expected a file of parameters (YAML)"))?;
-        Document::new(&text).read(path, self).map_err(|error| format!("{path}, {error}"))
+    /// [`ParametersError`]
+    pub fn add_file(&mut self, path: &str) -> Result<(), ParametersError> {
+        let text = read(path).map_err(|error| ParametersError::Unread(path.to_owned(), error))?;
+        let read = Document::new(&text).read(path, self);
+        read.map_err(|error| ParametersError::Document(path.to_owned(), error))
     }
 
     /// Returns the parameters of the sections that match a node's full name. The last of a name counts.
@@ -154,23 +192,25 @@ impl<'text> Document<'text> {
         Self { parser: Parser::new_from_str(text), line: 1 }
     }
 
-    fn next(&mut self) -> Result<Event<'text>, String> {
+    fn next(&mut self) -> Result<Event<'text>, DocumentError> {
         match self.parser.next_event() {
             None => Ok(Event::StreamEnd),
             Some(Ok((event, span))) => {
                 self.line = span.start.line();
                 Ok(event)
             }
-            Some(Err(error)) => Err(format!("line {}: {}", error.marker().line(), error.info())),
+            Some(Err(error)) => {
+                Err(DocumentError::Yaml { line: error.marker().line(), problem: error.info().to_owned() })
+            }
         }
     }
 
-    fn unexpected(&self) -> String {
-        format!("line {}, expected names of nodes, below each {PARAMETERS}, and below that NAME: VALUE", self.line)
+    fn unexpected(&self) -> DocumentError {
+        DocumentError::Form(self.line)
     }
 
     /// Reads the only value of a text.
-    fn value(&mut self) -> Result<Value, String> {
+    fn value(&mut self) -> Result<Value, DocumentError> {
         loop {
             match self.next()? {
                 Event::StreamStart | Event::DocumentStart(_) => (),
@@ -182,7 +222,7 @@ impl<'text> Document<'text> {
     }
 
     /// Reads a file.
-    fn read(mut self, path: &str, into: &mut Parameters) -> Result<(), String> {
+    fn read(mut self, path: &str, into: &mut Parameters) -> Result<(), DocumentError> {
         loop {
             match self.next()? {
                 Event::StreamEnd => return Ok(()),
@@ -195,7 +235,7 @@ impl<'text> Document<'text> {
     }
 
     /// Reads a mapping whose keys are namespaces, names of nodes, or [`PARAMETERS`] of the node `above`.
-    fn nodes(&mut self, above: &str, levels: usize, path: &str, into: &mut Parameters) -> Result<(), String> {
+    fn nodes(&mut self, above: &str, levels: usize, path: &str, into: &mut Parameters) -> Result<(), DocumentError> {
         loop {
             let key = match self.next()? {
                 Event::MappingEnd => return Ok(()),
@@ -212,7 +252,11 @@ impl<'text> Document<'text> {
                 if let Some(word) =
                     words.into_iter().find(|word| word.is_empty() || !(matches!(*word, "*" | "**") || is_word(word)))
                 {
-                    return Err(format!("line {}: \"{word}\" in \"{above}\" is no name of a node", self.line));
+                    return Err(DocumentError::NodeName {
+                        line: self.line,
+                        word: word.to_owned(),
+                        above: above.to_owned(),
+                    });
                 }
                 self.parameters("", levels - 1, path, into.section(above))?;
                 continue;
@@ -223,7 +267,13 @@ impl<'text> Document<'text> {
     }
 
     /// Reads a mapping of parameters. A mapping among them is a namespace of parameters.
-    fn parameters(&mut self, above: &str, levels: usize, path: &str, into: &mut Vec<Parameter>) -> Result<(), String> {
+    fn parameters(
+        &mut self,
+        above: &str,
+        levels: usize,
+        path: &str,
+        into: &mut Vec<Parameter>,
+    ) -> Result<(), DocumentError> {
         loop {
             let key = match self.next()? {
                 Event::MappingEnd => return Ok(()),
@@ -251,7 +301,7 @@ impl<'text> Document<'text> {
     }
 
     /// Reads to the end of a list of scalars.
-    fn skip_list(&mut self) -> Result<(), String> {
+    fn skip_list(&mut self) -> Result<(), DocumentError> {
         loop {
             match self.next()? {
                 Event::SequenceEnd => return Ok(()),

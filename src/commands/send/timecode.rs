@@ -14,7 +14,8 @@ use bench_dragon::chase::master::{MasterClock, MasterSummary, Sink};
 use bench_dragon::chase::timecode::FrameRate;
 use bench_dragon::client::feed::Delivery;
 use bench_dragon::client::polling::poll_until;
-use bench_dragon::outputs::send::network::{Outlet, Route, destination};
+use bench_dragon::messages::sentence::Expected;
+use bench_dragon::outputs::send::network::{DestinationError, Outlet, Route, destination};
 use nix::poll::{PollFd, PollFlags, PollTimeout};
 
 use super::super::chase::ScheduleArguments;
@@ -66,12 +67,12 @@ struct ClockArguments {
     fps: FrameRate,
 }
 
-fn artnet_destination(text: &str) -> Result<SocketAddrV4, String> {
+fn artnet_destination(text: &str) -> Result<SocketAddrV4, DestinationError> {
     destination(text, Some(PORT))
 }
 
-fn fps(text: &str) -> Result<FrameRate, String> {
-    text.parse().map_err(|_| "expected 23.976, 24, 25, 29.97, 29.97df or 30".to_owned())
+fn fps(text: &str) -> Result<FrameRate, Expected> {
+    text.parse().map_err(|_| Expected("23.976, 24, 25, 29.97, 29.97df or 30".into()))
 }
 
 /// Sends until a signal comes, or until the reader is gone.

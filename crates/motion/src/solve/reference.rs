@@ -26,6 +26,17 @@ use crate::model::double_double::DoubleDouble;
 use crate::model::spiral::Direction;
 use crate::model::team::Team;
 
+/// The reason for a missing reference.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ReferenceError {
+    /// There is no memory for the constants pi and ln 2.
+    #[error("the high-precision reference: {0:?}")]
+    NoMemory(astro_float::Error),
+    /// The path has tight bends and is too long.
+    #[error("the path has tight bends and is too long for the reference with 38 digits")]
+    TooLong,
+}
+
 /// One handle of the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceHandle {
@@ -72,8 +83,8 @@ impl Turn {
     /// Returns the arcs, to 30 digits.
     ///
     /// # Errors
-    /// A sentence if there is no memory for the constants pi and ln 2.
-    pub fn arcs(self) -> Result<TurnArcs, String> {
+    /// [`ReferenceError::NoMemory`]
+    pub fn arcs(self) -> Result<TurnArcs, ReferenceError> {
         curve::arcs_of_turn(self)
     }
 }
@@ -83,8 +94,8 @@ impl Piece {
     /// that is known.
     ///
     /// # Errors
-    /// A sentence if there is no memory for the constants pi and ln 2.
-    pub fn turns_of_metres(self, metres: f64, rough: f64) -> Result<DoubleDouble, String> {
+    /// [`ReferenceError::NoMemory`]
+    pub fn turns_of_metres(self, metres: f64, rough: f64) -> Result<DoubleDouble, ReferenceError> {
         curve::turns_of_metres(self, metres, rough)
     }
 }
@@ -111,11 +122,11 @@ impl Reference {
     /// along the curve.
     ///
     /// # Errors
-    /// A sentence if there is no memory for the constants pi and ln 2, or if a path with tight bends is too long.
-    pub fn new(team: Team, description: &PathDescription, head_speed: f64) -> Result<Self, String> {
+    /// [`ReferenceError`]
+    pub fn new(team: Team, description: &PathDescription, head_speed: f64) -> Result<Self, ReferenceError> {
         let path = RealPath::new(description)?;
         if [0, 1, team.benches - 1].into_iter().any(|bench| trace::is_too_long(&path, team.link(bench))) {
-            return Err("the path has tight bends and is too long for the reference with 38 digits".to_owned());
+            return Err(ReferenceError::TooLong);
         }
         Ok(Self { team, path, head_speed, traces: Vec::new() })
     }

@@ -75,7 +75,7 @@ pub(super) async fn serve(socket: WebSocket, server: Server, _place: Place) {
                     Message::Text(request) => match &session {
                         Some(open) => match open.request(request.to_string()) {
                             Ok(()) => continue,
-                            Err(sentence) => refused(&sentence),
+                            Err(busy) => refused(&busy.to_string()),
                         },
                         None => {
                             let allowed = is_token(&server, &request);

@@ -3,6 +3,8 @@
 
 use std::str::FromStr;
 
+use bench_dragon_messages::sentence::Expected;
+
 /// The stage's axes in the order of a vector's components: x to the right, y into the depth, and up.
 const NAMES: [&str; 3] = ["x", "y", "up"];
 
@@ -70,11 +72,10 @@ impl std::fmt::Display for Axes {
 }
 
 impl FromStr for Axes {
-    type Err = String;
+    type Err = Expected;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let refused =
-            || "expected x, y and up once each, any of them with a minus, such as x,up,y or -x,up,-y".to_owned();
+    fn from_str(text: &str) -> Result<Self, Expected> {
+        let refused = || Expected("x, y and up once each, any of them with a minus, such as x,up,y or -x,up,-y".into());
         let axis = |word: &str| {
             let (sign, name) = word.trim().strip_prefix('-').map_or((1.0, word.trim()), |name| (-1.0, name));
             let of_stage = NAMES.iter().position(|known| *known == name)?;
@@ -147,7 +148,7 @@ mod tests {
     #[test]
     fn what_is_no_three_axes_is_refused() {
         for text in ["", "x", "x,y", "x,y,x", "x,y,z", "x,y,up,up", "--x,y,up", "x;y;up"] {
-            assert!(Axes::from_str(text).unwrap_err().contains("once each"), "{text}");
+            assert!(Axes::from_str(text).unwrap_err().to_string().contains("once each"), "{text}");
         }
     }
 }

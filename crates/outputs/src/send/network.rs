@@ -7,6 +7,8 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, ToSocketAddrs, UdpSocket};
 
 use socket2::{Domain, Protocol, Socket, Type};
 
+use bench_dragon_messages::sentence::Expected;
+
 /// The route of datagrams out of this machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Route {
@@ -95,21 +97,37 @@ impl Outlet {
     }
 }
 
+/// A text that names no destination.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DestinationError {
+    /// The text has another form.
+    #[error(transparent)]
+    Form(Expected),
+    /// There is no host of this name.
+    #[error("{0:?} is the name of no host, {1}")]
+    NoHost(String, Expected),
+    /// The host of this name has no IPv4 address.
+    #[error("{0:?} has no IPv4 address, {1}")]
+    NoAddress(String, Expected),
+}
+
 /// Returns the address of `HOST:PORT`, or of `HOST` if there is a usual port.
 ///
 /// # Errors
-/// A sentence, if the text names no IPv4 address.
-pub fn destination(text: &str, usual_port: Option<u16>) -> Result<SocketAddrV4, String> {
-    let expected = if usual_port.is_some() { "an address such as 10.0.0.5 or desk.local:56565" } else { "HOST:PORT" };
+/// The text names no IPv4 address.
+pub fn destination(text: &str, usual_port: Option<u16>) -> Result<SocketAddrV4, DestinationError> {
+    let form = if usual_port.is_some() { "an address such as 10.0.0.5 or desk.local:56565" } else { "HOST:PORT" };
+    let expected = Expected(form.into());
     let (host, port) = match text.rsplit_once(':') {
         Some((host, port)) => (host, port.parse().ok()),
         None => (text, usual_port),
     };
-    let port = port.filter(|port| *port > 0).ok_or_else(|| format!("expected {expected}"))?;
-    let refused = |why: &str| format!("{host:?} {why}, expected {expected}");
-    let addresses = (host, port).to_socket_addrs().map_err(|_| refused("is the name of no host"))?;
+    let Some(port) = port.filter(|port| *port > 0) else { return Err(DestinationError::Form(expected)) };
+    let Ok(addresses) = (host, port).to_socket_addrs() else {
+        return Err(DestinationError::NoHost(host.to_owned(), expected));
+    };
     let of_v4 = |address| if let SocketAddr::V4(address) = address { Some(address) } else { None };
-    addresses.filter_map(of_v4).next().ok_or_else(|| refused("has no IPv4 address"))
+    addresses.filter_map(of_v4).next().ok_or_else(|| DestinationError::NoAddress(host.to_owned(), expected))
 }
 
 #[cfg(test)]
@@ -125,7 +143,7 @@ mod tests {
         for (text, port) in
             [("10.0.0.5", None), ("10.0.0.5:0", None), ("10.0.0.5:x", None), ("", Some(1)), ("::1", Some(1))]
         {
-            assert!(found(text, port).unwrap_err().contains("expected "), "{text}");
+            assert!(found(text, port).unwrap_err().to_string().contains("expected "), "{text}");
         }
     }
 }

@@ -4,6 +4,7 @@
 use std::str::FromStr;
 
 use super::psn::TrackerName;
+use bench_dragon_messages::sentence::Expected;
 
 /// A choice of handles that holds for any team.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,9 +47,9 @@ impl Selection {
 }
 
 impl FromStr for Selection {
-    type Err = String;
+    type Err = Expected;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, Expected> {
         let number = |text: &str| text.trim().parse::<u32>().ok().filter(|number| *number > 0);
         let part = |word: &str| match word.trim() {
             "all" => Some(Part::All),
@@ -60,9 +61,11 @@ impl FromStr for Selection {
                 (first <= last).then_some(Part::Range(first, last))
             }
         };
-        text.split(',').map(part).collect::<Option<_>>().map(Self).ok_or_else(|| {
-            "expected all, head, tail, or handles counted from 1, such as 1,2,9 or head,20-40,tail".to_owned()
-        })
+        text.split(',')
+            .map(part)
+            .collect::<Option<_>>()
+            .map(Self)
+            .ok_or(Expected("all, head, tail, or handles counted from 1, such as 1,2,9 or head,20-40,tail".into()))
     }
 }
 
@@ -154,7 +157,7 @@ mod tests {
         assert_eq!((chosen("300", 224), "2,300".parse::<Selection>().unwrap().beyond(224)), (vec![], Some(300)));
         assert_eq!("all,224".parse::<Selection>().unwrap().beyond(224), None);
         for text in ["", "0", "-1", "3-2", "1,,2", "heads", "1.5", "4294967296", "all head"] {
-            assert!(text.parse::<Selection>().unwrap_err().contains("counted from 1"), "{text}");
+            assert!(text.parse::<Selection>().unwrap_err().to_string().contains("counted from 1"), "{text}");
         }
     }
 

@@ -132,7 +132,7 @@ impl<'a> Visitor<'a> {
                 Some(refused(&id, "commands need the token of the address that view printed"))
             }
             (Request::Command { command, value, id }, Some(authorization)) => match action(&command, value) {
-                Err(sentence) => Some(refused(&id, &sentence)),
+                Err(error) => Some(refused(&id, &error.to_string())),
                 Ok(action) => self.pass_on(authorization, id, action),
             },
         }
@@ -172,20 +172,31 @@ fn expected() -> String {
     )
 }
 
+/// A command that is not understood.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+enum ActionError {
+    /// There is no such command, or it lacks its value.
+    #[error("{}", expected())]
+    Unknown,
+    /// The command of this name has another number of periods.
+    #[error("{0} is refused: expected a whole number of periods from 1 to {MOST_PERIODS}")]
+    Periods(&'static str),
+}
+
 /// Returns the action of a command's name and value.
-fn action(name: &str, value: Option<f64>) -> Result<Action, String> {
+fn action(name: &str, value: Option<f64>) -> Result<Action, ActionError> {
     if name == "toggle" {
         return Ok(Action::Toggle);
     }
-    let entry = Command::named(name).ok_or_else(expected)?;
+    let entry = Command::named(name).ok_or(ActionError::Unknown)?;
     let value = match value {
-        None if needs_value(entry) => return Err(expected()),
+        None if needs_value(entry) => return Err(ActionError::Unknown),
         None if entry.value == CommandValue::Periods => 1.0,
         value => value.unwrap_or_default(),
     };
     match Command::of_number(entry.number, value) {
         Ok(command) => Ok(Action::Send(command)),
-        Err(_) => Err(format!("{name} is refused: expected a whole number of periods from 1 to {MOST_PERIODS}")),
+        Err(_) => Err(ActionError::Periods(entry.name)),
     }
 }
 
@@ -227,7 +238,7 @@ mod tests {
         assert_eq!(action("toggle", None), Ok(Action::Toggle));
         let sentence = "expected JSON such as {\"command\":\"seek\",\"value\":400}; the commands are toggle, state, pause, \
                         resume, rate, seek, step, restart, hold, release, go; rate and seek have a value";
-        assert_eq!(action("seek", None), Err(sentence.to_owned()));
+        assert_eq!(action("seek", None).unwrap_err().to_string(), sentence);
         assert!(action("rate", None).is_err() && action("jump", None).is_err() && action("step", Some(0.5)).is_err());
     }
 }

@@ -3,16 +3,18 @@
 use std::net::IpAddr;
 use std::str::FromStr;
 
+use bench_dragon_messages::sentence::Expected;
+
 /// The origin of an admitted page, as browsers send it in `Origin`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AllowedOrigin(String);
 
 impl FromStr for AllowedOrigin {
-    type Err = String;
+    type Err = Expected;
 
     /// Parses an origin, with or without a slash at the end, with or without the scheme's usual port.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let refused = || "expected an origin such as https://show.example or http://localhost:5173, or null".to_owned();
+    fn from_str(text: &str) -> Result<Self, Expected> {
+        let refused = || Expected("an origin such as https://show.example or http://localhost:5173, or null".into());
         let plain = text.trim().to_ascii_lowercase();
         if plain == "null" {
             return Ok(Self(plain));

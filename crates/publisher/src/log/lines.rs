@@ -19,6 +19,25 @@ const CHECK: &str = ",\"check\":\"";
 const CHECK_DIGITS: usize = 16;
 const CHECK_END: &str = "\"}";
 
+/// A line that is damaged or forged.
+#[derive(Debug, thiserror::Error)]
+pub enum LineError {
+    /// The line has no check.
+    #[error("it does not end in a check, expected a line of a log")]
+    NoCheck,
+    /// The check is wrong.
+    #[error("its check is {found}, expected {expected}: it, or a line before it, is not as it was written")]
+    Check {
+        /// The digits of the line.
+        found: String,
+        /// The digits of the bytes before them.
+        expected: String,
+    },
+    /// The text before the check is no line of a log.
+    #[error("{0}, expected a line of a log")]
+    Json(#[from] serde_json::Error),
+}
+
 /// A line without its check. Lines are in the order of ticks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
@@ -244,24 +263,20 @@ impl HashChain {
     /// Reads a line that ends with a newline.
     ///
     /// # Errors
-    /// The problem, without its place.
-    pub fn read(&mut self, text: &str) -> Result<Line, String> {
+    /// [`LineError`]
+    pub fn read(&mut self, text: &str) -> Result<Line, LineError> {
         let length = CHECK.len() + CHECK_DIGITS + CHECK_END.len() + 1;
         let body = text.len().checked_sub(length).and_then(|at| text.split_at_checked(at));
         let checked = body.filter(|(_, check)| check.starts_with(CHECK) && check.ends_with("\"}\n"));
         let Some((body, check)) = checked else {
-            return Err("it does not end in a check, expected a line of a log".to_owned());
+            return Err(LineError::NoCheck);
         };
         let expected = self.check(body);
         if check != expected {
             let digits = |check: &str| check[CHECK.len()..CHECK.len() + CHECK_DIGITS].to_owned();
-            return Err(format!(
-                "its check is {}, expected {}: it, or a line before it, is not as it was written",
-                digits(check),
-                digits(&expected)
-            ));
+            return Err(LineError::Check { found: digits(check), expected: digits(&expected) });
         }
-        serde_json::from_str(&format!("{body}}}")).map_err(|error| format!("{error}, expected a line of a log"))
+        Ok(serde_json::from_str(&format!("{body}}}"))?)
     }
 
     /// Returns the end of a line that begins with `body`: BLAKE3 over all bytes of the file before the check.

@@ -6,6 +6,7 @@
 //! second with other bits are compared with those of a [second solver](bench_dragon_show::second_solver).
 
 mod player;
+mod problem;
 
 use std::io::{BufRead, Read};
 
@@ -13,23 +14,24 @@ use serde::Serialize;
 
 use super::lines::{FORMAT, HashChain, Line, ShowLine};
 use bench_dragon_motion::solve::table::Instructions;
-use bench_dragon_show::scene::{Accepted, Scene, printable};
+use bench_dragon_show::scene::{Accepted, Scene, SceneError, printable};
 use player::Player;
+pub use problem::Problem;
 
 /// The reason why there is no verdict.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The file is no log, or is damaged.
-    #[error("line {line}: {}", printable(.problem))]
+    #[error("line {line}: {}", printable(&.problem.to_string()))]
     Line {
         /// The line, from 1.
         line: u64,
         /// The problem.
-        problem: String,
+        problem: Problem,
     },
     /// The scene in its first line cannot be read.
-    #[error("{0}")]
-    Scene(String),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] std::io::Error),
@@ -101,28 +103,28 @@ pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> R
     let mut lines = Lines { log, chain: HashChain::default(), number: 0, bytes: 0, cut: false };
     let show = match lines.next()? {
         Some(Line::Show(show)) => *show,
-        Some(_) => return Err(lines.error("expected the line of the show, {\"type\":\"show\",...}")),
-        None if lines.cut => return Err(lines.error("it is cut, expected the line of the show")),
-        None => return Err(VerifyError::Line { line: 1, problem: "the file is empty, expected a log".to_owned() }),
+        Some(_) => return Err(lines.error(Problem::NoShow)),
+        None if lines.cut => return Err(lines.error(Problem::CutShow)),
+        None => return Err(VerifyError::Line { line: 1, problem: Problem::Empty }),
     };
     let mut player = player(&show, file, &lines)?;
     let (mut complete, mut ended) = (false, false);
     while player.difference().is_none() {
         let Some(line) = lines.next()? else {
             if ended && lines.cut {
-                return Err(lines.error("it stands behind the end of the log"));
+                return Err(lines.error(Problem::AfterEnd));
             }
             break;
         };
         if ended {
-            return Err(lines.error("it stands behind the end of the log"));
+            return Err(lines.error(Problem::AfterEnd));
         }
         match line {
-            Line::Show(_) => return Err(lines.error("a second show, expected one a log")),
+            Line::Show(_) => return Err(lines.error(Problem::SecondShow)),
             Line::End { .. } | Line::Stopped { .. } => (complete, ended) = (matches!(line, Line::End { .. }), true),
             _ => {}
         }
-        player.line(lines.number, &line).map_err(|problem| lines.error(&problem))?;
+        player.line(lines.number, &line).map_err(|problem| lines.error(problem))?;
         progress(lines.bytes);
     }
     Ok(player.verdict(&show, complete, lines.cut))
@@ -131,26 +133,24 @@ pub fn verify(log: impl BufRead, file: &str, progress: &mut dyn FnMut(u64)) -> R
 /// Creates the player of a show.
 fn player<R>(show: &ShowLine, file: &str, lines: &Lines<R>) -> Result<Player, VerifyError> {
     if show.format != FORMAT {
-        return Err(lines.error(&format!("the format is {}, expected {FORMAT}", show.format)));
+        return Err(lines.error(Problem::Format(show.format)));
     }
-    let scene = show.scene_text(file).parse().map_err(|error| VerifyError::Scene(error.to_string()))?;
-    let playback = show.playback().ok_or_else(|| {
-        lines.error("on_contact and at_end are not understood, expected \"stop\" or \"continue\", \"hold\" or \"loop\"")
-    })?;
+    let scene = show.scene_text(file).parse()?;
+    let playback = show.playback().ok_or_else(|| lines.error(Problem::Playback))?;
     let numbers = [
         (Accepted::RATE, "rate", playback.rate),
         (Accepted::TIME_SCALE, "time_scale", playback.time_scale),
         (Accepted::END_HOLD, "end_hold", playback.end_hold),
     ];
     for (accepted, name, value) in numbers {
-        accepted.check(name, value).map_err(|sentence| lines.error(&sentence))?;
+        accepted.check(name, value).map_err(|error| lines.error(error))?;
     }
     let scene = match show.arithmetic.sets() {
         Some(sets) => with_instructions(scene, &sets),
         None => scene,
     };
     let player = Player::new(&scene, playback, show.arithmetic.is_available());
-    player.map_err(|error| lines.error(&error.to_string()))
+    player.map_err(|error| lines.error(error))
 }
 
 /// Returns the scene computed with these instructions, one set for each dragon.
@@ -169,8 +169,8 @@ struct Lines<R> {
 }
 
 impl<R> Lines<R> {
-    fn error(&self, problem: &str) -> VerifyError {
-        VerifyError::Line { line: self.number, problem: problem.to_owned() }
+    fn error(&self, problem: impl Into<Problem>) -> VerifyError {
+        VerifyError::Line { line: self.number, problem: problem.into() }
     }
 }
 
@@ -185,15 +185,14 @@ impl<R: BufRead> Lines<R> {
         self.number += 1;
         self.bytes += read as u64;
         if bytes.last() != Some(&b'\n') && read as u64 == LONGEST_LINE {
-            return Err(self.error(&format!("it is longer than {LONGEST_LINE} bytes, expected a line of a log")));
+            return Err(self.error(Problem::TooLong(LONGEST_LINE)));
         }
         if bytes.last() != Some(&b'\n') {
             self.cut = true;
             return Ok(None);
         }
-        let text =
-            std::str::from_utf8(&bytes).map_err(|_| self.error("it is not UTF-8 text, expected a line of a log"))?;
-        let line = self.chain.read(text).map_err(|problem| self.error(&problem))?;
+        let text = std::str::from_utf8(&bytes).map_err(|_| self.error(Problem::NotText))?;
+        let line = self.chain.read(text).map_err(|error| self.error(error))?;
         Ok(Some(line))
     }
 }

@@ -19,9 +19,9 @@ mod queues;
 
 use std::time::{Duration, Instant};
 
-use ::iceoryx2::port::SendError;
 use ::iceoryx2::port::notifier::Notifier;
 use ::iceoryx2::port::update_connections::UpdateConnections;
+use ::iceoryx2::port::{LoanError, SendError};
 use ::iceoryx2::prelude::*;
 use ::iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
 use ::iceoryx2::service::port_factory::event;
@@ -254,7 +254,7 @@ impl SharedMemoryPublisher {
         Ok(Self { poses, poses_32, alerts, cues, stage, scene, tick, tick_service, _node: node })
     }
 
-    fn send_frame(&self, Outgoing { header, chain, .. }: Outgoing<'_>) -> Result<(), String> {
+    fn send_frame(&self, Outgoing { header, chain, .. }: Outgoing<'_>) -> Result<(), UnsentError> {
         self.poses.send(header, handle_poses(chain))?;
         match &self.poses_32 {
             None => Ok(()),
@@ -269,13 +269,24 @@ impl SharedMemoryPublisher {
     }
 }
 
+/// The reason why a message is not sent.
+#[derive(Debug, thiserror::Error)]
+enum UnsentError {
+    /// The port has no memory for it.
+    #[error(transparent)]
+    Loan(#[from] LoanError),
+    /// The port does not deliver it.
+    #[error(transparent)]
+    Send(#[from] SendError),
+}
+
 /// Sends messages if there is a service for them.
 fn send_all<Message: ZeroCopySend + std::fmt::Debug + Copy + 'static>(
     service: &mut Option<Repeated<Message>>,
     messages: &[Message],
-) -> Result<(), String> {
+) -> Result<(), UnsentError> {
     let Some(service) = service else { return Ok(()) };
-    messages.iter().try_for_each(|message| service.send(*message)).map_err(|error| error.to_string())
+    Ok(messages.iter().try_for_each(|message| service.send(*message))?)
 }
 
 impl Publisher for SharedMemoryPublisher {
@@ -283,7 +294,7 @@ impl Publisher for SharedMemoryPublisher {
         let sent = self.send_frame(outgoing);
         let sent = sent.and_then(|()| send_all(&mut self.alerts, outgoing.alerts));
         let sent = sent.and_then(|()| send_all(&mut self.cues, outgoing.cues));
-        sent.map_err(|reason| PublishError(format!("the shared memory failed: {reason}")))?;
+        sent.map_err(|error| PublishError(format!("the shared memory failed: {error}")))?;
         // A wake-up costs a socket write per listener, several times the cost of sending.
         if self.tick_service.dynamic_config().number_of_listeners() > 0 {
             // A dead or slow listener only loses the wake-up: the frame is in its queue.

@@ -13,6 +13,21 @@ pub struct Accepted {
     pub unit: &'static str,
 }
 
+/// A number outside of its range.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "{field} is {}, expected a number from {} to {} {}",
+    sentence::number(*.number), short(.accepted.least), short(.accepted.greatest), .accepted.unit
+)]
+pub struct RangeError {
+    /// The name of the field.
+    pub field: String,
+    /// The number.
+    pub number: f64,
+    /// The range.
+    pub accepted: Accepted,
+}
+
 impl Accepted {
     /// The pitch and lengths of boards.
     pub const LENGTH: Self = Self { least: 1e-3, greatest: 1e4, unit: "metres" };
@@ -70,16 +85,13 @@ impl Accepted {
     /// Returns the number if it is in the range.
     ///
     /// # Errors
-    /// One sentence that names the field, the number and the range.
-    pub fn check(self, field: &str, number: f64) -> Result<f64, String> {
+    /// [`RangeError`]
+    pub fn check(self, field: &str, number: f64) -> Result<f64, RangeError> {
         // A comparison with NaN is false, so NaN is refused too.
         if number >= self.least && number <= self.greatest {
             Ok(number)
         } else {
-            let Self { least, greatest, unit } = self;
-            let [least, greatest] = [least, greatest].map(short);
-            let shown = sentence::number(number);
-            Err(format!("{field} is {shown}, expected a number from {least} to {greatest} {unit}"))
+            Err(RangeError { field: field.to_owned(), number, accepted: self })
         }
     }
 }

@@ -234,7 +234,8 @@ impl RawPiece {
         };
         let Piece { direction: _, pitch, radius } = spiral;
         let arcs = Turn { pitch, radius, arc_ratio }.arcs();
-        let TurnArcs { radii: [first, second], turns } = arcs.map_err(|sentence| source.field_error(at, &sentence))?;
+        let TurnArcs { radii: [first, second], turns } =
+            arcs.map_err(|error| source.field_error(at, &error.to_string()))?;
         let arcs = [
             RouteStep::Arc { side, radius: first, turns },
             RouteStep::Arc { side: side.opposite(), radius: second, turns },
@@ -287,7 +288,7 @@ impl Extent<'_> {
                 let rough = spiral.advance(first, metres).minus(first).abs() / TAU;
                 ends_before_centre(begin, rough, ("length", given), source)?;
                 let turns = begin.turns_of_metres(metres, as_turns(source, "length", given, rough)?);
-                turns.map_err(|sentence| source.field_error(given, &sentence))?
+                turns.map_err(|error| source.field_error(given, &error.to_string()))?
             }
             Self::ToRadius(given) => {
                 let to_radius = checked(source, "to_radius", given, Accepted::LENGTH)?;
@@ -345,7 +346,7 @@ fn checked(source: &Source, field: &str, value: &Spanned<f64>, accepted: Accepte
 /// Checks the turns of a piece whose extent is given in another way.
 fn as_turns(source: &Source, field: &str, given: &Spanned<f64>, turns: f64) -> Result<f64, SceneError> {
     let checked = Accepted::ARC_TURNS.check(&format!("path.pieces.{field} in turns"), turns);
-    checked.map_err(|sentence| source.field_error(given, &sentence))
+    checked.map_err(|error| source.field_error(given, &error.to_string()))
 }
 
 /// Returns the turns of an arc of some metres, to 30 digits.

@@ -83,7 +83,7 @@ impl<'a> Source<'a> {
 
     pub fn check(&self, field: &str, value: &Spanned<f64>, accepted: Accepted) -> Result<f64, SceneError> {
         self.note(value, accepted, false);
-        accepted.check(field, *value.get_ref()).map_err(|sentence| self.field_error(value, &sentence))
+        accepted.check(field, *value.get_ref()).map_err(|error| self.field_error(value, &error.to_string()))
     }
 
     /// Returns a place of the stage; by default the origin.
@@ -92,15 +92,14 @@ impl<'a> Source<'a> {
         self.note(given, Accepted::PLACE, false);
         for number in given.get_ref() {
             let checked = Accepted::PLACE.check(field, *number);
-            checked.map_err(|sentence| self.field_error(given, &sentence))?;
+            checked.map_err(|error| self.field_error(given, &error.to_string()))?;
         }
         Ok(Vector::from(*given.get_ref()))
     }
 
     pub fn check_count(&self, field: &str, value: &Spanned<i64>, accepted: Accepted) -> Result<usize, SceneError> {
         self.note(value, accepted, true);
-        let number =
-            accepted.check(field, *value.get_ref() as f64).map_err(|sentence| self.field_error(value, &sentence))?;
-        Ok(number as usize)
+        let checked = accepted.check(field, *value.get_ref() as f64);
+        Ok(checked.map_err(|error| self.field_error(value, &error.to_string()))? as usize)
     }
 }

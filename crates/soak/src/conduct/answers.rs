@@ -46,6 +46,30 @@ impl ShowFacts {
     }
 }
 
+/// A response that the show cannot have given, by the responses that it can have given.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum WrongAnswer {
+    /// The response is of this tick or an earlier one.
+    #[error("expected a tick after {0}")]
+    Tick(u64),
+    /// Another code, playback state or time scale.
+    #[error("expected {}", .0.iter().map(in_words).collect::<Vec<_>>().join(", or "))]
+    States(Vec<(Code, PlaybackState, f64)>),
+    /// A jump to another simulated time than this one, in seconds.
+    #[error("expected t = {0} s")]
+    Time(f64),
+    /// Another number of cues.
+    #[error("expected the number of cues until then")]
+    Cues,
+    /// A result that no step can have had.
+    #[error("expected one of {0:?}")]
+    Steps(Vec<Step>),
+}
+
+fn in_words((code, playback, scale): &(Code, PlaybackState, f64)) -> String {
+    format!("{}, {} at {scale} x", code.name(), playback.name())
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
     Playing,
@@ -53,8 +77,9 @@ enum Mode {
     Held,
 }
 
+/// The state of the step that was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Step {
+pub(super) enum Step {
     None,
     Sent,
     Running,
@@ -191,7 +216,7 @@ impl AnswerCheck {
     ///
     /// # Errors
     /// The expected response, if this one is wrong. The check continues from the response.
-    pub fn answered(&mut self, command: Command, answer: &ControlResponse) -> Result<(), String> {
+    pub fn answered(&mut self, command: Command, answer: &ControlResponse) -> Result<(), WrongAnswer> {
         let result = self.allows(command, answer);
         if result.is_err() {
             self.adopt(answer);
@@ -200,9 +225,9 @@ impl AnswerCheck {
         result
     }
 
-    fn allows(&mut self, command: Command, answer: &ControlResponse) -> Result<(), String> {
+    fn allows(&mut self, command: Command, answer: &ControlResponse) -> Result<(), WrongAnswer> {
         if answer.tick <= self.tick && self.tick > 0 {
-            return Err(format!("expected a tick after {}", self.tick));
+            return Err(WrongAnswer::Tick(self.tick));
         }
         let time = answer.sim_time;
         let has_jumped = |code| code == Some(Code::Done) && matches!(command, Command::Seek(_) | Command::Restart);
@@ -230,11 +255,11 @@ impl AnswerCheck {
                     Mode::Playing | Mode::Paused => PlaybackState::Paused,
                 };
                 let scale = if after.advances() { rate } else { 0.0 };
-                let wanted = (Some(code), Some(playback), scale);
-                if (answer.result(), answer.playback_state(), answer.time_scale) != wanted {
-                    let sentence = format!("{}, {} at {scale} x", code.name(), playback.name());
-                    if !expected.contains(&sentence) {
-                        expected.push(sentence);
+                let wanted = (code, playback, scale);
+                if (answer.result(), answer.playback_state(), answer.time_scale) != (Some(code), Some(playback), scale)
+                {
+                    if !expected.contains(&wanted) {
+                        expected.push(wanted);
                     }
                 } else if !allowed.contains(&after) {
                     allowed.push(after);
@@ -243,7 +268,7 @@ impl AnswerCheck {
         }
         self.possible = allowed;
         if self.possible.is_empty() {
-            return Err(format!("expected {}", expected.join(", or ")));
+            return Err(WrongAnswer::States(expected));
         }
         let target = match command {
             Command::Seek(time) if has_jumped(answer.result()) => Some(time),
@@ -251,7 +276,7 @@ impl AnswerCheck {
             _ => None,
         };
         if let Some(target) = target.filter(|target| *target != time) {
-            return Err(format!("expected t = {target} s"));
+            return Err(WrongAnswer::Time(target));
         }
         if let (Some(Code::Done), Command::Rate(rate)) = (answer.result(), command) {
             self.rate = rate;
@@ -259,21 +284,20 @@ impl AnswerCheck {
         self.check_cue(answer)
     }
 
-    fn check_cue(&self, answer: &ControlResponse) -> Result<(), String> {
+    fn check_cue(&self, answer: &ControlResponse) -> Result<(), WrongAnswer> {
         let passed = self.facts.can_have_passed(answer.cue, answer.sim_time);
-        if passed { Ok(()) } else { Err("expected the number of cues until then".to_owned()) }
+        if passed { Ok(()) } else { Err(WrongAnswer::Cues) }
     }
 
     /// Checks the response to the step that was sent. The response may be older than responses to other commands.
     ///
     /// # Errors
     /// As [`answered`](Self::answered).
-    pub fn step_answered(&mut self, answer: &ControlResponse) -> Result<(), String> {
+    pub fn step_answered(&mut self, answer: &ControlResponse) -> Result<(), WrongAnswer> {
         self.advance(self.facts.has_pausing_cue());
-        let steps: Vec<_> = self.possible.iter().map(|state| state.step).collect();
+        let steps = self.possible.iter().map(|state| state.step).collect();
         self.possible.retain(|state| answer.result().is_some_and(|code| state.step == Step::Over(code)));
-        let result =
-            if self.possible.is_empty() { Err(format!("expected one of {steps:?}")) } else { self.check_cue(answer) };
+        let result = if self.possible.is_empty() { Err(WrongAnswer::Steps(steps)) } else { self.check_cue(answer) };
         if self.possible.is_empty() {
             self.adopt(answer);
         }

@@ -2,12 +2,13 @@
 //!
 //! A second client sends the steps, because a step is answered only when it is over, and other commands come between.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
 use super::Conducted;
-use super::answers::{AnswerCheck, ShowFacts};
+use super::answers::{AnswerCheck, ShowFacts, WrongAnswer};
 use super::commands::RandomCommands;
 use super::record::{Answered, Record};
 use bench_dragon_client::clock::monotonic_ns;
@@ -246,7 +247,7 @@ impl LoadGenerator<'_> {
     fn check_reply(
         &mut self,
         reply: Reply,
-        check: impl FnOnce(&mut AnswerCheck, &ControlResponse) -> Result<(), String>,
+        check: impl FnOnce(&mut AnswerCheck, &ControlResponse) -> Result<(), WrongAnswer>,
         is_step_that_ran: bool,
     ) {
         let Reply { command, sent_ns, answered_ns, answer } = reply;
@@ -259,7 +260,7 @@ impl LoadGenerator<'_> {
             Ok(answer) => Ok((answer, check(&mut self.check, &answer))),
             Err(error) => {
                 self.lost = true;
-                Err(error.to_string())
+                Err(Arc::new(error))
             }
         };
         // The receiver is gone if the test has ended.

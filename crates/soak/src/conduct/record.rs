@@ -2,11 +2,13 @@
 //! of its tick.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use hdrhistogram::Histogram;
 
 use super::Conducted;
-use super::answers::ShowFacts;
+use super::answers::{ShowFacts, WrongAnswer};
+use bench_dragon_client::control::ControlError;
 use bench_dragon_messages::control::{Code, Command};
 use bench_dragon_messages::state::PlaybackState;
 use bench_dragon_messages::{ControlResponse, FrameHeader};
@@ -28,7 +30,7 @@ pub(super) struct Answered {
     /// CLOCK_MONOTONIC at which the answer was received, ns.
     pub answered_ns: u64,
     /// The answer, and the result of its check by the command table. `Err` if no answer came.
-    pub answer: Result<(ControlResponse, Result<(), String>), String>,
+    pub answer: Result<(ControlResponse, Result<(), WrongAnswer>), Arc<ControlError>>,
     /// True for a step that ran, whose answer comes when it is over.
     pub is_step_that_ran: bool,
 }

@@ -50,7 +50,10 @@ fn frames(list: &[(u64, u64, Command)]) -> Vec<(FrameHeader, Vec<HandlePose>)> {
 
 fn faults(frames: &[(FrameHeader, Vec<HandlePose>)]) -> Vec<String> {
     let mut conformance = ConformanceCheck::default();
-    frames.iter().filter_map(|(header, handles)| conformance.check(header, handles, RATE).err()).collect()
+    frames
+        .iter()
+        .filter_map(|(header, handles)| Some(conformance.check(header, handles, RATE).err()?.to_string()))
+        .collect()
 }
 
 proptest! {

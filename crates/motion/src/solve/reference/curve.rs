@@ -3,7 +3,7 @@
 //! In: a [`RouteStep`] with the end of the path before it. Out: its curve.
 
 use super::real::{Functions, Real, RealVector};
-use super::{Piece, Turn, TurnArcs};
+use super::{Piece, ReferenceError, Turn, TurnArcs};
 use crate::model::Vector;
 use crate::model::curve::Side;
 use crate::model::description::RouteStep;
@@ -289,7 +289,7 @@ pub(super) fn turns_of_metres(
     Piece { direction, pitch, radius }: Piece,
     metres: f64,
     rough: f64,
-) -> Result<DoubleDouble, String> {
+) -> Result<DoubleDouble, ReferenceError> {
     let mut functions = Functions::new()?;
     let turn = functions.turn();
     let radius_per_radian = Real::from(pitch) / &turn;
@@ -307,7 +307,7 @@ pub(super) fn turns_of_metres(
 /// Returns the two radii of a turn, and the turns of each of its arcs: see [`Path::turnaround`].
 ///
 /// [`Path::turnaround`]: crate::model::path::Path::turnaround
-pub(super) fn arcs_of_turn(Turn { pitch, radius, arc_ratio }: Turn) -> Result<TurnArcs, String> {
+pub(super) fn arcs_of_turn(Turn { pitch, radius, arc_ratio }: Turn) -> Result<TurnArcs, ReferenceError> {
     let mut functions = Functions::new()?;
     let turn = functions.turn();
     let (one, ratio, a) = (Real::from(1.0), Real::from(arc_ratio), Real::from(pitch) / &turn);

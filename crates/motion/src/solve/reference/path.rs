@@ -2,6 +2,7 @@
 //!
 //! In: a [`PathDescription`]. Out: a path that gives places by metres of travel and by a curve's own coordinate.
 
+use super::ReferenceError;
 use super::curve::{Curve, RealParam, RealPiece, origin, spiral_length};
 use super::real::{Functions, Real, RealVector};
 use crate::model::curve::Side;
@@ -32,8 +33,8 @@ pub(super) struct RealPath {
 
 impl RealPath {
     /// # Errors
-    /// A sentence if there is no memory for the constants.
-    pub fn new(description: &PathDescription) -> Result<Self, String> {
+    /// [`ReferenceError::NoMemory`]
+    pub fn new(description: &PathDescription) -> Result<Self, ReferenceError> {
         let mut path = Self { segments: Vec::new(), heading: Real::from(0.0), functions: Functions::new()? };
         match *description {
             PathDescription::Spiral { pitch, start_turn } => path.spiral(pitch, start_turn),

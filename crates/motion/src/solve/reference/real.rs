@@ -6,6 +6,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use astro_float::{BigFloat, Consts, RoundingMode, Sign};
 
+use super::ReferenceError;
 use crate::model::Vector;
 use crate::model::double_double::DoubleDouble;
 
@@ -144,10 +145,9 @@ pub(super) struct Functions {
 
 impl Functions {
     /// # Errors
-    /// A sentence if there is no memory for the constants.
-    pub fn new() -> Result<Self, String> {
-        let constants = Consts::new().map_err(|error| format!("the high-precision reference: {error:?}"))?;
-        Ok(Self { constants })
+    /// [`ReferenceError::NoMemory`]
+    pub fn new() -> Result<Self, ReferenceError> {
+        Ok(Self { constants: Consts::new().map_err(ReferenceError::NoMemory)? })
     }
 
     /// Returns 2 pi.

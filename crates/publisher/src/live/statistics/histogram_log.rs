@@ -14,7 +14,6 @@ use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 
 use super::{Durations, Sample};
-use bench_dragon_messages::sentence::not_writable;
 
 /// The header of every interval log.
 const LEGEND: &str = "\"StartTimestamp\",\"Interval_Length\",\"Interval_Max\",\"Interval_Compressed_Histogram\"\n";
@@ -39,12 +38,9 @@ impl HistogramLog {
     /// Creates the file of a run of `rate` frames per second that begins at `began_ns` of CLOCK_REALTIME.
     ///
     /// # Errors
-    /// A sentence, if the file cannot be created.
-    pub fn create(file: &Path, rate: f64, began_ns: u64) -> Result<Self, String> {
-        let name = file.display().to_string();
-        let failed = |error: io::Error| not_writable(&name, &error);
-        let opened = File::create(file).map_err(failed)?;
-        Ok(Self::new(opened, name, rate, began_ns))
+    /// The file cannot be created.
+    pub fn create(file: &Path, rate: f64, began_ns: u64) -> io::Result<Self> {
+        Ok(Self::new(File::create(file)?, file.display().to_string(), rate, began_ns))
     }
 }
 

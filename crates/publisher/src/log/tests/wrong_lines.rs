@@ -101,7 +101,7 @@ fn a_log_forged_with_right_checks_differs_in_the_second_that_was_forged() {
 fn lines_that_no_run_can_have_written_are_refused_with_their_number() {
     let run = conducted();
     let problem = |verdict: Result<Verdict, VerifyError>| match verdict {
-        Err(VerifyError::Line { line, problem }) => (line, problem),
+        Err(VerifyError::Line { line, problem }) => (line, problem.to_string()),
         other => panic!("{other:?}"),
     };
     let (_, sentence) = problem(forged(&run, |line| match line {
@@ -158,7 +158,8 @@ fn lines_that_no_run_can_have_written_are_refused_with_their_number() {
         }
         _ => false,
     });
-    let Err(VerifyError::Scene(sentence)) = scene else { panic!("{scene:?}") };
+    let Err(VerifyError::Scene(error)) = scene else { panic!("{scene:?}") };
+    let sentence = error.to_string();
     assert!(
         sentence.contains("line 1, the scene \"small.toml\", line") && sentence.contains("team.benches"),
         "{sentence}"

@@ -3,6 +3,7 @@
 use super::super::hash::{FrameHasher, columns, header_words};
 use super::super::lines::{Line, SecondLine, ShowLine, command_of};
 use super::super::writer::{sampled, second_of};
+use super::problem::{FramesOfSecond, Problem};
 use super::{Difference, Verdict};
 use bench_dragon_messages::control::Code;
 use bench_dragon_motion::event::unreported;
@@ -89,13 +90,13 @@ impl Player {
     ///
     /// # Errors
     /// The problem of a line that no run can have written.
-    pub fn line(&mut self, number: u64, line: &Line) -> Result<(), String> {
+    pub fn line(&mut self, number: u64, line: &Line) -> Result<(), Problem> {
         match line {
             Line::Command { tick, command, value, code } => {
                 self.play_until(number, *tick)?;
                 let known = code.as_deref().is_none_or(|code| Code::named(code).is_some());
                 let Some(command) = command_of(command, *value).filter(|_| known) else {
-                    return Err("the command is not understood, expected one of those of docs/conducting.md".to_owned());
+                    return Err(Problem::UnknownCommand);
                 };
                 self.counts.commands += 1;
                 self.uncompared.commands += 1;
@@ -115,7 +116,7 @@ impl Player {
             Line::Lost { from, to } => {
                 self.play_until(number, *from)?;
                 if second_of(*from, self.rate) != second_of(*to, self.rate) {
-                    return Err(format!("ticks {from} to {to} are of several seconds, expected a line for each"));
+                    return Err(Problem::SeveralSeconds { from: *from, to: *to });
                 }
                 self.counts.lost += self.range(*from, *to)?;
                 while self.tick <= *to && self.difference.is_none() {
@@ -125,18 +126,15 @@ impl Player {
             Line::Second(second) => self.second(number, second)?,
             Line::End { frames, skipped, lost, .. } => {
                 if !self.announced.is_empty() {
-                    let tick = self.tick;
-                    return Err(format!("the commands of tick {tick} in line {} have no frame", self.command_line));
+                    return Err(Problem::UnplayedCommands { tick: self.tick, line: self.command_line });
                 }
                 if let Some((from, _)) = self.hashed {
-                    return Err(format!("the frames from tick {from} on have no hash"));
+                    return Err(Problem::Unhashed(from));
                 }
-                let VerifiedCounts { frames: played, skipped: passed, lost: missing, .. } = self.counts;
-                if (*frames, *skipped, *lost) != (played, passed, missing) {
-                    return Err(format!(
-                        "{frames} frames, {skipped} periods skipped, {lost} frames lost, expected {played}, {passed}, \
-                         {missing} from the lines before"
-                    ));
+                let found = [*frames, *skipped, *lost];
+                let expected = [self.counts.frames, self.counts.skipped, self.counts.lost];
+                if found != expected {
+                    return Err(Problem::Totals { found, expected });
                 }
             }
             Line::Show(_) | Line::Stopped { .. } => {}
@@ -176,9 +174,9 @@ impl Player {
     }
 
     /// Returns the number of ticks in a line's range, which must begin at the next tick.
-    fn range(&self, from: u64, to: u64) -> Result<u64, String> {
+    fn range(&self, from: u64, to: u64) -> Result<u64, Problem> {
         if from != self.tick || to < from || to == u64::MAX {
-            return Err(format!("ticks {from} to {to} are out of order, expected to begin at tick {}", self.tick));
+            return Err(Problem::Ticks { from, to, next: self.tick });
         }
         Ok(to - from + 1)
     }
@@ -189,18 +187,14 @@ impl Player {
     }
 
     /// Plays the frames before a tick.
-    fn play_until(&mut self, number: u64, tick: u64) -> Result<(), String> {
+    fn play_until(&mut self, number: u64, tick: u64) -> Result<(), Problem> {
         if tick < self.tick {
-            return Err(format!("tick {tick} is out of order, expected {} or a later one", self.tick));
+            return Err(Problem::Tick { tick, next: self.tick });
         }
         // Two seconds have the line of the first between them. This also bounds the work after a wrong digit.
         if tick > self.tick && second_of(tick - 1, self.rate) != second_of(self.tick, self.rate) {
-            return Err(format!(
-                "ticks {} to {} are of several seconds without their hash, expected the line of second {}",
-                self.tick,
-                tick - 1,
-                second_of(self.tick, self.rate)
-            ));
+            let second = second_of(self.tick, self.rate);
+            return Err(Problem::NoHash { from: self.tick, to: tick - 1, second });
         }
         while self.tick < tick && self.difference.is_none() {
             self.play(number, true);
@@ -209,9 +203,9 @@ impl Player {
     }
 
     /// Skips periods. The commands before them must have had their frame.
-    fn skip_to(&mut self, number: u64, tick: u64) -> Result<(), String> {
+    fn skip_to(&mut self, number: u64, tick: u64) -> Result<(), Problem> {
         if !self.announced.is_empty() {
-            return Err(format!("the period {} is skipped, expected its frame after line {number}", self.tick));
+            return Err(Problem::SkippedCommands { tick: self.tick, line: number });
         }
         self.tick = tick;
         Ok(())
@@ -240,20 +234,18 @@ impl Player {
         self.announced.clear();
     }
 
-    fn second(&mut self, number: u64, line: &SecondLine) -> Result<(), String> {
-        let next = line.to.checked_add(1).ok_or("the tick is too large")?;
+    fn second(&mut self, number: u64, line: &SecondLine) -> Result<(), Problem> {
+        let next = line.to.checked_add(1).ok_or(Problem::LastTick)?;
         // The frames lost at the end of the second have been played.
         self.play_until(number, next.max(self.tick))?;
         let Some((from, frames)) = self.hashed.take().filter(|_| self.difference.is_none()) else {
-            return if self.difference.is_some() { Ok(()) } else { Err("there is no frame for its hash".to_owned()) };
+            return if self.difference.is_some() { Ok(()) } else { Err(Problem::NoFrame) };
         };
-        let (second, to) = (second_of(from, self.rate), self.latest.tick);
-        if (line.second, line.from, line.to, line.frames) != (second, from, to, frames) {
-            return Err(format!(
-                "second {} with {} frames of ticks {} to {}, expected second {second} with {frames} frames of ticks {from} \
-                 to {to}",
-                line.second, line.frames, line.from, line.to
-            ));
+        let to = self.latest.tick;
+        let found = FramesOfSecond { second: line.second, from: line.from, to: line.to, frames: line.frames };
+        let expected = FramesOfSecond { second: second_of(from, self.rate), from, to, frames };
+        if found != expected {
+            return Err(Problem::Second { found, expected });
         }
         self.counts.seconds += 1;
         // The commands of the next tick have no frame yet.
@@ -269,7 +261,8 @@ impl Player {
         if !self.same_arithmetic {
             let numbers = |handles: &[(u32, f64, f64)]| handles.iter().map(|handle| handle.0).collect::<Vec<_>>();
             let compared = if numbers(&self.latest.handles) == numbers(&line.handles) {
-                self.reference.compare(line.sim_time, self.latest.sim_time, &line.handles)
+                let compared = self.reference.compare(line.sim_time, self.latest.sim_time, &line.handles);
+                compared.map_err(|error| error.to_string())
             } else {
                 Err("other handles than those that are sampled".to_owned())
             };

@@ -13,7 +13,7 @@ use bench_dragon_client::shared_memory::{
     CLOCK, MOST_PUBLISHERS, OpenError, failed, port_error, service_error, service_name,
 };
 
-use super::{PublisherConfig, SPARE_NODES, Sender, Service};
+use super::{PublisherConfig, SPARE_NODES, Sender, Service, UnsentError};
 use bench_dragon_client::clock::{monotonic_clock_name, monotonic_ns};
 use bench_dragon_messages::FrameHeader;
 
@@ -61,14 +61,15 @@ impl<Pose: ZeroCopySend + Debug + Default + 'static> FrameSender<Pose> {
         &self,
         header: &FrameHeader,
         mut poses: impl ExactSizeIterator<Item = Pose>,
-    ) -> Result<(), String> {
+    ) -> Result<(), UnsentError> {
         let handles = poses.len();
-        let sample = self.port.loan_slice_uninit(handles).map_err(|error| error.to_string())?;
+        let sample = self.port.loan_slice_uninit(handles)?;
         // The iterator has exactly `handles` items: the default is never used.
         let mut sample = sample.write_from_fn(|_| poses.next().unwrap_or_default());
         let handles = handles as u32;
         *sample.user_header_mut() = FrameHeader { handles, sent_ns: monotonic_ns(), ..*header };
-        sample.send().map(|_| ()).map_err(|error| error.to_string())
+        sample.send()?;
+        Ok(())
     }
 
     /// Delivers the history to newly connected subscribers.
@@ -89,7 +90,7 @@ fn open_service<Pose: ZeroCopySend + Debug + 'static>(
     described: &FrameService,
 ) -> Result<Service<[Pose], FrameHeader>, OpenError> {
     let full_name = service_name(&config.name, described.service)?;
-    let attributes = attributes(described).map_err(|reason| failed(&config.name, described.service, reason))?;
+    let attributes = attributes(&config.name, described)?;
     let builder = || {
         node.service_builder(&full_name)
             .publish_subscribe::<[Pose]>()
@@ -119,11 +120,13 @@ fn open_service<Pose: ZeroCopySend + Debug + 'static>(
 }
 
 /// Returns the attributes that a service must have. A new service gets them.
-fn attributes(described: &FrameService) -> Result<AttributeVerifier, String> {
+fn attributes(name: &str, described: &FrameService) -> Result<AttributeVerifier, OpenError> {
+    let illegal = |error| failed(name, described.service, format!("{error:?}"));
     let with = |attributes: AttributeVerifier, key: &str, value: String| {
-        let key = AttributeKey::try_from(key).map_err(|error| format!("{error:?}"))?;
-        let value = AttributeValue::try_from(value.as_str()).map_err(|error| format!("{error:?}"))?;
-        attributes.require(&key, &value).map_err(|error| error.to_string())
+        let key = AttributeKey::try_from(key).map_err(illegal)?;
+        let value = AttributeValue::try_from(value.as_str()).map_err(illegal)?;
+        let required = attributes.require(&key, &value);
+        required.map_err(|error| failed(name, described.service, error.to_string()))
     };
     let attributes = with(AttributeVerifier::new(), CLOCK, monotonic_clock_name())?;
     match described.every {

@@ -11,7 +11,7 @@ use ::iceoryx2::prelude::*;
 
 use bench_dragon_client::shared_memory::{MOST_PUBLISHERS, OpenError, failed, port_error, service_error, service_name};
 
-use super::{PublisherConfig, REPEAT_INTERVAL, SPARE_NODES, Sender, Service};
+use super::{PublisherConfig, REPEAT_INTERVAL, SPARE_NODES, Sender, Service, UnsentError};
 
 /// The messages that a subscriber may fall behind: that of this run, and that of the next.
 pub(super) const QUEUE: usize = 2;
@@ -62,16 +62,17 @@ impl<Element: Sent, Header: Sent> HeldSlice<Element, Header> {
             .create()
             .map_err(|error| port_error(name, service, error))?;
         let mut held = Self { header, elements: elements.to_vec(), port, service: opened, sent: Instant::now() };
-        held.send().map_err(|reason| failed(name, service, reason))?;
+        held.send().map_err(|error| failed(name, service, error.to_string()))?;
         Ok(held)
     }
 
-    fn send(&mut self) -> Result<(), String> {
+    fn send(&mut self) -> Result<(), UnsentError> {
         self.sent = Instant::now();
-        let sample = self.port.loan_slice_uninit(self.elements.len()).map_err(|error| error.to_string())?;
+        let sample = self.port.loan_slice_uninit(self.elements.len())?;
         let mut sample = sample.write_from_slice(&self.elements);
         *sample.user_header_mut() = self.header;
-        sample.send().map(|_| ()).map_err(|error| error.to_string())
+        sample.send()?;
+        Ok(())
     }
 
     /// Delivers the message to late subscribers, on this machine and, through a tunnel, on others.
