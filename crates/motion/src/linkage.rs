@@ -5,6 +5,7 @@
 use crate::model::Point;
 use crate::model::curve::{Curve, Follower};
 pub use crate::model::curve::{LinkPose, NoFollower};
+use crate::model::curve_bounds::CurveBounds;
 use crate::model::path::{Param, Path};
 
 /// Returns the place of the rear handle. It is the first place behind `front` whose straight-line distance from it is

@@ -6,6 +6,7 @@
 pub mod arc;
 pub mod board;
 pub mod curve;
+pub mod curve_bounds;
 pub mod description;
 pub mod double_double;
 pub mod elementary;

@@ -5,6 +5,7 @@ use crate::event::Budget;
 use crate::linkage::follower;
 use crate::model::board::Board;
 use crate::model::curve::Curve;
+use crate::model::curve_bounds::CurveBounds;
 use crate::model::path::{Param, Path};
 use crate::model::team::Team;
 use crate::model::{Point, Vector};

@@ -25,7 +25,7 @@ use crate::event::Budget;
 use crate::ground::{Ground, Obstacle};
 use crate::linkage::NoFollower;
 use crate::model::board::Board;
-use crate::model::curve::Curve;
+use crate::model::curve_bounds::CurveBounds;
 use crate::model::path::Param;
 use crate::model::root::golden_section_min;
 use crate::model::shape::ShapeKind;

@@ -2,7 +2,7 @@
 //! place behind which no boards come near each other.
 
 use crate::model::Point;
-use crate::model::curve::{Curve, ReachedDisc};
+use crate::model::curve_bounds::{CurveBounds, ReachedDisc};
 use crate::model::elementary::hypot;
 use crate::model::path::{Param, Path};
 use crate::model::team::Team;

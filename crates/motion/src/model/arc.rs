@@ -2,7 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc, Side};
+use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, Side};
+use super::curve_bounds::{CurveBounds, ReachedDisc};
 use super::double_double::DoubleDouble;
 use super::elementary;
 use super::{Point, Vector};
@@ -83,10 +84,6 @@ impl Curve for Arc {
         Some(self.signed_curvature())
     }
 
-    fn circumference(&self) -> f64 {
-        TAU * self.radius
-    }
-
     fn arc_over(&self, chord: f64) -> Option<f64> {
         self.angle_over(chord).map(|angle| self.radius * angle)
     }
@@ -95,10 +92,6 @@ impl Curve for Arc {
         // The chord is parallel to the tangent half way.
         let half = 0.5 * to.minus(from);
         2.0 * self.radius * elementary::sin(half) * self.tangent(from.plus(half))
-    }
-
-    fn largest_summand(&self, _: Coordinate, _: Coordinate, length: f64) -> f64 {
-        self.origin.coords.amax().max(length.min(2.0 * self.radius))
     }
 
     fn link_pose(&self, front: Coordinate, rear: Coordinate, _: f64) -> LinkPose {
@@ -114,6 +107,20 @@ impl Curve for Arc {
 
     fn ahead(&self, _: Coordinate, _: f64, link: f64) -> Option<f64> {
         self.angle_over(link)
+    }
+}
+
+impl CurveBounds for Arc {
+    fn tightens(&self) -> bool {
+        false
+    }
+
+    fn circumference(&self) -> f64 {
+        TAU * self.radius
+    }
+
+    fn largest_summand(&self, _: Coordinate, _: Coordinate, length: f64) -> f64 {
+        self.origin.coords.amax().max(length.min(2.0 * self.radius))
     }
 
     fn second_derivative_bound(&self, _: Coordinate, distance: f64) -> f64 {

@@ -1,6 +1,7 @@
 //! The straight line.
 
-use super::curve::{Coordinate, Curve, Follower, NoFollower, ReachedDisc};
+use super::curve::{Coordinate, Curve, Follower, NoFollower};
+use super::curve_bounds::{CurveBounds, ReachedDisc};
 use super::team::Team;
 use super::{Point, Vector};
 
@@ -54,16 +55,22 @@ impl Curve for Line {
         to.minus(from) * self.direction
     }
 
-    fn largest_summand(&self, _: Coordinate, _: Coordinate, _: f64) -> f64 {
-        self.origin.coords.amax()
-    }
-
     fn follower(&self, _: Coordinate, behind: f64, link: f64) -> Result<Follower, NoFollower> {
         Ok(Follower::within(link, behind))
     }
 
     fn ahead(&self, _: Coordinate, _: f64, link: f64) -> Option<f64> {
         Some(link)
+    }
+}
+
+impl CurveBounds for Line {
+    fn tightens(&self) -> bool {
+        false
+    }
+
+    fn largest_summand(&self, _: Coordinate, _: Coordinate, _: f64) -> f64 {
+        self.origin.coords.amax()
     }
 
     fn second_derivative_bound(&self, _: Coordinate, _: f64) -> f64 {

@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use super::arc::Arc;
 use super::curve::{Coordinate, Curve, Side};
+use super::curve_bounds::CurveBounds;
 use super::double_double::DoubleDouble;
 use super::elementary::{atan, atan2, hypot};
 use super::line::Line;

@@ -1,7 +1,8 @@
 //! A spiral piece of a route: a [`Spiral`] mirrored, rotated and moved so that one of its places becomes a given point
 //! with a given direction of travel.
 
-use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc, Side};
+use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, Side};
+use super::curve_bounds::{CurveBounds, ReachedDisc};
 use super::spiral::{Direction, Spiral};
 use super::{Point, Vector};
 
@@ -91,21 +92,8 @@ impl Curve for PlacedSpiral {
         self.mirror * self.spiral.turning()
     }
 
-    fn tightens(&self) -> bool {
-        self.spiral.tightens()
-    }
-
-    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64 {
-        self.spiral.length_bound(one, other)
-    }
-
     fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector {
         self.vector(self.spiral.displacement(from, to))
-    }
-
-    fn largest_summand(&self, first: Coordinate, last: Coordinate, length: f64) -> f64 {
-        let widest = self.spiral.radius(first).max(self.spiral.radius(last));
-        self.point(first).coords.amax().max(length.min(2.0 * widest))
     }
 
     fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose {
@@ -127,6 +115,21 @@ impl Curve for PlacedSpiral {
 
     fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64> {
         self.spiral.ahead(rear, gap, link)
+    }
+}
+
+impl CurveBounds for PlacedSpiral {
+    fn tightens(&self) -> bool {
+        self.spiral.tightens()
+    }
+
+    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64 {
+        self.spiral.length_bound(one, other)
+    }
+
+    fn largest_summand(&self, first: Coordinate, last: Coordinate, length: f64) -> f64 {
+        let widest = self.spiral.radius(first).max(self.spiral.radius(last));
+        self.point(first).coords.amax().max(length.min(2.0 * widest))
     }
 
     fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64 {

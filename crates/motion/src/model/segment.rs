@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use super::arc::Arc;
-use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
+use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower};
+use super::curve_bounds::{CurveBounds, ReachedDisc};
 use super::elementary::atan2;
 use super::line::Line;
 use super::placed_spiral::PlacedSpiral;
@@ -26,18 +27,18 @@ pub enum Segment {
     PlacedSpiral(PlacedSpiral),
 }
 
-/// Forwards every method of [`Curve`] to the curve of the segment, by a match: frames call these methods per handle.
+/// Forwards every method of a trait to the curve of the segment, by a match: frames call these methods per handle.
 macro_rules! forward {
-    ($(fn $name:ident(&self $(, $argument:ident: $type:ty)*) -> $result:ty;)*) => {
-        impl Curve for Segment {
+    ($trait:ident: $(fn $name:ident(&self $(, $argument:ident: $type:ty)*) -> $result:ty;)*) => {
+        impl $trait for Segment {
             $(
                 #[inline]
                 fn $name(&self $(, $argument: $type)*) -> $result {
                     match self {
-                        Self::Line(line) => Curve::$name(line $(, $argument)*),
-                        Self::Arc(arc) => Curve::$name(arc $(, $argument)*),
-                        Self::Spiral(spiral) => Curve::$name(spiral $(, $argument)*),
-                        Self::PlacedSpiral(spiral) => Curve::$name(spiral $(, $argument)*),
+                        Self::Line(line) => $trait::$name(line $(, $argument)*),
+                        Self::Arc(arc) => $trait::$name(arc $(, $argument)*),
+                        Self::Spiral(spiral) => $trait::$name(spiral $(, $argument)*),
+                        Self::PlacedSpiral(spiral) => $trait::$name(spiral $(, $argument)*),
                     }
                 }
             )*
@@ -45,7 +46,7 @@ macro_rules! forward {
     };
 }
 
-forward! {
+forward! { Curve:
     fn point(&self, at: Coordinate) -> Point;
     fn tangent(&self, at: Coordinate) -> Vector;
     fn curvature(&self, at: Coordinate) -> f64;
@@ -56,15 +57,18 @@ forward! {
     fn contains(&self, at: Coordinate) -> bool;
     fn turning(&self) -> f64;
     fn constant_curvature(&self) -> Option<f64>;
-    fn tightens(&self) -> bool;
-    fn circumference(&self) -> f64;
     fn arc_over(&self, chord: f64) -> Option<f64>;
-    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64;
     fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector;
-    fn largest_summand(&self, first: Coordinate, last: Coordinate, length: f64) -> f64;
     fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose;
     fn follower(&self, front: Coordinate, behind: f64, link: f64) -> Result<Follower, NoFollower>;
     fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64>;
+}
+
+forward! { CurveBounds:
+    fn tightens(&self) -> bool;
+    fn circumference(&self) -> f64;
+    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64;
+    fn largest_summand(&self, first: Coordinate, last: Coordinate, length: f64) -> f64;
     fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64;
     fn longest_step(&self) -> f64;
     fn distance_grows(&self, front: Coordinate, rear: Coordinate) -> bool;

@@ -8,7 +8,8 @@ mod links;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
 
-use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower, ReachedDisc};
+use super::curve::{Coordinate, Curve, Follower, LinkPose, NoFollower};
+use super::curve_bounds::{CurveBounds, ReachedDisc};
 use super::double_double::DoubleDouble;
 use super::elementary::{asinh, cos, hypot, pow, sin, sin_cos, tan};
 use super::root::{bisect_predicate, increasing_root};
@@ -260,21 +261,9 @@ impl Curve for Spiral {
         self.sign()
     }
 
-    fn tightens(&self) -> bool {
-        self.direction == Direction::Inward
-    }
-
-    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64 {
-        self.outer_length(one, other)
-    }
-
     fn displacement(&self, from: Coordinate, to: Coordinate) -> Vector {
         // A "link" of one metre has the displacement as its direction.
         self.pose(to, from, 1.0).direction
-    }
-
-    fn largest_summand(&self, _: Coordinate, _: Coordinate, _: f64) -> f64 {
-        0.0
     }
 
     fn link_pose(&self, front: Coordinate, rear: Coordinate, link: f64) -> LinkPose {
@@ -290,6 +279,20 @@ impl Curve for Spiral {
 
     fn ahead(&self, rear: Coordinate, gap: f64, link: f64) -> Option<f64> {
         self.angle_ahead(rear, gap, link)
+    }
+}
+
+impl CurveBounds for Spiral {
+    fn tightens(&self) -> bool {
+        self.direction == Direction::Inward
+    }
+
+    fn length_bound(&self, one: Coordinate, other: Coordinate) -> f64 {
+        self.outer_length(one, other)
+    }
+
+    fn largest_summand(&self, _: Coordinate, _: Coordinate, _: f64) -> f64 {
+        0.0
     }
 
     fn second_derivative_bound(&self, at: Coordinate, distance: f64) -> f64 {

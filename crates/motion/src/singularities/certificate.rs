@@ -36,6 +36,7 @@
 
 use crate::linkage::{NoFollower, first_follower, follower_behind, link_pose};
 use crate::model::curve::Curve;
+use crate::model::curve_bounds::CurveBounds;
 use crate::model::path::{Param, Path};
 use crate::model::root::{bisect_predicate, golden_section_min};
 use crate::model::{Point, Vector};

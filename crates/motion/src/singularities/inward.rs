@@ -22,7 +22,7 @@
 
 use std::f64::consts::PI;
 
-use crate::model::curve::Curve;
+use crate::model::curve_bounds::CurveBounds;
 use crate::model::path::Param;
 use crate::model::root::bisect_predicate;
 

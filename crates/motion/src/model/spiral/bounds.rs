@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::{Direction, Spiral};
-use crate::model::curve::{Coordinate, Curve, ReachedDisc};
+use crate::model::curve::Coordinate;
+use crate::model::curve_bounds::{CurveBounds, ReachedDisc};
 use crate::model::elementary;
 use crate::model::root::bisect_predicate;
 use crate::model::team::Team;

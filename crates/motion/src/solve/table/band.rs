@@ -16,7 +16,7 @@ use super::track::{Node, Track};
 use crate::event::Budget;
 use crate::linkage;
 use crate::model::Vector;
-use crate::model::curve::Curve;
+use crate::model::curve_bounds::CurveBounds;
 use crate::model::elementary::hypot;
 use crate::model::path::Param;
 use crate::model::team::Team;

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::track::{Node, Track};
 use crate::linkage;
 use crate::model::curve::{Coordinate, Curve, Follower};
+use crate::model::curve_bounds::CurveBounds;
 use crate::model::path::Param;
 use crate::model::root::increasing_root;
 use crate::model::team::Team;
