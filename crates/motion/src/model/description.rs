@@ -3,11 +3,15 @@
 
 use std::f64::consts::TAU;
 
-use super::curve::Side;
+use super::arc::Arc;
+use super::curve::{Coordinate, Curve, Side};
 use super::double_double::DoubleDouble;
 use super::elementary::{atan, hypot};
-use super::path::{Disjoint, Path};
-use super::spiral::Direction;
+use super::line::Line;
+use super::path::{Disjoint, Path, Route};
+use super::placed_spiral::PlacedSpiral;
+use super::segment::Segment;
+use super::spiral::{Direction, Spiral};
 
 /// The numbers of a path.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,5 +158,49 @@ impl PathDescription {
                 route.build()
             }
         }
+    }
+}
+
+/// The pieces of a route.
+impl Route {
+    /// Adds a straight line of `length` metres.
+    pub fn line(self, length: f64) -> Self {
+        let line = Line { origin: self.end, direction: self.direction() };
+        self.piece(Segment::Line(line), Coordinate::ZERO, Coordinate { high: length, low: 0.0 }, length, 0.0)
+    }
+
+    /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
+    pub fn arc(self, side: Side, radius: impl Into<DoubleDouble>, turns: impl Into<DoubleDouble>) -> Self {
+        let (radius, around) = (radius.into().high, turns.into());
+        let turns = around.high;
+        let arc = Arc::new(self.end, self.direction(), side, radius);
+        let turned = if side == Side::Left { turns } else { -turns };
+        let last = DoubleDouble::from_turns(around);
+        self.piece(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
+    }
+
+    /// Adds an Archimedean spiral of `pitch` metres per turn. The spiral begins `radius` metres from its centre, which
+    /// is on one side, and leads `turns` turns around it.
+    ///
+    /// The tangent has the polar angle theta + atan(theta), but for a constant.
+    pub fn spiral(
+        self,
+        side: Side,
+        direction: Direction,
+        pitch: f64,
+        radius: impl Into<DoubleDouble>,
+        turns: impl Into<DoubleDouble>,
+    ) -> Self {
+        let turns = turns.into();
+        let spiral = Spiral::new(pitch, direction);
+        let DoubleDouble { high, low } = radius.into().over(pitch);
+        let first = DoubleDouble::from_turns(high).plus(TAU * low);
+        let around = DoubleDouble::from_turns(turns);
+        let last = first.plus(spiral.sign() * around.high).plus(spiral.sign() * around.low);
+        let placed = PlacedSpiral::new(self.end, self.direction(), side, spiral, first);
+        let inclined = atan(around.high / (1.0 + first.high * last.high)) / TAU;
+        let turned = turns.high + inclined;
+        let turned = if side == Side::Left { turned } else { -turned };
+        self.piece(Segment::PlacedSpiral(placed), first, last, spiral.arc_length(first, last), turned)
     }
 }

@@ -12,7 +12,6 @@ use super::curve_bounds::CurveBounds;
 use super::double_double::DoubleDouble;
 use super::elementary::{atan, atan2, hypot};
 use super::line::Line;
-use super::placed_spiral::PlacedSpiral;
 use super::segment::{Segment, SegmentOutline};
 use super::spiral::{Direction, Spiral};
 use super::{Point, Vector};
@@ -379,11 +378,11 @@ impl Path {
     }
 }
 
-/// A route under construction.
+/// A route under construction. Its pieces are in [`description`](super::description).
 #[derive(Debug, Clone)]
 pub struct Route {
     path: Path,
-    end: Point,
+    pub(super) end: Point,
     heading_turns: f64,
     remainders: Option<Remainders>,
 }
@@ -403,47 +402,6 @@ impl Route {
         Self { remainders: Some(Remainders::default()), ..self }
     }
 
-    /// Adds a straight line of `length` metres.
-    pub fn line(self, length: f64) -> Self {
-        let line = Line { origin: self.end, direction: self.direction() };
-        self.piece(Segment::Line(line), Coordinate::ZERO, Coordinate { high: length, low: 0.0 }, length, 0.0)
-    }
-
-    /// Adds an arc of `radius` metres whose centre is on one side, for `turns` turns (90 degrees are a quarter).
-    pub fn arc(self, side: Side, radius: impl Into<DoubleDouble>, turns: impl Into<DoubleDouble>) -> Self {
-        let (radius, around) = (radius.into().high, turns.into());
-        let turns = around.high;
-        let arc = Arc::new(self.end, self.direction(), side, radius);
-        let turned = if side == Side::Left { turns } else { -turns };
-        let last = DoubleDouble::from_turns(around);
-        self.piece(Segment::Arc(arc), Coordinate::ZERO, last, radius * TAU * turns, turned)
-    }
-
-    /// Adds an Archimedean spiral of `pitch` metres per turn. The spiral begins `radius` metres from its centre, which
-    /// is on one side, and leads `turns` turns around it.
-    ///
-    /// The tangent has the polar angle theta + atan(theta), but for a constant.
-    pub fn spiral(
-        self,
-        side: Side,
-        direction: Direction,
-        pitch: f64,
-        radius: impl Into<DoubleDouble>,
-        turns: impl Into<DoubleDouble>,
-    ) -> Self {
-        let turns = turns.into();
-        let spiral = Spiral::new(pitch, direction);
-        let DoubleDouble { high, low } = radius.into().over(pitch);
-        let first = DoubleDouble::from_turns(high).plus(TAU * low);
-        let around = DoubleDouble::from_turns(turns);
-        let last = first.plus(spiral.sign() * around.high).plus(spiral.sign() * around.low);
-        let placed = PlacedSpiral::new(self.end, self.direction(), side, spiral, first);
-        let inclined = atan(around.high / (1.0 + first.high * last.high)) / TAU;
-        let turned = turns.high + inclined;
-        let turned = if side == Side::Left { turned } else { -turned };
-        self.piece(Segment::PlacedSpiral(placed), first, last, spiral.arc_length(first, last), turned)
-    }
-
     /// Returns the unit direction at the route's end.
     pub fn direction(&self) -> Vector {
         let rest = self.remainders.map_or(0.0, |remainders| remainders.heading_turns);
@@ -455,7 +413,14 @@ impl Route {
 
     /// Adds the `length` metres of a curve from one place to another. The piece begins at the route's end in the
     /// route's direction there, and turns by `turned` turns to the left.
-    pub fn piece(mut self, segment: Segment, first: Coordinate, last: Coordinate, length: f64, turned: f64) -> Self {
+    pub(super) fn piece(
+        mut self,
+        segment: Segment,
+        first: Coordinate,
+        last: Coordinate,
+        length: f64,
+        turned: f64,
+    ) -> Self {
         let before = self.path.length();
         self.path.push(segment, first, last, length);
         let Some(rest) = &mut self.remainders else {

@@ -119,6 +119,19 @@ impl Curve {
         }
     }
 
+    /// Returns the greatest curvature between two places, 1/m.
+    pub fn tightest(&self, first: &RealParam, last: &RealParam) -> f64 {
+        match self {
+            Self::Line { .. } => 0.0,
+            Self::Arc { radius, .. } => radius.rounded().recip(),
+            Self::Spiral { radius_per_radian, .. } => {
+                let theta = first.at.rounded().min(last.at.rounded());
+                let square = theta * theta;
+                (square + 2.0) / (radius_per_radian.rounded() * (square + 1.0) * (square + 1.0).sqrt())
+            }
+        }
+    }
+
     /// Returns the coordinate `metres` of travel after another, before it if negative.
     pub fn advanced(&self, from: &Real, metres: &Real, functions: &mut Functions) -> Real {
         match self {

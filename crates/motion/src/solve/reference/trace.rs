@@ -6,7 +6,7 @@
 //! neighbours among them, one nearer and one further than the link. As the front handle passes a point, the two move on
 //! to neighbours. This shares nothing with the search of `singularities`.
 
-use super::curve::{Curve, RealParam};
+use super::curve::RealParam;
 use super::path::RealPath;
 use super::real::Real;
 use crate::linkage::NoFollower;
@@ -147,21 +147,6 @@ impl Trace {
         let is_first = !(ahead..index).any(|place| distance(place) >= self.link);
         let segment = self.begins.partition_point(|begin| *begin <= ahead) - 1;
         (!is_first).then(|| (segment, self.backs[ahead]))
-    }
-}
-
-impl Curve {
-    /// Returns the greatest curvature between two places, 1/m.
-    fn tightest(&self, first: &RealParam, last: &RealParam) -> f64 {
-        match self {
-            Self::Line { .. } => 0.0,
-            Self::Arc { radius, .. } => radius.rounded().recip(),
-            Self::Spiral { radius_per_radian, .. } => {
-                let theta = first.at.rounded().min(last.at.rounded());
-                let square = theta * theta;
-                (square + 2.0) / (radius_per_radian.rounded() * (square + 1.0) * (square + 1.0).sqrt())
-            }
-        }
     }
 }
 
