@@ -95,7 +95,7 @@ fn a_least_clearance_is_the_least_up_to_where_the_search_came_or_none() {
         stopped(
             |progress| ensemble.least_clearances(&timeline, timeline.end(), progress),
             |whole, part| {
-                assert!(part.is_stopped && !whole.is_stopped);
+                assert!(!part.is_complete && whole.is_complete);
                 check(whole.own, part.own);
                 check(whole.between, part.between);
                 check(whole.of_show, part.of_show);

@@ -20,8 +20,6 @@ pub struct LeastClearances {
     pub between: Option<TimedClearance>,
     /// The least clearance of any two boards; `None` likewise.
     pub of_show: Option<TimedClearance>,
-    /// True if the search was stopped by the receiver of its progress.
-    pub is_stopped: bool,
     /// True if the search is complete: of all boards, up to the end of the show.
     pub is_complete: bool,
 }
@@ -55,7 +53,7 @@ impl Ensemble {
         let is_complete =
             !is_stopped && of_show.is_none_or(|found| found.is_some_and(|found| found.searched_until.is_none()));
         let of_show = of_show.flatten();
-        LeastClearances { own: own.flatten(), between: between.flatten(), of_show, is_stopped, is_complete }
+        LeastClearances { own: own.flatten(), between: between.flatten(), of_show, is_complete }
     }
 
     /// Returns the least clearance of two boards of one dragon, with the numbers and at the times of the show. Returns
