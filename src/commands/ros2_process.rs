@@ -219,6 +219,9 @@ impl Supervisor {
         command.args(&self.arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
         // With an arena for each thread, the allocator of glibc keeps the memory of subscribers that have left.
         command.env("MALLOC_ARENA_MAX", "1");
+        // Unless it is set, glibc raises this limit, and the receive buffers of RustDDS, 256 kB each
+        // (`network/udp_listener.rs:43`), leave gaps in the pages of small objects that stay.
+        command.env("MALLOC_MMAP_THRESHOLD_", "131072");
         let mut child = command.spawn()?;
         let (output, connected) = (child.stdout.take(), Arc::clone(&self.connected));
         let reader = std::thread::spawn(move || read_lines(output, &connected));

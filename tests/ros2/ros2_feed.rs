@@ -241,10 +241,12 @@ fn the_process_of_ros_2_is_one_subscriber_inherits_no_files_and_ends_with_a_kill
     assert!(!files_of_nodes(child).is_empty());
     // A process may look at a file of another one's node for a moment.
     wait_until("no file is inherited", || files_of_nodes(child).is_disjoint(&of_publisher));
-    // Without this variable the memory of the process grows with the subscribers that come and go, which only the long
-    // run measures.
+    // Without these variables the memory of the process grows with the subscribers that come and go, which only the
+    // long run measures.
     let environment = std::fs::read(format!("/proc/{child}/environ")).unwrap();
-    assert!(environment.split(|byte| *byte == 0).any(|variable| variable == b"MALLOC_ARENA_MAX=1"));
+    for expected in ["MALLOC_ARENA_MAX=1", "MALLOC_MMAP_THRESHOLD_=131072"] {
+        assert!(environment.split(|byte| *byte == 0).any(|variable| variable == expected.as_bytes()), "{expected}");
+    }
     publisher.signal(SIGKILL);
     publisher.output();
     wait_until("the process of ROS 2 has ended", || !exists(child));

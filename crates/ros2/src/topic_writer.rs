@@ -82,8 +82,6 @@ struct Latched<Message> {
     latest: Option<Arc<Message>>,
     /// True if the latest message has been written.
     is_written: bool,
-    /// True if the message never changes.
-    is_constant: bool,
 }
 
 impl<Message: Serialize> TopicWriter<Message> {
@@ -226,8 +224,10 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
         }
         matches.settle(writer, self.readers.update(&subscribers, Instant::now()));
         if subscribers.is_empty() {
-            // The messages that RustDDS keeps are out of date for the next subscriber.
-            if self.readers.written() > 0 && !latched.is_constant {
+            // The messages that RustDDS keeps are out of date for the next subscriber, unless the latest is the only
+            // one. Each new publisher costs memory without end.
+            let is_current = latched.is_written && self.readers.written() == 1;
+            if self.readers.written() > 0 && !is_current {
                 self.replace(node);
             }
             return;
@@ -313,8 +313,7 @@ impl WriterFactory<'_> {
             .create_topic(format!("rt{name}"), type_name, &policies(*qos, bytes), TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = self.node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        let is_constant = matches!(topic, Topic::Stage | Topic::Path);
-        let nothing = Latched { latest: None, is_written: false, is_constant };
+        let nothing = Latched { latest: None, is_written: false };
         let (kind, latched) = match qos.durability {
             Durability::TransientLocal => (Kind::Latest, Some(nothing)),
             Durability::Volatile => (Kind::Volatile(qos.depth.into()), None),
