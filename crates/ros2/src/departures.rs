@@ -12,13 +12,13 @@
 //! died: on this machine those whose sockets are gone, elsewhere those whose addresses belong to a newer participant.
 //! A participant lists all addresses of its machine. It is on this machine if all of them are, and it is succeeded by
 //! one that lists the same. Machines share single addresses, such as those of the loopback interface or of containers'
-//! bridges, but not all.
+//! bridges, but not all. The participants of one process of Cyclone DDS share all, and live side by side.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
-use super::wire::Prefix;
+use super::wire::{Prefix, are_of_one_process};
 
 /// The interval at which sockets are read. Reading takes a fraction of a millisecond, and a new process needs longer to
 /// join the network.
@@ -88,14 +88,14 @@ impl Departures {
         dead
     }
 
-    /// Returns all participants with the addresses of this one but the one that was discovered last.
+    /// Returns all participants with the addresses of this one but the one that was discovered last, and those of its
+    /// process.
     fn earlier_than_the_latest_at(&self, prefix: Prefix) -> Vec<Prefix> {
         let addresses = &self.participants[&prefix].addresses;
         let with = self.participants.iter().filter(|(_, other)| other.addresses == *addresses);
-        let mut with: Vec<Prefix> = with.map(|(prefix, _)| *prefix).collect();
-        with.sort_by_key(|prefix| self.order.get(prefix));
-        with.pop();
-        with
+        let with: Vec<Prefix> = with.map(|(prefix, _)| *prefix).collect();
+        let latest = with.iter().copied().max_by_key(|prefix| self.order.get(prefix)).unwrap_or(prefix);
+        with.into_iter().filter(|prefix| *prefix != latest && !are_of_one_process(*prefix, latest)).collect()
     }
 
     fn remember(&mut self, dead: &[Prefix]) {
@@ -259,6 +259,25 @@ mod tests {
         assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
         departures.discovered([3; 12]);
         assert_eq!(note(&mut departures, [3; 12], one), [OLD]);
+    }
+
+    /// The names are those of two participants of one process, and of one of another process, of Cyclone DDS 11.0.1.
+    #[test]
+    fn participants_of_one_process_of_cyclone_share_its_socket() {
+        let [one, beside, later] = [[1, 16, 0x7f, 0x1a, 9, 1], [1, 16, 0x7f, 0x1a, 9, 2], [1, 16, 0x33, 0x80, 9, 1]]
+            .map(|start| std::array::from_fn(|byte| *start.get(byte).unwrap_or(&7)));
+        // A documentation address (RFC 5737).
+        for address in [free_address(), "198.51.100.1:7411".parse().unwrap()] {
+            let (mut departures, socket) = (Departures::default(), UdpSocket::bind(address));
+            for prefix in [one, beside] {
+                departures.discovered(prefix);
+                assert_eq!(note(&mut departures, prefix, address), [[0; 12]; 0]);
+            }
+            assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
+            departures.discovered(later);
+            assert_eq!(note(&mut departures, later, address), [one, beside]);
+            drop(socket);
+        }
     }
 
     /// As when the kernel's table misses a line.

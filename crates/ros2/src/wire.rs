@@ -15,6 +15,7 @@ pub(super) type Prefix = [u8; 12];
 /// Vendor ids, the first two bytes of GUIDs (RTPS 2.5, sections 9.3.1.5 and 9.4.4).
 const RUSTDDS: [u8; 2] = [1, 18];
 const FAST_DDS: [u8; 2] = [1, 15];
+const CYCLONE_DDS: [u8; 2] = [1, 16];
 /// The protocol version of RustDDS.
 const VERSION: [u8; 2] = [2, 4];
 /// Kinds of submessages.
@@ -51,6 +52,13 @@ pub(super) fn prefix(guid: GUID) -> Prefix {
 /// Returns true for an endpoint of Fast DDS.
 pub(super) fn is_fast_dds(guid: GUID) -> bool {
     guid.to_bytes().starts_with(&FAST_DDS)
+}
+
+/// Returns true for two participants of Cyclone DDS whose names begin alike, as those of one process do: after the
+/// vendor follow two bytes of a hash that is drawn for the process (`ddsi_generate_participant_guid`). All participants
+/// of a process have one socket. Those of other implementations have sockets of their own.
+pub(super) fn are_of_one_process(one: Prefix, other: Prefix) -> bool {
+    one.starts_with(&CYCLONE_DDS) && one[..4] == other[..4]
 }
 
 /// Returns the participant of an endpoint, and the number of the endpoint in it.
