@@ -1,15 +1,19 @@
 """A client of the control services without ROS: Cyclone DDS calls them as rmw_cyclonedds_cpp does.
 
-    ros2_control_peer.py --name NAME [--domain D] [--calls-of-input | --fresh N | --flood N] [SERVICE[=VALUE] ...]
+    ros2_control_peer.py --name NAME [--domain D] [--calls-of-input | --fresh N | --in-turn N | --flood N]
+        [SERVICE[=VALUE] ...]
 
 Before each request and response come the client (uint64) and the number of the call (int64). Prints a JSON line for
 each response, or null if none came within some seconds. With --calls-of-input the calls are lines of standard input, and
-the clients of all services stay. With --fresh, N clients, each with its own participant, make their first call to the first service.
-With --flood, one client calls the first service N times without waiting for a response. Without a call, prints the
+the clients of all services stay. With --fresh, N clients, each with its own participant, make their first call to the
+first service. With --in-turn, N clients, each the only one for its time, make four first calls at once; prints the
+number of responses to each. With --flood, one client calls the first service N times without waiting for a response. Without a call, prints the
 topics below NAME with their types, including those of services, and /clock and /tf.
 """
 
 import argparse
+import functools
+import gc
 import json
 import resource
 import sys
@@ -124,6 +128,7 @@ SERVICES = {
 HEADER = [("client", idl.uint64), ("sequence", idl.int64)]
 
 
+@functools.cache
 def ends(service):
     """Returns the types of a service's request and response."""
     package, name, request, response = SERVICES[service]
@@ -185,19 +190,34 @@ class Client:
         self.sequence += 1
         self.writer.write(self.request(self.number, self.sequence, *arguments_of(self.service, text)))
 
-    def call(self, text, seconds):
-        self.send(text)
+    def responses(self, seconds):
+        """Yields the responses to this client that come within some seconds."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             for sample in self.reader.take(N=10):
-                fields = getattr(sample, "__dataclass_fields__", None)
                 # The notice that a publisher has gone comes as an empty sample.
-                if fields is None:
-                    continue
-                if (sample.client, sample.sequence) == (self.number, self.sequence):
-                    return {name: plain(getattr(sample, name)) for name in fields if name not in dict(HEADER)}
+                if hasattr(sample, "__dataclass_fields__") and sample.client == self.number:
+                    yield sample
             time.sleep(0.001)
+
+    def call(self, text, seconds):
+        self.send(text)
+        for sample in self.responses(seconds):
+            if sample.sequence == self.sequence:
+                names = (name for name in sample.__dataclass_fields__ if name not in dict(HEADER))
+                return {name: plain(getattr(sample, name)) for name in names}
         return None
+
+    def call_at_once(self, calls, seconds):
+        """Returns the number of these calls that get a response."""
+        for _ in range(calls):
+            self.send("")
+        answered = set()
+        for sample in self.responses(seconds):
+            answered.add(sample.sequence)
+            if len(answered) == calls:
+                break
+        return len(answered)
 
 
 def endpoints(participant, name, topics, seconds):
@@ -227,6 +247,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=300.0, help="greatest wait for a response")
     parser.add_argument("--calls-of-input", action="store_true")
     parser.add_argument("--fresh", type=int, default=0)
+    parser.add_argument("--in-turn", type=int, default=0)
     parser.add_argument("--flood", type=int, default=0)
     parser.add_argument("--topics", type=int, default=1, help="topics to wait for if there is no call")
     parser.add_argument("calls", nargs="*")
@@ -250,6 +271,16 @@ def main():
         with ThreadPoolExecutor(10) as pool:
             for answer in pool.map(first_call, range(arguments.fresh)):
                 print(json.dumps(answer), flush=True)
+        return
+
+    for _ in range(arguments.in_turn):
+        client = Client(DomainParticipant(arguments.domain), arguments.name, arguments.calls[0])
+        if not client.ready(300):
+            sys.exit("no service")
+        print(json.dumps(client.call_at_once(4, arguments.seconds)), flush=True)
+        del client
+        gc.collect()
+    if arguments.in_turn:
         return
 
     participant = DomainParticipant(arguments.domain)

@@ -130,20 +130,15 @@ impl Matches {
     /// Cyclone DDS takes the messages that the first heartbeat of a writer names for old ones, and acknowledges them
     /// without delivery to a volatile reader. RustDDS sends a heartbeat when it matches a reader
     /// (`Writer::update_reader_proxy`, `rtps/writer.rs:1971`), but the reader may not know the writer yet. The next
-    /// heartbeat may name an answer that RustDDS has not sent: it counts a message from the call that writes it, and
-    /// answers an ACKNACK before it sends (`Writer::handle_ack_nack`, `rtps/writer.rs:1137`). The client would then
-    /// wait without end. So this heartbeat, just before an answer is written, names the earlier answers.
+    /// heartbeat follows an answer, and also names the answers that are written and not sent
+    /// (`FragmentationIter::next`, `rtps/writer.rs:2392`). The client would wait for these without end. So this
+    /// heartbeat, just before an answer is written, names the earlier answers. Held by
+    /// `all_first_calls_of_a_new_client_are_answered`.
     pub(super) fn announce(&self, writer: GUID, reader: GUID, written: u32) {
         self.with(|ends| {
             let addresses = ends.addresses.get(&reader).into_iter().flatten().copied();
             wire::send(&wire::heartbeat(writer, reader, written), addresses);
         });
-    }
-
-    /// Notifies all subscribers of a local writer that the writer has written nothing until now, for the reason that
-    /// [`announce`](Self::announce) has.
-    pub(super) fn announce_to_all(&self, writer: GUID) {
-        self.subscribers(writer).into_keys().for_each(|reader| self.announce(writer, reader, 0));
     }
 
     /// Returns true if a response written to `responses` reaches the client that sent a request from `client` to

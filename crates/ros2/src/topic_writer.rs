@@ -134,10 +134,6 @@ impl<Message: Serialize> TopicWriter<Message> {
     }
 
     fn write(&mut self, message: Arc<Message>) -> bool {
-        if self.readers.written() == 0 {
-            // Frames that come at once have one heartbeat, which names them all: the first would be old for Cyclone.
-            self.matches.announce_to_all(self.publisher.guid());
-        }
         let is_written = self.publisher.publish(Arc::clone(&message)).is_ok();
         if is_written {
             self.relief.count();

@@ -37,6 +37,40 @@ fn a_hundred_new_clients_of_each_kind_get_the_answer_to_their_first_call() {
     assert!(!printed.contains("refused"), "{printed}");
 }
 
+/// Answers that are written at once are named by the heartbeat after the first of them. Cyclone DDS takes what its first
+/// heartbeat of a writer names for old. It may have seen none before: most of these clients know the publisher later
+/// than the publisher knows them.
+#[test]
+fn all_first_calls_of_a_new_client_are_answered() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "at_once";
+    // With services that conduct the show, requests are polled so often that an answer comes before the next heartbeat.
+    let publisher = publisher(name, &["--ros2-control", "--duration", "6000"]);
+    let output = Process::start(&mut peer(name, &["--in-turn", "20", "--seconds", "20", "list_parameters"])).output();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_eq!(json_lines(&output), vec![json!(4); 20]);
+    ended(publisher);
+}
+
+/// All participants of a process of Cyclone DDS have one socket. None is taken for the successor of another.
+#[test]
+fn all_clients_of_one_process_are_answered() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "one_process";
+    let publisher = publisher(name, &["--duration", "6000"]);
+    for _ in 0..3 {
+        let clients = ["--fresh", "4", "--seconds", "60", "list_parameters"];
+        let output = Process::start(&mut peer(name, &clients)).output();
+        let answers = json_lines(&output).iter().filter(|line| line["response"]["result"].is_object()).count();
+        assert_eq!(answers, 4, "{}: {} {}", output.status, text(&output.stdout), text(&output.stderr));
+    }
+    ended(publisher);
+}
+
 /// Both kinds of client conduct one show by the same services, in turn. Cyclone DDS's stays all the time, so each
 /// answer to the other passes by its readers.
 #[test]
