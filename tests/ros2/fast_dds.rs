@@ -384,7 +384,7 @@ fn visit(name: &str, index: usize) -> Visit {
 
 /// Messages of 223 benches on a busy machine; half of the subscribers are killed, the others leave. A subscriber of Fast
 /// DDS that is sent an empty change spins, and would never end. `BENCH_DRAGON_SUBSCRIBERS` is their number, 2,000 by
-/// default, which take 20 minutes.
+/// default, which take some five minutes.
 #[test]
 fn subscribers_that_come_and_go_cost_bounded_memory_and_none_is_left_without_messages() {
     // Beside many other processes a subscriber may discover the publisher later than within its minute.

@@ -13,6 +13,8 @@
 //! A participant lists all addresses of its machine. It is on this machine if all of them are, and it is succeeded by
 //! one that lists the same. Machines share single addresses, such as those of the loopback interface or of containers'
 //! bridges, but not all. The participants of one process of Cyclone DDS share all, and live side by side.
+//!
+//! Held by `the_ports_of_a_killed_subscriber_are_silent_within_seconds` and `all_clients_of_one_process_are_answered`.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{SocketAddr, UdpSocket};

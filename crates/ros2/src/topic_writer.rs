@@ -3,8 +3,9 @@
 //! A transient-local topic holds one message here: the latest. RustDDS keeps more, whatever the depth: unacknowledged
 //! messages, and all others until its cleanup every six seconds. A late subscriber would get all of them first. With
 //! Fast DDS so would a volatile subscriber, since RustDDS does not read the durability of a subscriber. So a message
-//! without subscribers is held here and not written, and a writer of events is replaced after its last subscriber has
-//! left. A GAP of our own ([`readers`](super::readers)) withholds older messages from a subscriber that joins others.
+//! without subscribers is held here and not written, and a writer that keeps outdated messages is replaced after its
+//! last subscriber has left. A GAP of our own ([`readers`](super::readers)) withholds older messages from a subscriber
+//! that joins others, and the latest one from a volatile subscriber.
 //! RustDDS sends a GAP only if the writer is volatile (`Writer::matched_reader_update`, `rtps/writer.rs:2074`). A
 //! second, volatile writer is no remedy: a volatile subscriber matches both, and a transient-local one would report
 //! the second as incompatible. Messages to single readers are no remedy either: RustDDS repairs them for every later
@@ -221,7 +222,7 @@ impl<Message: Serialize> Serviced for TopicWriter<Message> {
         matches.settle(writer, self.readers.update(&subscribers, Instant::now()));
         if subscribers.is_empty() {
             // The messages that RustDDS keeps are out of date for the next subscriber, unless the latest is the only
-            // one. Each new publisher costs memory without end.
+            // one. The memory of a replaced publisher is never free again: it stays in tables of discovery.
             let is_current = latched.is_written && self.readers.written() == 1;
             if self.readers.written() > 0 && !is_current {
                 self.replace(node);
