@@ -259,9 +259,12 @@ def main():
 
         # No client is removed while others are created.
         clients = []
+        creation = threading.Lock()
 
         def first_call(_):
-            client = Client(DomainParticipant(arguments.domain), arguments.name, arguments.calls[0])
+            # Topics of one type that are created at once fail at times.
+            with creation:
+                client = Client(DomainParticipant(arguments.domain), arguments.name, arguments.calls[0])
             clients.append(client)
             if not client.ready(300):
                 return {"response": "no service"}
