@@ -3,12 +3,12 @@
 use super::Proved;
 use super::events::{Events, LockShown};
 use super::greatest::Greatest;
-use super::lines::{About, ParsedLine, ProvedClearance, ProvedObstacleClearance};
+use super::lines::{About, ParsedLine, ProvedEvent};
 use super::path::Span;
 use super::pitch::Pitch;
-use super::results;
+use super::results::{Claim, Clearance, Known, Subject};
 use super::scene::Scene;
-use super::several::{Alone, Claim, Pair};
+use super::several::{Alone, Pair, PairClaim};
 use super::steps::{Step, Steps};
 
 /// The version of the file format.
@@ -67,15 +67,15 @@ impl Checker {
             links,
             pairs,
         };
-        let (steps, events, greatest) = (Steps::new(), Events::default(), Greatest::default());
+        let steps = Steps::new(scenes[0].obstacles.len());
+        let (events, greatest) = (Events::default(), Greatest::default());
         let (is_in_section, between, before) = (false, None, 0);
         Ok(Self { about, scenes, alone, is_in_section, between, before, steps, events, greatest, pitch: None, proved })
     }
 
-    /// Returns the number of results of a dragon's section.
-    fn results_of(&self, dragon: usize) -> usize {
-        let kinds = if self.about == About::Events { 4 } else { 1 };
-        kinds + self.scenes[dragon].obstacles.len()
+    /// Returns the dragon of the section; the only one of a scene of one.
+    fn dragon(&self) -> &Scene {
+        &self.scenes[self.alone.as_ref().map_or(0, Vec::len)]
     }
 
     /// Returns the number of results of all sections so far.
@@ -87,12 +87,67 @@ impl Checker {
 
     /// Returns true if the section of a dragon or of two has its results.
     fn is_section_complete(&self) -> bool {
-        let so_far = self.results() - self.before;
-        match (&self.alone, &self.between) {
-            (_, Some(_)) => so_far == 1,
-            (Some(alone), None) => self.is_in_section && so_far == self.results_of(alone.len()),
-            (None, None) => so_far == self.results_of(0),
+        let has_begun = self.alone.is_none() || self.is_in_section || self.between.is_some();
+        has_begun && self.subject().is_none()
+    }
+
+    /// Returns the subject of the next result of a section; `None` after the last.
+    fn subject(&self) -> Option<Subject> {
+        let earlier = self.results() - self.before;
+        // Of two dragons there is one result.
+        let (most, obstacles) =
+            if self.between.is_some() { (1, 0) } else { (usize::MAX, self.dragon().obstacles.len()) };
+        if earlier < most { Subject::nth(self.about, earlier, obstacles) } else { None }
+    }
+
+    /// Returns the dragon of a section in a scene of several, or the two.
+    fn dragons(&self) -> Vec<usize> {
+        match &self.between {
+            Some(pair) => pair.dragons.to_vec(),
+            None => Vec::from_iter(self.alone.as_ref().map(Vec::len)),
         }
+    }
+
+    /// Returns what the section has shown about the subject of a result. It must be the next one.
+    fn known(&self, claim: Claim, obstacle: Option<usize>, dragons: &[usize]) -> Result<Known<'_>, String> {
+        let subject = self.subject().ok_or("a result too many: its section has all results")?;
+        if (claim, obstacle) != (subject.claim, subject.obstacle) {
+            let first = if self.about == About::Events { "contact, stall, lock, path_end" } else { "least_clearance" };
+            return Err(format!("the results are not {first} and the obstacles in this order"));
+        }
+        if *dragons != self.dragons() {
+            return Err("it is not the result for this dragon, or for these two".to_owned());
+        }
+        Ok(match (&self.between, &self.alone) {
+            (Some(pair), Some(alone)) => pair.known(&self.scenes, alone),
+            _ => self.events.known(self.dragon(), &self.steps, &subject),
+        })
+    }
+
+    /// Checks and adds a result of a section. Returns another line.
+    fn add_result(&mut self, line: ParsedLine) -> Result<Option<ParsedLine>, String> {
+        match line {
+            ParsedLine::Result(outcome) => {
+                let ProvedEvent { event, obstacle, dragons, .. } = &outcome;
+                self.known(Claim::Event(*event), *obstacle, dragons)?.check_event(&outcome)?;
+                self.proved.results.push(outcome);
+            }
+            ParsedLine::LeastClearance(outcome) => {
+                let known = self.known(Claim::Clearance, None, &outcome.dragons)?;
+                known.check_clearance(&Clearance::from(&outcome))?;
+                match self.alone {
+                    Some(_) => self.proved.least_clearances.push(outcome),
+                    None => self.proved.least_clearance = Some(outcome),
+                }
+            }
+            ParsedLine::ObstacleClearance(outcome) => {
+                let known = self.known(Claim::Clearance, Some(outcome.obstacle), &outcome.dragons)?;
+                known.check_clearance(&Clearance::from(&outcome))?;
+                self.proved.obstacle_clearances.push(outcome);
+            }
+            line => return Ok(Some(line)),
+        }
+        Ok(None)
     }
 
     /// Ends a section, and adds its counts.
@@ -103,7 +158,9 @@ impl Checker {
         let Some(alone) = &mut self.alone else {
             return Err("the scene has one dragon, and no sections".to_owned());
         };
-        let (steps, events) = (std::mem::replace(&mut self.steps, Steps::new()), std::mem::take(&mut self.events));
+        // All dragons are on one stage.
+        let next = Steps::new(self.scenes[0].obstacles.len());
+        let (steps, events) = (std::mem::replace(&mut self.steps, next), std::mem::take(&mut self.events));
         let mut counts = [steps.steps, steps.links, steps.pairs];
         if self.is_in_section {
             alone.push(Alone::new(&steps, &events));
@@ -132,7 +189,7 @@ impl Checker {
     /// Handles the lines of a scene of several dragons. Returns false for another line.
     fn add_of_ensemble(&mut self, line: &ParsedLine) -> Result<bool, String> {
         let has_result = self.between.is_some() && self.results() > self.before;
-        let Self { about, scenes, alone, between, proved, .. } = self;
+        let Self { about, scenes, alone, between, .. } = self;
         if has_result && !matches!(line, ParsedLine::Dragon { .. } | ParsedLine::Pair { .. }) {
             return Err("nothing of two dragons can follow their result".to_owned());
         }
@@ -156,10 +213,10 @@ impl Checker {
             }
             (ParsedLine::Both { from, to, heads, spans: [one, other], apart, at }, Some(pair), Some(_)) => {
                 let claim = match (&about, apart) {
-                    (About::Events, None) => Claim::Clear,
+                    (About::Events, None) => PairClaim::Clear,
                     (About::Events, Some(_)) => return Err("`apart` in a certificate of events".to_owned()),
-                    (_, None) => Claim::Links,
-                    (_, Some(metres)) => Claim::Apart(*metres, at.each_ref().map(Vec::as_slice)),
+                    (_, None) => PairClaim::Links,
+                    (_, Some(metres)) => PairClaim::Apart(*metres, at.each_ref().map(Vec::as_slice)),
                 };
                 pair.add_both(scenes, [*from, *to], (*heads, [one, other]), claim)?;
             }
@@ -171,14 +228,7 @@ impl Checker {
                 let alone = (*about == About::Events).then_some(alone.as_slice());
                 pair.add_meeting(scenes, alone, (*benches, *time), (*heads, [one, other]), *point)?;
             }
-            (ParsedLine::Result(outcome), Some(pair), Some(alone)) => {
-                pair.check(scenes, alone, outcome)?;
-                proved.results.push(outcome.clone());
-            }
-            (ParsedLine::LeastClearance(outcome), Some(pair), Some(_)) => {
-                pair.check_clearance(scenes, outcome)?;
-                proved.least_clearances.push(outcome.clone());
-            }
+            (ParsedLine::Result(_) | ParsedLine::LeastClearance(_), Some(_), _) => return Ok(false),
             (
                 ParsedLine::Dragon { .. }
                 | ParsedLine::Both { .. }
@@ -230,6 +280,7 @@ impl Checker {
         if self.add_of_ensemble(&line)? {
             return Ok(());
         }
+        let Some(line) = self.add_result(line)? else { return Ok(()) };
         let section = self.alone.as_ref().map(Vec::len);
         if let (ParsedLine::Branch { link, from, to, behind }, true) = (&line, self.about != About::LeastPitch) {
             if self.steps.end.is_some() || self.greatest.steps > 0 {
@@ -241,7 +292,6 @@ impl Checker {
         let so_far = self.results() - self.before;
         let Self { about, scenes, steps, events, greatest, pitch, proved, .. } = self;
         let scene = &scenes[section.unwrap_or(0)];
-        let of_section = Vec::from_iter(section);
         if question.is_none() && (events.finish.is_some() || so_far > 0) {
             return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
         }
@@ -277,38 +327,6 @@ impl Checker {
                 events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
             }
             ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
-            ParsedLine::Result(outcome) => {
-                let earlier = &proved.results[proved.results.len() - so_far..];
-                results::check(scene, steps, events, &outcome, earlier)?;
-                if of_section != outcome.dragons {
-                    return Err("it is not the result for this dragon".to_owned());
-                }
-                proved.results.push(outcome);
-                Ok(())
-            }
-            ParsedLine::LeastClearance(_) if so_far > 0 => Err("a second result".to_owned()),
-            ParsedLine::LeastClearance(ProvedClearance { dragons, .. })
-            | ParsedLine::ObstacleClearance(ProvedObstacleClearance { dragons, .. })
-                if dragons != of_section =>
-            {
-                Err("it is not the result for this dragon".to_owned())
-            }
-            ParsedLine::ObstacleClearance(outcome) => {
-                let Some(earlier) = so_far.checked_sub(1) else {
-                    return Err("the result for two boards does not precede it".to_owned());
-                };
-                results::check_obstacle_clearance(scene, steps, events, &outcome, earlier)?;
-                proved.obstacle_clearances.push(outcome);
-                Ok(())
-            }
-            ParsedLine::LeastClearance(outcome) => {
-                results::check_clearance(scene, steps, events, &outcome)?;
-                match section {
-                    Some(_) => proved.least_clearances.push(outcome),
-                    None => proved.least_clearance = Some(outcome),
-                }
-                Ok(())
-            }
             ParsedLine::Speeds { from, to, spans, at } => greatest.add_step(scene, Span(from, to), &spans, &at),
             ParsedLine::Fast { handle, spans, at } => greatest.add_fast(scene, handle, &spans, &at),
             ParsedLine::GreatestSpeed(outcome) => {
@@ -331,7 +349,10 @@ impl Checker {
             | ParsedLine::Pair { .. }
             | ParsedLine::Both { .. }
             | ParsedLine::NearBoth { .. }
-            | ParsedLine::Meeting { .. } => Err("the scene has one dragon".to_owned()),
+            | ParsedLine::Meeting { .. }
+            | ParsedLine::Result(_)
+            | ParsedLine::LeastClearance(_)
+            | ParsedLine::ObstacleClearance(_) => Err("it is not in a section".to_owned()),
             ParsedLine::LeastPitch(outcome) => {
                 begun(pitch)?.check(&outcome)?;
                 proved.least_pitch = Some(outcome);

@@ -4,49 +4,35 @@ use super::boards::{Board, covers};
 use super::chain::{Chain, span_is_one};
 use super::first_order::FirstOrder;
 use super::interval::{Interval, Vector};
+use super::lines::EventKind;
 use super::link;
 use super::path::{Place, Span};
+use super::results::{Claim, Known, Subject};
 use super::scene::Scene;
+use super::shown::{At, Shown, Witness};
 use super::steps::Steps;
 
 /// The events that are shown so far.
 #[derive(Default)]
 pub(super) struct Events {
-    /// The benches that overlap, and the place of the head. A place before the start means an overlap at the start.
-    pub contact: Option<([usize; 2], Place)>,
-    /// The link that has stalled, and the place of the head, as above.
-    pub stall: Option<(usize, Place)>,
-    /// The obstacles that were reached, each with the bench and the place of the head, as above.
-    pub reached: Vec<(usize, usize, Place)>,
+    /// Two benches that overlap.
+    pub contact: Option<Witness>,
+    /// A link that has stalled.
+    pub stall: Option<Witness>,
+    /// The obstacles that were reached, each with a bench.
+    pub reached: Vec<(usize, Witness)>,
     /// The end of the motion.
     pub finish: Option<Finish>,
-    /// Two boards that are near each other.
-    pub near: Option<Near>,
-    /// Boards near obstacles.
-    pub near_obstacles: Vec<NearObstacle>,
-}
-
-/// Two benches that are no further apart than some metres at a place of the motion.
-pub(super) struct Near {
-    pub benches: [usize; 2],
-    pub most: Interval,
-    /// A lower bound of the travel of the head at that place, in metres.
-    pub travelled: Interval,
-}
-
-/// A bench whose clearance from an obstacle is no more than some metres at a place of the motion.
-pub(super) struct NearObstacle {
-    pub obstacle: usize,
-    pub bench: usize,
-    pub most: Interval,
-    /// A lower bound of the travel of the head at that place, in metres.
-    pub travelled: Interval,
+    /// Two benches that are near each other.
+    pub near: Option<Witness>,
+    /// Benches near obstacles.
+    pub near_obstacles: Vec<(usize, Witness)>,
 }
 
 /// The end of a motion.
 pub(super) enum Finish {
-    /// The link whose follower is not continuous, and the place of the head.
-    Lock(usize, Place),
+    /// The link whose follower is not continuous.
+    Lock(Witness),
     /// The path's end has been reached.
     PathEnd,
 }
@@ -89,18 +75,13 @@ fn touching_chain(scene: &Scene, steps: &Steps, head: Span, spans: &[Span]) -> R
 ///
 /// # Errors
 /// The condition that does not follow.
-fn near_step(
-    scene: &Scene,
-    shown: Option<Place>,
-    head: Span,
-    (spans, at): (&[Span], &[Place]),
-) -> Result<FirstOrder, String> {
+fn near_step(scene: &Scene, shown: &Shown, head: Span, (spans, at): (&[Span], &[Place])) -> Result<FirstOrder, String> {
     let (path, Span(from, to)) = (&scene.path, head);
     let chain = Chain::check(scene, head, spans)?;
     if !Interval::new(0.0).is_at_most(&path.travelled(to)) || !path.is_within(from) {
         return Err("the head is before the start or beyond the end of the path".to_owned());
     }
-    if !shown.is_some_and(|end| path.in_order(from, end)) {
+    if !shown.end.is_some_and(|end| matches!(end, At::Head(end) if path.in_order(from, end))) {
         return Err("no step has come there".to_owned());
     }
     FirstOrder::new(scene, &chain, at)
@@ -136,7 +117,7 @@ impl Events {
                 return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
             }
         }
-        self.contact = Some((benches, head.0));
+        self.contact = Some(Witness::of_event(benches.map(Some), At::Head(head.0)));
         Ok(())
     }
 
@@ -153,7 +134,7 @@ impl Events {
         spans: &[Span],
         point: [f64; 2],
     ) -> Result<(), String> {
-        if self.reached.iter().any(|(other, ..)| *other == number) {
+        if self.reached.iter().any(|(other, _)| *other == number) {
             return Err(format!("obstacle {number} was reached before"));
         }
         let obstacle = scene.obstacles.get(number).ok_or_else(|| format!("the scene has no obstacle {number}"))?;
@@ -166,7 +147,7 @@ impl Events {
         if !obstacle.is_reached_by(&board, &Vector::new(point[0], point[1])) {
             return Err(format!("bench {bench} may be clear of obstacle {number} (Lemma 9)"));
         }
-        self.reached.push((number, bench, head.0));
+        self.reached.push((number, Witness::of_event([Some(bench), None], At::Head(head.0))));
         Ok(())
     }
 
@@ -189,13 +170,13 @@ impl Events {
         if b < 2 || a > b - 2 || b >= spans.len() {
             return Err(format!("benches {a} and {b} share a handle, or are not both listed in order"));
         }
-        let step = near_step(scene, steps.apart_end, head, (spans, at))?;
+        let step = near_step(scene, &steps.apart, head, (spans, at))?;
         let [one, other] = [a, b].map(|bench| step.board(bench, &scene.team));
         let most = Interval::new(most);
         if !one.at_most(&other).is_at_most(&most) {
             return Err(format!("benches {a} and {b} may be further apart than it says (Lemma 6)"));
         }
-        self.near = Some(Near { benches: [a, b], most, travelled: scene.path.travelled(head.0) });
+        self.near = Some(Witness { benches: [Some(a), Some(b)], most, at: At::Head(head.0) });
         Ok(())
     }
 
@@ -212,20 +193,20 @@ impl Events {
         (spans, at): (&[Span], &[Place]),
         most: f64,
     ) -> Result<(), String> {
-        if self.near_obstacles.iter().any(|other| other.obstacle == number) {
+        if self.near_obstacles.iter().any(|(other, _)| *other == number) {
             return Err(format!("a second line `near_obstacle` of obstacle {number}"));
         }
         let obstacle = scene.obstacles.get(number).ok_or_else(|| format!("the scene has no obstacle {number}"))?;
         if bench >= spans.len() {
             return Err(format!("bench {bench} is not listed"));
         }
-        let step = near_step(scene, steps.beside(number).end, head, (spans, at))?;
+        let step = near_step(scene, &steps.beside[number], head, (spans, at))?;
         let most = Interval::new(most);
         if !obstacle.at_most(&step.board(bench, &scene.team)).is_at_most(&most) {
             return Err(format!("bench {bench} may be further from obstacle {number} than it says (Lemma 11)"));
         }
-        let travelled = scene.path.travelled(head.0);
-        self.near_obstacles.push(NearObstacle { obstacle: number, bench, most, travelled });
+        let near = Witness { benches: [Some(bench), None], most, at: At::Head(head.0) };
+        self.near_obstacles.push((number, near));
         Ok(())
     }
 
@@ -250,14 +231,13 @@ impl Events {
             return Err("it is not where the last step ended".to_owned());
         }
         // Otherwise the link may have stalled before the start.
-        let zero = Interval::new(0.0);
-        if !steps.moving_end.is_some_and(|end| zero.is_at_most(&scene.path.travelled(end))) {
+        if !steps.moving.has_come_to(scene, 0.0) {
             return Err("no moving step has come to the start".to_owned());
         }
         if !chain.products.get(link).is_some_and(Interval::is_negative) {
             return Err(format!("link {link} may not have stalled (Lemma 5)"));
         }
-        self.stall = Some((link, head.0));
+        self.stall = Some(Witness::of_event([Some(link), None], At::Head(head.0)));
         Ok(())
     }
 
@@ -308,7 +288,7 @@ impl Events {
         if !test(path, front_at_end, window, &squared) {
             return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
         }
-        self.finish = Some(Finish::Lock(link, to));
+        self.finish = Some(Finish::Lock(Witness::of_event([Some(link), None], At::Head(to))));
         Ok(())
     }
 
@@ -322,5 +302,38 @@ impl Events {
         }
         self.finish = Some(Finish::PathEnd);
         Ok(())
+    }
+
+    /// Returns what a section of one dragon has shown about the subject of a result.
+    pub fn known<'s>(&self, scene: &'s Scene, steps: &Steps, subject: &Subject) -> Known<'s> {
+        let of_obstacle = |found: &[(usize, Witness)]| {
+            found.iter().find(|(number, _)| Some(*number) == subject.obstacle).map(|(_, witness)| *witness)
+        };
+        let (ends, lock) = match self.finish {
+            Some(Finish::PathEnd) => (true, None),
+            Some(Finish::Lock(lock)) => (false, Some(lock)),
+            None => (false, None),
+        };
+        let up_to = |end: Option<At>| Shown { end, ..Shown::NOTHING };
+        let (shown, event, near) = match (subject.claim, subject.obstacle) {
+            (Claim::Event(EventKind::Contact), _) => (steps.clear, self.contact, None),
+            (Claim::Event(EventKind::Stall), _) => (steps.moving, self.stall, None),
+            (Claim::Event(EventKind::Lock), _) => (up_to(steps.end.map(At::Head)), lock, None),
+            (Claim::Event(EventKind::PathEnd), _) => {
+                let event = ends.then_some(Witness::of_event([None; 2], At::PathEnd));
+                let shown = up_to(Some(At::PathEnd));
+                return Known { scene, shown, event, near: None, is_whole: lock.is_some(), locks: Vec::new() };
+            }
+            (Claim::Event(EventKind::Obstacle), number) => {
+                (number.map_or(Shown::NOTHING, |number| steps.free[number]), of_obstacle(&self.reached), None)
+            }
+            (Claim::Clearance, None) => (steps.apart, self.contact, self.near),
+            (Claim::Clearance, Some(number)) => (steps.beside[number], None, of_obstacle(&self.near_obstacles)),
+        };
+        let zero = Interval::new(0.0);
+        // A lock has happened itself.
+        let locks = lock.filter(|_| shown.all && subject.claim != Claim::Event(EventKind::Lock));
+        let locks = locks.map(|_| [zero, shown.end.map_or(zero, |end| end.seconds(scene))]);
+        Known { scene, shown, event, near, is_whole: ends && shown.all, locks: Vec::from_iter(locks) }
     }
 }

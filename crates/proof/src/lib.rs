@@ -30,6 +30,7 @@ mod placement;
 mod results;
 mod scene;
 mod several;
+mod shown;
 mod sides;
 mod speeds;
 mod steps;

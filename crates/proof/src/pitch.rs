@@ -8,6 +8,7 @@ use super::interval::{Interval, Vector};
 use super::lines::ProvedPitch;
 use super::path::{Place, Span};
 use super::scene::Scene;
+use super::shown::At;
 use super::steps::{Step, Steps};
 
 /// Limit of pieces on which a distance is bounded for one lock. A certificate that the search has written needs some
@@ -194,12 +195,12 @@ impl Pitch {
         }
         let Some(value_hi) = value_hi else { return Ok(()) };
         let reached = self.free.as_ref().filter(|free| free.pitch == value_hi).is_some_and(|free| {
-            let Steps { end, apart_end, all_apart, apart, .. } = &free.steps;
+            let Steps { end, apart, .. } = &free.steps;
             let within = |metres: &Interval| metres.is_at_most(&Interval::new(radius));
             within(&Interval::new(free.far))
-                || *all_apart
-                    && *apart >= self.clearance
-                    && end == apart_end
+                || apart.all
+                    && apart.least >= self.clearance
+                    && end.map(At::Head) == apart.end
                     && end.and_then(|end| free.scene.path.spiral_radius(end)).is_some_and(|metres| within(&metres))
         });
         if reached { Ok(()) } else { Err("value_hi does not follow".to_owned()) }

@@ -1,215 +1,177 @@
-//! Checks that a result follows from the steps and the events.
+//! Checks that a result follows from what a section has shown.
 
-use super::events::{Events, Finish, Near};
 use super::interval::Interval;
-use super::lines::{EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, Status, Until};
-use super::path::Place;
+use super::lines::{About, EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, Status, Until};
 use super::scene::Scene;
-use super::steps::Steps;
+use super::shown::{Shown, Witness};
 
-/// The order of the results.
-const ORDER: [EventKind; 4] = [EventKind::Contact, EventKind::Stall, EventKind::Lock, EventKind::PathEnd];
-
-/// The state of knowledge of an event.
-struct Known {
-    /// The time, in seconds, before which the event does not happen.
-    not_before: Interval,
-    /// The time, in seconds, by which the event has happened, and its benches.
-    by: Option<(Interval, Option<usize>, Option<usize>)>,
-    /// True if the event does not happen before the motion ends.
-    never: bool,
+/// The claim of a result.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Claim {
+    /// The time of the first such event.
+    Event(EventKind),
+    /// The least clearance.
+    Clearance,
 }
 
-/// Checks a result. `earlier` are the results before it.
-///
-/// # Errors
-/// The condition that does not follow.
-pub(super) fn check(
-    scene: &Scene,
-    steps: &Steps,
-    events: &Events,
-    outcome: &ProvedEvent,
-    earlier: &[ProvedEvent],
-) -> Result<(), String> {
-    let obstacle = earlier.len().checked_sub(ORDER.len());
-    let expected = ORDER.get(earlier.len()).copied().unwrap_or(EventKind::Obstacle);
-    if obstacle.is_some_and(|number| number >= scene.obstacles.len()) {
-        return Err("a result too many, expected four and one for each obstacle".to_owned());
-    }
-    if outcome.event != expected || outcome.obstacle != obstacle {
-        return Err("the results are not contact, stall, lock, path_end and the obstacles in this order".to_owned());
-    }
-    let known = known(scene, steps, events, (expected, obstacle.unwrap_or(0)));
-    let ProvedEvent { time_lo, time_hi, bench_a, bench_b, .. } = outcome;
-    let begins = |lo: f64| lo.is_finite() && lo >= 0.0 && Interval::new(lo).is_at_most(&known.not_before);
-    match (outcome.status, time_lo, time_hi) {
-        (Status::None, lo, None) if known.never && bench_a.is_none() && bench_b.is_none() => {
-            // Between the last step and the lock nothing is known, so a claim must state up to when it holds.
-            let up_to_a_lock = matches!(events.finish, Some(Finish::Lock(..))) && expected != EventKind::PathEnd;
-            match lo {
-                Some(lo) if up_to_a_lock && begins(*lo) => Ok(()),
-                None if !up_to_a_lock => Ok(()),
-                _ => Err("the time_lo of status none does not follow".to_owned()),
+/// The claims of the results of a section before those about obstacles, in their order.
+const OF_EVENTS: [Claim; 4] = [
+    Claim::Event(EventKind::Contact),
+    Claim::Event(EventKind::Stall),
+    Claim::Event(EventKind::Lock),
+    Claim::Event(EventKind::PathEnd),
+];
+const OF_CLEARANCE: [Claim; 1] = [Claim::Clearance];
+
+/// The subject of a result.
+pub(super) struct Subject {
+    pub claim: Claim,
+    pub obstacle: Option<usize>,
+}
+
+impl Subject {
+    /// Returns the subject of a result of a section, by the number of results before it and the number of obstacles.
+    /// Returns `None` after the last.
+    pub fn nth(about: About, earlier: usize, obstacles: usize) -> Option<Self> {
+        let (claims, of_obstacle): (&[Claim], _) = match about {
+            About::Events => (&OF_EVENTS, Claim::Event(EventKind::Obstacle)),
+            _ => (&OF_CLEARANCE, Claim::Clearance),
+        };
+        match earlier.checked_sub(claims.len()) {
+            None => Some(Self { claim: claims[earlier], obstacle: None }),
+            number => {
+                number.filter(|number| *number < obstacles).map(|_| Self { claim: of_obstacle, obstacle: number })
             }
         }
-        (Status::None, ..) => Err("the status none does not follow".to_owned()),
-        (Status::Undecided, Some(lo), None) if begins(*lo) && bench_a.is_none() && bench_b.is_none() => Ok(()),
-        (Status::Undecided, ..) => Err("the status undecided with this time_lo does not follow".to_owned()),
-        (Status::Proved, Some(lo), Some(hi)) => {
-            let Some((by, a, b)) = known.by else { return Err("the status proved does not follow".to_owned()) };
-            if (a, b) != (*bench_a, *bench_b) {
-                return Err("the benches are not those of the event".to_owned());
-            }
-            if begins(*lo) && hi.is_finite() && by.is_at_most(&Interval::new(*hi)) {
-                Ok(())
-            } else {
-                Err("the interval from time_lo to time_hi does not follow".to_owned())
-            }
-        }
-        (Status::Proved, ..) => Err("a time is missing".to_owned()),
     }
 }
 
-/// Checks the result of a certificate of the least clearance.
-///
-/// # Errors
-/// The condition that does not follow.
-pub(super) fn check_clearance(
-    scene: &Scene,
-    steps: &Steps,
-    events: &Events,
-    outcome: &ProvedClearance,
-) -> Result<(), String> {
-    let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b, .. } = *outcome;
-    let zero = Interval::new(0.0);
-    let comes_to = |metres: &Interval| steps.apart_end.is_some_and(|end| metres.is_at_most(&scene.path.travelled(end)));
-    if lo.is_some_and(|lo| !(lo.is_finite() && lo <= steps.apart && comes_to(&zero))) {
-        return Err("the clearance lo does not follow".to_owned());
-    }
-    let of = |near: &Near| (near.benches, near.most);
-    let near = match until {
-        Until::PathEnd if steps.all_apart && matches!(events.finish, Some(Finish::PathEnd)) => {
-            events.near.as_ref().map(of)
-        }
-        Until::PathEnd => return Err("the steps that say how far boards are apart end before the path".to_owned()),
-        Until::Contact => {
-            // Boards are apart at the start, and two overlap later.
-            let begins = steps.apart >= 0.0 && lo.is_none_or(|lo| lo <= 0.0) && comes_to(&zero);
-            let contact = events.contact.filter(|_| begins);
-            Some(contact.map(|(benches, _)| (benches, zero)).ok_or("a first contact does not follow")?)
-        }
-        Until::Time => {
-            let is_reached = |time: f64| lo.is_none() || comes_to(&scene.travelled_by(&Interval::new(time)));
-            let Some(time) = time_until.filter(|time| *time >= 0.0 && is_reached(*time)) else {
-                return Err("time_until does not follow".to_owned());
-            };
-            events.near.as_ref().filter(|near| is_by(scene, &near.travelled, time)).map(of)
-        }
-    };
-    if (until == Until::Time) != time_until.is_some() {
-        return Err("time_until is of another end".to_owned());
-    }
-    match (hi, near) {
-        (None, _) if bench_a.is_none() && bench_b.is_none() => Ok(()),
-        (Some(hi), Some(([a, b], most))) if (Some(a), Some(b)) == (bench_a, bench_b) => {
-            if most.is_at_most(&Interval::new(hi)) {
-                Ok(())
-            } else {
-                Err("the clearance hi does not follow".to_owned())
-            }
-        }
-        _ => Err("the clearance hi, or its benches, do not follow".to_owned()),
+/// What a section has shown about the subject of a result.
+pub(super) struct Known<'s> {
+    /// The dragon, or one of the two.
+    pub scene: &'s Scene,
+    /// The steps in which the event does not happen, or in which boards keep a clearance.
+    pub shown: Shown,
+    /// The event, or the contact that ends the stretch of a least clearance.
+    pub event: Option<Witness>,
+    /// The upper bound of the least clearance.
+    pub near: Option<Witness>,
+    /// True if that is shown for the whole motion, which ends without a lock.
+    pub is_whole: bool,
+    /// For each lock that ends the motion, the first and the last time in seconds up to which a result may state it.
+    /// Between the last step and the lock nothing is known.
+    pub locks: Vec<[Interval; 2]>,
+}
+
+/// The numbers of a result for a least clearance.
+pub(super) struct Clearance {
+    lo: Option<f64>,
+    hi: Option<f64>,
+    until: Until,
+    time_until: Option<f64>,
+    benches: [Option<usize>; 2],
+}
+
+impl From<&ProvedClearance> for Clearance {
+    fn from(outcome: &ProvedClearance) -> Self {
+        let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b, .. } = *outcome;
+        Self { lo, hi, until, time_until, benches: [bench_a, bench_b] }
     }
 }
 
-/// Returns true if the head has surely travelled so far by a time of the show.
-fn is_by(scene: &Scene, travelled: &Interval, time: f64) -> bool {
-    travelled.is_at_most(&scene.travelled_by(&Interval::new(time)))
+impl From<&ProvedObstacleClearance> for Clearance {
+    fn from(outcome: &ProvedObstacleClearance) -> Self {
+        let ProvedObstacleClearance { lo, hi, until, time_until, bench, .. } = *outcome;
+        Self { lo, hi, until, time_until, benches: [bench, None] }
+    }
 }
 
-/// Checks the result for an obstacle in a certificate of the least clearance.
-///
-/// # Errors
-/// The condition that does not follow.
-pub(super) fn check_obstacle_clearance(
-    scene: &Scene,
-    steps: &Steps,
-    events: &Events,
-    outcome: &ProvedObstacleClearance,
-    earlier: usize,
-) -> Result<(), String> {
-    let ProvedObstacleClearance { obstacle, lo, hi, until, time_until, bench, .. } = *outcome;
-    if obstacle != earlier || obstacle >= scene.obstacles.len() {
-        return Err("the obstacles are not all named in their order".to_owned());
+impl Known<'_> {
+    /// Checks the result for an event.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn check_event(&self, outcome: &ProvedEvent) -> Result<(), String> {
+        let ProvedEvent { status, time_lo, time_hi, bench_a, bench_b, .. } = *outcome;
+        let benches = [bench_a, bench_b];
+        let (follows, claim) = match (status, time_lo, time_hi) {
+            (Status::None, lo, None) if self.can_be_none() && benches == [None; 2] => {
+                (lo.map_or(self.is_whole, |lo| self.begins(lo) && self.is_up_to_lock(lo)), "the time_lo of status none")
+            }
+            (Status::None, ..) => (false, "the status none"),
+            (Status::Undecided, lo, hi) => {
+                let begins = lo.is_some_and(|lo| self.begins(lo));
+                (begins && hi.is_none() && benches == [None; 2], "the status undecided with this time_lo")
+            }
+            (Status::Proved, Some(lo), Some(hi)) => {
+                let Some(event) = self.event else { return Err("the status proved does not follow".to_owned()) };
+                if event.benches != benches {
+                    return Err("the benches are not those of the event".to_owned());
+                }
+                let is_by = hi.is_finite() && event.at.seconds(self.scene).is_at_most(&Interval::new(hi));
+                (self.begins(lo) && is_by, "the interval from time_lo to time_hi")
+            }
+            (Status::Proved, ..) => return Err("a time is missing".to_owned()),
+        };
+        if follows { Ok(()) } else { Err(format!("{claim} does not follow")) }
     }
-    let beside = steps.beside(obstacle);
-    let comes_to = |metres: &Interval| beside.end.is_some_and(|end| metres.is_at_most(&scene.path.travelled(end)));
-    if lo.is_some_and(|lo| !(lo.is_finite() && lo <= beside.least && comes_to(&Interval::new(0.0)))) {
-        return Err("the clearance lo does not follow".to_owned());
-    }
-    let is_reached = match (until, time_until) {
-        (Until::PathEnd, None) => beside.all && matches!(events.finish, Some(Finish::PathEnd)),
-        (Until::Time, Some(time)) => {
-            time >= 0.0 && (lo.is_none() || comes_to(&scene.travelled_by(&Interval::new(time))))
-        }
-        _ => false,
-    };
-    if !is_reached {
-        return Err("the end of the stretch does not follow".to_owned());
-    }
-    let near = events.near_obstacles.iter().find(|near| near.obstacle == obstacle);
-    let is_before = |travelled: &Interval| time_until.is_none_or(|time| is_by(scene, travelled, time));
-    let follows = match (hi, bench, near) {
-        (None, None, _) => true,
-        (Some(hi), Some(bench), Some(near)) => {
-            bench == near.bench && near.most.is_at_most(&Interval::new(hi)) && is_before(&near.travelled)
-        }
-        _ => false,
-    };
-    if follows { Ok(()) } else { Err("the clearance hi, or its bench, does not follow".to_owned()) }
-}
 
-fn known(scene: &Scene, steps: &Steps, events: &Events, (event, obstacle): (EventKind, usize)) -> Known {
-    let zero = Interval::new(0.0);
-    let seconds = |place: Place| scene.time(&scene.path.travelled(place));
-    let after = |place: Option<Place>| place.map_or_else(|| zero, seconds);
-    let finished = events.finish.is_some();
-    match event {
-        EventKind::Contact => Known {
-            not_before: after(steps.clear_end),
-            by: events.contact.map(|([a, b], to)| (seconds(to), Some(a), Some(b))),
-            never: finished && steps.all_clear,
-        },
-        EventKind::Stall => Known {
-            not_before: after(steps.moving_end),
-            by: events.stall.map(|(link, to)| (seconds(to), Some(link), None)),
-            never: finished && steps.all_moving,
-        },
-        EventKind::Lock => Known {
-            not_before: after(steps.end),
-            by: match events.finish {
-                Some(Finish::Lock(link, to)) => Some((seconds(to), Some(link), None)),
-                _ => None,
-            },
-            never: matches!(events.finish, Some(Finish::PathEnd)),
-        },
-        EventKind::Obstacle => {
-            let (end, all_free) = steps.free(obstacle);
-            let reached = events.reached.iter().find(|(number, ..)| *number == obstacle);
-            Known {
-                not_before: after(end),
-                by: reached.map(|(_, bench, at)| (seconds(*at), Some(*bench), None)),
-                never: finished && all_free,
-            }
+    /// Returns true if the event certainly does not happen before a time.
+    fn begins(&self, lo: f64) -> bool {
+        let not_before = self.shown.end.map_or_else(|| Interval::new(0.0), |end| end.seconds(self.scene));
+        lo.is_finite() && lo >= 0.0 && Interval::new(lo).is_at_most(&not_before)
+    }
+
+    /// Returns true if the event may not happen at all.
+    fn can_be_none(&self) -> bool {
+        self.event.is_none() && (self.is_whole || !self.locks.is_empty())
+    }
+
+    /// Returns true if a result may state a time as that up to which it holds before a lock.
+    fn is_up_to_lock(&self, time: f64) -> bool {
+        let time = Interval::new(time);
+        self.locks.iter().any(|[from, to]| from.is_at_most(&time) && time.is_at_most(to))
+    }
+
+    /// Checks the result for a least clearance.
+    ///
+    /// # Errors
+    /// The condition that does not follow.
+    pub fn check_clearance(&self, outcome: &Clearance) -> Result<(), String> {
+        let Clearance { lo, hi, until, time_until, benches } = *outcome;
+        let (shown, scene) = (&self.shown, self.scene);
+        if lo.is_some_and(|lo| !(lo.is_finite() && lo <= shown.least && shown.has_come_to(scene, 0.0))) {
+            return Err("the clearance lo does not follow".to_owned());
         }
-        EventKind::PathEnd => {
-            let seconds = scene.time(&scene.path.length);
-            let reached = matches!(events.finish, Some(Finish::PathEnd));
-            Known {
-                not_before: seconds,
-                by: reached.then_some((seconds, None, None)),
-                never: matches!(events.finish, Some(Finish::Lock(..))),
+        let near = match until {
+            Until::PathEnd if self.is_whole => self.near,
+            Until::PathEnd => return Err("the steps that say how far boards are apart end before the path".to_owned()),
+            Until::Contact => {
+                // Boards are apart at the start, and two overlap later.
+                let begins = shown.least >= 0.0 && lo.is_none_or(|lo| lo <= 0.0) && shown.has_come_to(scene, 0.0);
+                Some(self.event.filter(|_| begins).ok_or("a first contact does not follow")?)
             }
+            Until::Time => {
+                let is_reached = |time: f64| lo.is_none() || shown.has_come_to(scene, time);
+                let Some(time) = time_until.filter(|time| *time >= 0.0 && is_reached(*time)) else {
+                    return Err("time_until does not follow".to_owned());
+                };
+                self.near.filter(|near| near.at.is_by(scene, time))
+            }
+        };
+        if (until == Until::Time) != time_until.is_some() {
+            return Err("time_until is of another end".to_owned());
+        }
+        match (hi, near) {
+            (None, _) if benches == [None; 2] => Ok(()),
+            (Some(hi), Some(near)) if near.benches == benches => {
+                if near.most.is_at_most(&Interval::new(hi)) {
+                    Ok(())
+                } else {
+                    Err("the clearance hi does not follow".to_owned())
+                }
+            }
+            _ => Err("the clearance hi, or its benches, do not follow".to_owned()),
         }
     }
 }

@@ -8,9 +8,10 @@ use super::first_order::FirstOrder;
 use super::first_order_board::FirstOrderBoard;
 use super::handle::When;
 use super::interval::{Interval, Vector};
-use super::lines::{EventKind, ProvedClearance, ProvedEvent, Status, Until};
 use super::path::{Place, Span};
+use super::results::Known;
 use super::scene::Scene;
+use super::shown::{At, Shown, Witness};
 use super::steps::Steps;
 use super::team::Size;
 use super::unlisted::straight_run;
@@ -34,19 +35,16 @@ impl Alone {
 const BEFORE_LOCK: f64 = 1e-3;
 
 impl Alone {
-    /// Returns true if the dragon locks, and a time is within [`BEFORE_LOCK`] links of travel before the end of its
-    /// last step.
-    fn locks_just_after(&self, scene: &Scene, time: f64) -> bool {
-        let Some(end) = self.end.filter(|_| self.locks) else { return false };
-        let end = scene.time(&scene.path.travelled(end));
-        let before = end - scene.team.shortest_link() * Interval::new(BEFORE_LOCK) / scene.head_speed;
-        let time = Interval::new(time);
-        before.is_at_most(&time) && time.is_at_most(&end)
+    /// Returns the time of the end of the last step of a dragon that locks, in seconds, and the time [`BEFORE_LOCK`]
+    /// links of travel before it, the earlier first.
+    fn just_before_lock(&self, scene: &Scene) -> Option<[Interval; 2]> {
+        let end = scene.time(&scene.path.travelled(self.end.filter(|_| self.locks)?));
+        Some([end - scene.team.shortest_link() * Interval::new(BEFORE_LOCK) / scene.head_speed, end])
     }
 }
 
 /// Claim about two dragons over an interval of time in which their links do not lock.
-pub(super) enum Claim<'c> {
+pub(super) enum PairClaim<'c> {
     /// No claim about their boards.
     Links,
     /// No boards of the two touch.
@@ -58,17 +56,14 @@ pub(super) enum Claim<'c> {
 /// The section of two dragons.
 pub(super) struct Pair {
     pub dragons: [usize; 2],
-    /// The time, in seconds, up to which stretches follow one another from the start. The first flag is true if all
-    /// stretches were clear, the second if all have a number `apart`.
+    /// The time, in seconds, up to which stretches follow one another from the start.
     end: Option<f64>,
-    all_clear: bool,
-    all_apart: bool,
-    /// The end of the last stretch with a number `apart`, and the least of these numbers, in metres.
-    apart: Option<(f64, f64)>,
-    /// Two benches that overlap, and seconds.
-    meeting: Option<([usize; 2], f64)>,
-    /// Two benches that are no further apart than some metres at a time, in seconds.
-    near: Option<([usize; 2], Interval, f64)>,
+    /// The stretches that are clear, or that have a number `apart`.
+    shown: Shown,
+    /// Two benches that overlap.
+    meeting: Option<Witness>,
+    /// Two benches that are near each other.
+    near: Option<Witness>,
     /// Counts for the report.
     pub steps: u64,
     pub links: u64,
@@ -167,8 +162,7 @@ impl Together {
 
 impl Pair {
     pub fn new(dragons: [usize; 2]) -> Self {
-        let (end, apart, meeting, near) = (None, None, None, None);
-        Self { dragons, end, all_clear: true, all_apart: true, apart, meeting, near, steps: 0, links: 0, pairs: 0 }
+        Self { dragons, end: None, shown: Shown::NOTHING, meeting: None, near: None, steps: 0, links: 0, pairs: 0 }
     }
 
     fn scenes<'s>(&self, scenes: &'s [Scene]) -> [&'s Scene; 2] {
@@ -184,7 +178,7 @@ impl Pair {
         scenes: &[Scene],
         [from, to]: [f64; 2],
         (heads, spans): ([Span; 2], [&[Span]; 2]),
-        claim: Claim,
+        claim: PairClaim,
     ) -> Result<(), String> {
         if self.meeting.is_some() {
             return Err("a step after a contact of the two".to_owned());
@@ -201,16 +195,13 @@ impl Pair {
         let together = Together::new(scenes, [from, to], heads, spans)?;
         let boards = [together.boards(scenes[0], 0)?, together.boards(scenes[1], 1)?];
         match claim {
-            Claim::Links => (self.all_clear, self.all_apart) = (false, false),
-            Claim::Clear => {
-                self.all_apart = false;
+            PairClaim::Links => self.shown.all = false,
+            PairClaim::Clear => {
                 self.pairs += check_pairs(&boards, |[a, b]| boards[0][a].is_apart_from(&boards[1][b]), "2")?;
+                self.shown.extend(At::Time(to), 0.0);
             }
-            Claim::Apart(metres, at) => {
-                self.all_clear = false;
-                if !self.all_apart {
-                    return Err("it says how far boards are apart after a step that does not".to_owned());
-                }
+            PairClaim::Apart(metres, at) => {
+                self.shown.continues("says how far boards are apart")?;
                 if !metres.is_finite() {
                     return Err(format!("`apart` is {metres:?}, expected a number"));
                 }
@@ -225,7 +216,7 @@ impl Pair {
                         || one.is_apart_somehow(&limit, other)
                 };
                 self.pairs += check_pairs(&boards, are_apart, "6")?;
-                self.apart = Some((to, self.apart.map_or(metres, |(_, least)| least.min(metres))));
+                self.shown.extend(At::Time(to), metres);
             }
         }
         self.links += together.links;
@@ -260,7 +251,7 @@ impl Pair {
         if !one.at_most(&other).is_at_most(&most) {
             return Err("the two benches may be further apart than it says (Lemma 6)".to_owned());
         }
-        self.near = Some((benches, most, time));
+        self.near = Some(Witness { benches: benches.map(Some), most, at: At::Time(time) });
         Ok(())
     }
 
@@ -312,44 +303,20 @@ impl Pair {
                 return Err(format!("the point may be outside bench {} (Lemma 5)", benches[k]));
             }
         }
-        self.meeting = Some((benches, time));
+        self.meeting = Some(Witness::of_event(benches.map(Some), At::Time(time)));
         Ok(())
     }
 
-    /// Checks the result.
-    ///
-    /// # Errors
-    /// The condition that does not follow.
-    pub fn check(&self, scenes: &[Scene], alone: &[Alone], outcome: &ProvedEvent) -> Result<(), String> {
-        let ProvedEvent { event, status, time_lo, time_hi, bench_a, bench_b, obstacle, ref dragons, .. } = *outcome;
-        if event != EventKind::Contact || obstacle.is_some() || *dragons != self.dragons {
-            return Err("it is not the result for a contact of these two dragons".to_owned());
-        }
-        if !self.all_clear {
-            return Err("not all steps of the two say that no boards touch".to_owned());
-        }
-        let clear = self.end.unwrap_or(0.0);
-        let begins = |lo: f64| lo >= 0.0 && lo <= clear;
-        let no_benches = bench_a.is_none() && bench_b.is_none();
-        let follows = match (status, time_lo, time_hi) {
-            (Status::None, None, None) => no_benches && self.end.is_some() && self.ends_with_paths(scenes),
-            (Status::None, Some(lo), None) => {
-                let is_of = |dragon: &usize| alone[*dragon].locks_just_after(&scenes[*dragon], lo);
-                no_benches && self.end.is_some() && begins(lo) && self.dragons.iter().any(is_of)
-            }
-            (Status::Undecided, Some(lo), None) => no_benches && begins(lo),
-            (Status::Proved, Some(lo), Some(hi)) => {
-                let is_of = |(benches, time): ([usize; 2], f64)| {
-                    benches.map(Some) == [bench_a, bench_b] && hi.is_finite() && time <= hi
-                };
-                begins(lo) && self.meeting.is_some_and(is_of)
-            }
-            _ => false,
-        };
-        if follows && !(status == Status::None && self.meeting.is_some()) {
-            Ok(())
-        } else {
-            Err("the result for a contact of two dragons does not follow".to_owned())
+    /// Returns what the section has shown about the two. `alone` has the facts of all dragons.
+    pub fn known<'s>(&self, scenes: &'s [Scene], alone: &[Alone]) -> Known<'s> {
+        let locks = self.dragons.into_iter().filter_map(|dragon| alone[dragon].just_before_lock(&scenes[dragon]));
+        Known {
+            scene: &scenes[self.dragons[0]],
+            shown: self.shown,
+            event: self.meeting,
+            near: self.near,
+            is_whole: self.shown.all && self.ends_with_paths(scenes),
+            locks: locks.filter(|_| self.end.is_some()).collect(),
         }
     }
 
@@ -357,44 +324,6 @@ impl Pair {
     fn ends_with_paths(&self, scenes: &[Scene]) -> bool {
         let end = Interval::new(self.end.unwrap_or(0.0));
         self.scenes(scenes).into_iter().all(|scene| scene.time(&scene.path.length).is_at_most(&end))
-    }
-
-    /// Checks the result for the least clearance of the two.
-    ///
-    /// # Errors
-    /// The condition that does not follow.
-    pub fn check_clearance(&self, scenes: &[Scene], outcome: &ProvedClearance) -> Result<(), String> {
-        let ProvedClearance { lo, hi, until, time_until, bench_a, bench_b, ref dragons } = *outcome;
-        if *dragons != self.dragons {
-            return Err("it is not the result for the least clearance of these two dragons".to_owned());
-        }
-        let covers = |time: f64| self.apart.is_some_and(|(end, _)| time <= end);
-        if lo.is_some_and(|lo| !(lo.is_finite() && covers(0.0) && self.apart.is_some_and(|(_, least)| lo <= least))) {
-            return Err("the clearance lo does not follow".to_owned());
-        }
-        let near = self.near.map(|(benches, most, _)| (benches, most));
-        let near = match (until, time_until) {
-            (Until::PathEnd, None) if self.all_apart && self.ends_with_paths(scenes) => near,
-            (Until::Contact, None) => {
-                // Boards are apart at the start, and two overlap later.
-                let begins = covers(0.0) && self.apart.is_some_and(|(_, least)| least >= 0.0);
-                let meeting = self.meeting.filter(|_| begins && lo.is_none_or(|lo| lo <= 0.0));
-                let (benches, _) = meeting.ok_or("a first contact of the two does not follow")?;
-                Some((benches, Interval::new(0.0)))
-            }
-            (Until::Time, Some(time)) if time >= 0.0 && time.is_finite() && (lo.is_none() || covers(time)) => {
-                near.filter(|_| self.near.is_some_and(|(.., at)| at <= time))
-            }
-            _ => return Err("the end of the stretch does not follow".to_owned()),
-        };
-        let follows = match (hi, near) {
-            (None, _) => bench_a.is_none() && bench_b.is_none(),
-            (Some(hi), Some((benches, most))) => {
-                benches.map(Some) == [bench_a, bench_b] && most.is_at_most(&Interval::new(hi))
-            }
-            (Some(_), None) => false,
-        };
-        if follows { Ok(()) } else { Err("the clearance hi, or its benches, do not follow".to_owned()) }
     }
 }
 

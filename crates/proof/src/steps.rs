@@ -9,6 +9,7 @@ use super::interval::Interval;
 use super::lines::Links;
 use super::path::{Place, Span};
 use super::scene::Scene;
+use super::shown::{At, Shown};
 use super::team::Size;
 use super::unlisted::{check_ring, first_partner, straight_run};
 
@@ -33,21 +34,13 @@ pub(super) struct Step {
 pub(super) struct Steps {
     /// The end of the last step.
     pub end: Option<Place>,
-    /// The ends of the last moving step and of the last clear step.
-    pub moving_end: Option<Place>,
-    pub clear_end: Option<Place>,
-    /// The end of the last step with a number `apart`.
-    pub apart_end: Option<Place>,
-    /// True if all steps were moving, if all were clear, and if all have a number `apart`.
-    pub all_moving: bool,
-    pub all_clear: bool,
-    pub all_apart: bool,
-    /// The distance that boards kept at least in all steps up to `apart_end`, in metres.
-    pub apart: f64,
-    /// By obstacle: the end of the last step that stays clear of it, and true if all steps did.
-    free: Vec<(Option<Place>, bool)>,
-    /// The proved clearance of each obstacle.
-    beside: Vec<Beside>,
+    /// The steps that are moving, that are clear, and that have a number `apart`.
+    pub moving: Shown,
+    pub clear: Shown,
+    pub apart: Shown,
+    /// By obstacle: the steps that stay clear of it, and those with a number for it.
+    pub free: Vec<Shown>,
+    pub beside: Vec<Shown>,
     /// Spans of the last step.
     pub spans: Vec<Span>,
     /// Lemma 4: S is not beyond this place, the end of handle 1's span in the first step.
@@ -62,32 +55,16 @@ pub(super) struct Steps {
     pub pairs: u64,
 }
 
-/// The clearance of an obstacle in the steps so far.
-#[derive(Clone, Copy)]
-pub(super) struct Beside {
-    /// The end of the last step with a number for the obstacle.
-    pub end: Option<Place>,
-    /// True if all steps have a number for the obstacle.
-    pub all: bool,
-    /// The clearance was more than these metres up to `end`.
-    pub least: f64,
-}
-
-const NOTHING: Beside = Beside { end: None, all: true, least: f64::INFINITY };
-
 impl Steps {
-    pub fn new() -> Self {
+    /// Begins at the start of a motion among some obstacles.
+    pub fn new(obstacles: usize) -> Self {
         Self {
             end: None,
-            moving_end: None,
-            clear_end: None,
-            apart_end: None,
-            all_moving: true,
-            all_clear: true,
-            all_apart: true,
-            apart: f64::INFINITY,
-            free: Vec::new(),
-            beside: Vec::new(),
+            moving: Shown::NOTHING,
+            clear: Shown::NOTHING,
+            apart: Shown::NOTHING,
+            free: vec![Shown::NOTHING; obstacles],
+            beside: vec![Shown::NOTHING; obstacles],
             spans: Vec::new(),
             start_of_second: None,
             has_come: false,
@@ -100,7 +77,7 @@ impl Steps {
 
     /// Begins where handle 1 has come from far out, and everything further out is shown: in Lemma 4, S is out there.
     pub fn far_out() -> Self {
-        Self { start_of_second: Some(Place(0, f64::INFINITY, 0.0)), has_come: true, ..Self::new() }
+        Self { start_of_second: Some(Place(0, f64::INFINITY, 0.0)), has_come: true, ..Self::new(0) }
     }
 
     /// Checks a step and adds its consequences.
@@ -178,35 +155,26 @@ impl Steps {
 
     fn add_moving(&mut self, moving: bool, to: Place, chain: &Chain) -> Result<(), String> {
         if !moving {
-            self.all_moving = false;
+            self.moving.all = false;
             return Ok(());
         }
-        if !self.all_moving {
-            return Err("it claims to be moving after a step that does not".to_owned());
-        }
+        self.moving.continues("claims to be moving")?;
         if let Some(link) = chain.products.iter().position(|product| !product.is_positive()) {
             return Err(format!("it claims to be moving, but link {link} may stall"));
         }
-        self.moving_end = Some(to);
+        self.moving.extend(At::Head(to), 0.0);
         Ok(())
     }
 
     fn add_clear(&mut self, scene: &Scene, links: Links, clear: bool, to: Place, chain: &Chain) -> Result<(), String> {
         if !clear {
-            self.all_clear = false;
+            self.clear.all = false;
             return Ok(());
         }
-        if !self.all_clear {
-            return Err("it claims to be clear after a step that does not".to_owned());
-        }
+        self.clear.continues("claims to be clear")?;
         self.pairs += check_clear(scene, links, chain)?;
-        self.clear_end = Some(to);
+        self.clear.extend(At::Head(to), 0.0);
         Ok(())
-    }
-
-    /// Returns the end of the last step that stays clear of an obstacle, and true if all steps so far did.
-    pub fn free(&self, obstacle: usize) -> (Option<Place>, bool) {
-        self.free.get(obstacle).copied().unwrap_or((None, true))
     }
 
     /// Checks that all boards stay clear of some obstacles (Lemma 9).
@@ -224,22 +192,18 @@ impl Steps {
         if let Some(obstacle) = free.iter().find(|obstacle| **obstacle >= scene.obstacles.len()) {
             return Err(format!("it names the obstacle {obstacle}, which the scene has not"));
         }
-        self.free.resize(scene.obstacles.len(), (None, true));
         let runs = runs_on_ground(scene, links, chain);
         let boards = boards_on_ground(scene, links, chain, &runs);
-        for (number, obstacle) in scene.obstacles.iter().enumerate() {
-            let (end, all) = &mut self.free[number];
+        for (number, (obstacle, shown)) in scene.obstacles.iter().zip(&mut self.free).enumerate() {
             if !free.contains(&number) {
-                *all = false;
+                shown.all = false;
                 continue;
             }
-            if !*all {
-                return Err(format!("it claims to be clear of obstacle {number} after a step that does not"));
-            }
+            shown.continues(&format!("claims to be clear of obstacle {number}"))?;
             if let Some((bench, _)) = boards.iter().find(|(_, board)| !obstacle.is_avoided_by(board)) {
                 return Err(format!("bench {bench}, or one behind it, may be at obstacle {number} (Lemma 9)"));
             }
-            *end = Some(to);
+            shown.extend(At::Head(to), 0.0);
         }
         Ok(())
     }
@@ -253,25 +217,16 @@ impl Steps {
         chain: &Chain,
     ) -> Result<(), String> {
         let Some((metres, step)) = apart else {
-            self.all_apart = false;
+            self.apart.all = false;
             return Ok(());
         };
-        if !self.all_apart {
-            return Err("it says how far boards are apart after a step that does not".to_owned());
-        }
+        self.apart.continues("says how far boards are apart")?;
         if !metres.is_finite() {
             return Err(format!("`apart` is {metres:?}, expected a number"));
         }
         self.pairs += apart::check(scene, links, chain, step, metres)?;
-        self.apart = self.apart.min(metres);
-        self.apart_end = Some(to);
+        self.apart.extend(At::Head(to), metres);
         Ok(())
-    }
-
-    /// Returns the proved clearance of an obstacle.
-    pub fn beside(&self, obstacle: usize) -> Beside {
-        let nothing = Beside { all: false, ..NOTHING };
-        self.beside.get(obstacle).copied().unwrap_or(nothing)
     }
 
     /// Checks the clearances of obstacles (Lemma 11).
@@ -286,7 +241,6 @@ impl Steps {
         if claims.len() > scene.obstacles.len() {
             return Err(format!("it names {} obstacles, expected at most {}", claims.len(), scene.obstacles.len()));
         }
-        self.beside.resize(scene.obstacles.len(), Beside { all: self.steps == 0, ..NOTHING });
         let runs = runs_on_ground(scene, links, chain);
         let boards = step.map_or_else(Vec::new, |_| boards_on_ground(scene, links, chain, &runs));
         let first_order = |step: &FirstOrder, bench: usize| {
@@ -294,14 +248,12 @@ impl Steps {
             if !is_listed { step.straight_run(bench, &scene.team) } else { step.board(bench, &scene.team) }
         };
         let first_order: Vec<_> = boards.iter().filter_map(|(bench, _)| Some(first_order(step?, *bench))).collect();
-        for (number, (obstacle, beside)) in scene.obstacles.iter().zip(&mut self.beside).enumerate() {
+        for (number, (obstacle, shown)) in scene.obstacles.iter().zip(&mut self.beside).enumerate() {
             let Some(metres) = claims.get(number).copied().flatten() else {
-                beside.all = false;
+                shown.all = false;
                 continue;
             };
-            if !beside.all {
-                return Err(format!("it states a clearance of obstacle {number} after a step that does not"));
-            }
+            shown.continues(&format!("states a clearance of obstacle {number}"))?;
             if !metres.is_finite() {
                 return Err(format!("`beside` of obstacle {number} is {metres:?}, expected a number"));
             }
@@ -312,7 +264,7 @@ impl Steps {
             {
                 return Err(format!("bench {bench}, or one behind it, may be nearer to obstacle {number} (Lemma 11)"));
             }
-            *beside = Beside { end: Some(to), all: true, least: beside.least.min(metres) };
+            shown.extend(At::Head(to), metres);
         }
         Ok(())
     }

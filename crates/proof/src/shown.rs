@@ -1,0 +1,102 @@
+//! What the steps of a section show one after another, and the lines that show what happens.
+
+use super::interval::Interval;
+use super::path::Place;
+use super::scene::Scene;
+
+/// A moment of a section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum At {
+    /// The place of the head, in the section of one dragon.
+    Head(Place),
+    /// The time of the show in seconds, in the section of two.
+    Time(f64),
+    /// The path's end.
+    PathEnd,
+}
+
+impl At {
+    /// Returns the metres that the head has travelled; the seconds of the show for a time.
+    fn measure(self, scene: &Scene) -> Interval {
+        match self {
+            Self::Head(place) => scene.path.travelled(place),
+            Self::Time(seconds) => Interval::new(seconds),
+            Self::PathEnd => scene.path.length,
+        }
+    }
+
+    /// Returns the seconds of the show.
+    pub fn seconds(self, scene: &Scene) -> Interval {
+        let measure = self.measure(scene);
+        if matches!(self, Self::Time(_)) { measure } else { scene.time(&measure) }
+    }
+
+    /// Returns a time of the show in the measure of this moment.
+    fn measured(self, scene: &Scene, seconds: f64) -> Interval {
+        let time = Interval::new(seconds);
+        if matches!(self, Self::Time(_)) { time } else { scene.travelled_by(&time) }
+    }
+
+    /// Returns true if the moment is certainly not after a time of the show, in seconds.
+    pub fn is_by(self, scene: &Scene, seconds: f64) -> bool {
+        self.measure(scene).is_at_most(&self.measured(scene, seconds))
+    }
+
+    /// Returns true if the moment is certainly not before a time of the show, in seconds.
+    pub fn has_come_to(self, scene: &Scene, seconds: f64) -> bool {
+        self.measured(scene, seconds).is_at_most(&self.measure(scene))
+    }
+}
+
+/// One claim of the steps of a section: boards are further apart than some metres, or further from an obstacle, or links
+/// move. Steps make a claim only while all steps before have made it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shown {
+    /// The end of the last step that makes the claim.
+    pub end: Option<At>,
+    /// True if all steps make it.
+    pub all: bool,
+    /// The least of the metres of these steps.
+    pub least: f64,
+}
+
+impl Shown {
+    /// The claim before the first step.
+    pub const NOTHING: Self = Self { end: None, all: true, least: f64::INFINITY };
+
+    /// Checks that all steps so far make the claim; `what` names it.
+    ///
+    /// # Errors
+    /// The sentence about a step before that does not.
+    pub fn continues(&self, what: &str) -> Result<(), String> {
+        if self.all { Ok(()) } else { Err(format!("it {what} after a step that does not")) }
+    }
+
+    /// Adds a step that makes the claim.
+    pub fn extend(&mut self, to: At, metres: f64) {
+        (self.end, self.least) = (Some(to), self.least.min(metres));
+    }
+
+    /// Returns true if steps that make the claim have come to a time of the show, in seconds.
+    pub fn has_come_to(&self, scene: &Scene, seconds: f64) -> bool {
+        self.end.is_some_and(|end| end.has_come_to(scene, seconds))
+    }
+}
+
+/// Benches with which an event has happened, or which are near each other or near an obstacle.
+#[derive(Clone, Copy)]
+pub(super) struct Witness {
+    /// The bench of a link or at an obstacle, or the two.
+    pub benches: [Option<usize>; 2],
+    /// The clearance is no more than these metres.
+    pub most: Interval,
+    /// A moment at which this holds, or one before it. A place before the start means the start.
+    pub at: At,
+}
+
+impl Witness {
+    /// Returns the witness of an event: boards that overlap or have come to an obstacle, or a link.
+    pub fn of_event(benches: [Option<usize>; 2], at: At) -> Self {
+        Self { benches, most: Interval::new(0.0), at }
+    }
+}
