@@ -8,6 +8,7 @@ use super::handle::When;
 use super::interval::Interval;
 use super::lines::Links;
 use super::path::Span;
+use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
 use super::unlisted::{check_ring, first_partner, straight_run};
 
@@ -16,7 +17,7 @@ use super::unlisted::{check_ring, first_partner, straight_run};
 ///
 /// # Errors
 /// The pair that does not follow.
-pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, step: &FirstOrder, metres: f64) -> Result<u64, String> {
+pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, step: &FirstOrder, metres: f64) -> Checked<u64> {
     let team = &scene.team;
     let metres = Interval::new(metres);
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
@@ -34,9 +35,7 @@ pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, step: &FirstOrde
                 || first_order[a].is_apart_by(&metres, &first_order[b], when)
                 || boards[a].is_apart_somehow(&metres, &boards[b])
                 || check_ring(scene, chain, a..a + 1, b, &far).is_ok();
-            if !is_apart {
-                return Err(format!("benches {a} and {b} may be nearer than it says (Lemma 6)"));
-            }
+            ensure!(is_apart, "benches {a} and {b} may be nearer than it says (Lemma 6)");
             pairs += 1;
         }
     }
@@ -59,14 +58,15 @@ pub(super) fn check(scene: &Scene, links: Links, chain: &Chain, step: &FirstOrde
                 || first_order[a].is_apart_by(&metres, &step.straight_run(first, team), When::Always)
                 || boards[a].is_apart_somehow(&metres, &run)
         };
-        if !team.runs(first).all(is_apart) {
-            return Err(format!("bench {a} may be nearer to one on the line than it says (Lemmas 3 and 6)"));
-        }
+        ensure!(
+            team.runs(first).all(is_apart),
+            "bench {a} may be nearer to one on the line than it says (Lemmas 3 and 6)"
+        );
         pairs += 1;
     }
     // Boards on the line among themselves.
     if links == Links::All && !metres.is_below(&(team.link(1) - team.hole_inset - team.hole_inset)) {
-        return Err("benches on a line may be nearer than it says (Lemma 3)".to_owned());
+        return Err(problem!("benches on a line may be nearer than it says (Lemma 3)"));
     }
     Ok(pairs)
 }

@@ -3,6 +3,7 @@
 
 use super::interval::Interval;
 use super::path::{Path, Place, Span};
+use super::problem::{Checked, ensure, problem};
 use super::team::Team;
 
 /// A stretch of the front handle of a link in which the follower is the first place at its distance back from `behind`.
@@ -22,26 +23,26 @@ impl Branches {
     ///
     /// # Errors
     /// The condition that is violated.
-    pub fn add(&mut self, (path, team): (&Path, &Team), link: usize, front: Span, behind: Place) -> Result<(), String> {
+    pub fn add(&mut self, (path, team): (&Path, &Team), link: usize, front: Span, behind: Place) -> Checked {
         if link > 1 && (link > 2 || team.own_tail().is_none()) {
-            return Err(format!("a branch of link {link}, expected 0, 1, or 2 for a tail with a size of its own"));
+            return Err(problem!("a branch of link {link}, expected 0, 1, or 2 for a tail with a size of its own"));
         }
-        if ![front.0, front.1, behind].into_iter().all(|place| path.has(place)) {
-            return Err("a place of the branch is not inside a segment of the path".to_owned());
-        }
+        ensure!(
+            [front.0, front.1, behind].into_iter().all(|place| path.has(place)),
+            "a place of the branch is not inside a segment of the path"
+        );
         if front.0 == front.1 || !path.in_order(front.0, front.1) {
-            return Err("the branch is empty, or its ends are not in order".to_owned());
+            return Err(problem!("the branch is empty, or its ends are not in order"));
         }
         if !Interval::new(0.0).is_below(&path.travelled(front.0)) || front.0.0 == 0 {
-            return Err("the branch begins on the first segment, or not beyond the start".to_owned());
+            return Err(problem!("the branch begins on the first segment, or not beyond the start"));
         }
-        if !path.in_order(behind, front.0) {
-            return Err("the place of the branch is not behind the front handle".to_owned());
-        }
+        ensure!(path.in_order(behind, front.0), "the place of the branch is not behind the front handle");
         let last = self.0.iter().rfind(|branch| branch.link == link);
-        if last.is_some_and(|before| !path.in_order(before.front.1, front.0)) {
-            return Err("the branch begins before the end of the one before it".to_owned());
-        }
+        ensure!(
+            last.is_none_or(|before| path.in_order(before.front.1, front.0)),
+            "the branch begins before the end of the one before it"
+        );
         self.0.push(Branch { link, front, behind });
         Ok(())
     }

@@ -4,6 +4,7 @@ use super::capsule::Capsule;
 use super::interval::{Interval, Vector};
 use super::link;
 use super::path::{Place, Span};
+use super::problem::{Checked, problem};
 use super::scene::Scene;
 
 /// The listed handles, from handle 0 (the head) on. Each is in its span while the head is in the head's span.
@@ -19,16 +20,16 @@ impl Chain {
     ///
     /// # Errors
     /// The link that does not follow.
-    pub fn check(scene: &Scene, head: Span, spans: &[Span]) -> Result<Self, String> {
+    pub fn check(scene: &Scene, head: Span, spans: &[Span]) -> Checked<Self> {
         let (path, team) = (&scene.path, &scene.team);
         if spans.len() > team.benches {
-            return Err(format!("{} spans, but there are only {} benches", spans.len(), team.benches));
+            return Err(problem!("{} spans, but there are only {} benches", spans.len(), team.benches));
         }
         let mut capsules: Vec<Capsule> = Vec::with_capacity(spans.len() + 1);
         let mut products = Vec::with_capacity(spans.len());
         let mut front_ends: Option<[Vector; 2]> = None;
         for (handle, span) in std::iter::once(&head).chain(spans).enumerate() {
-            span_is_one(scene, *span).map_err(|problem| format!("handle {handle}: {problem}"))?;
+            span_is_one(scene, *span).map_err(|problem| problem!("handle {handle}: {problem}"))?;
             let (capsule, ends) = (Capsule::new(path, *span), [span.0, span.1].map(|place| path.at(place).point));
             if let (Some(front), Some(front_ends)) = (capsules.last(), front_ends) {
                 let index = handle - 1;
@@ -36,7 +37,7 @@ impl Chain {
                     ([(front.span, None)], scene.branches.rules(path, team.link_kind(index), front.span));
                 let rules = several.as_deref().unwrap_or(&one);
                 let product = link::check(path, (front, front_ends), (&capsule, ends), team.link(index), rules)
-                    .map_err(|problem| format!("link {index}: {problem} (Lemma 1)"))?;
+                    .map_err(|problem| problem!("link {index}: {problem} (Lemma 1)"))?;
                 products.push(product);
             }
             capsules.push(capsule);
@@ -58,12 +59,12 @@ impl Chain {
 }
 
 /// Checks that a span is valid: two places strictly inside segments, in order.
-pub(super) fn span_is_one(scene: &Scene, Span(lo, hi): Span) -> Result<(), String> {
+pub(super) fn span_is_one(scene: &Scene, Span(lo, hi): Span) -> Checked {
     for place in [lo, hi] {
         if !scene.path.has(place) {
             let Place(segment, coordinate, _) = place;
-            return Err(format!("[{segment}, {coordinate:?}] is not inside a segment of the path"));
+            return Err(problem!("[{segment}, {coordinate:?}] is not inside a segment of the path"));
         }
     }
-    if scene.path.in_order(lo, hi) { Ok(()) } else { Err("the span's ends are not in order".to_owned()) }
+    if scene.path.in_order(lo, hi) { Ok(()) } else { Err(problem!("the span's ends are not in order")) }
 }

@@ -6,6 +6,7 @@ use super::greatest::Greatest;
 use super::lines::{About, ParsedLine, ProvedEvent};
 use super::path::Span;
 use super::pitch::Pitch;
+use super::problem::{Checked, Problem, ensure, problem};
 use super::results::{Claim, Clearance, Known, Subject};
 use super::scene::Scene;
 use super::several::{Alone, Pair, PairClaim};
@@ -35,20 +36,18 @@ pub struct Checker {
 
 impl Checker {
     /// Begins with the first line.
-    pub fn begin(first: ParsedLine) -> Result<Self, String> {
+    pub fn begin(first: ParsedLine) -> Checked<Self> {
         let ParsedLine::Certificate { format, version, about, scene: text } = first else {
-            return Err("the first line is not that of a certificate".to_owned());
+            return Err(problem!("the first line is not that of a certificate"));
         };
-        if format != FORMAT {
-            return Err(format!("a certificate of format {format}, expected {FORMAT}"));
-        }
-        let in_scene = |problem: String| format!("the scene: {problem}");
+        ensure!(format == FORMAT, "a certificate of format {format}, expected {FORMAT}");
+        let in_scene = |problem: Problem| problem!("the scene: {problem}");
         let mut scenes = Scene::read_ensemble(&text).map_err(in_scene)?;
         let alone = if scenes.is_empty() { None } else { Some(Vec::new()) };
         if alone.is_none() {
             scenes.push(Scene::read(&text).map_err(in_scene)?);
         } else if !matches!(about, About::Events | About::LeastClearance) {
-            return Err("the scene has several dragons, of which this kind of certificate proves nothing".to_owned());
+            return Err(problem!("the scene has several dragons, of which this kind of certificate proves nothing"));
         }
         let dragons =
             if alone.is_some() { scenes.iter().map(|scene| scene.name.clone()).collect() } else { Vec::new() };
@@ -109,15 +108,13 @@ impl Checker {
     }
 
     /// Returns what the section has shown about the subject of a result. It must be the next one.
-    fn known(&self, claim: Claim, obstacle: Option<usize>, dragons: &[usize]) -> Result<Known<'_>, String> {
-        let subject = self.subject().ok_or("a result too many: its section has all results")?;
+    fn known(&self, claim: Claim, obstacle: Option<usize>, dragons: &[usize]) -> Checked<Known<'_>> {
+        let subject = self.subject().ok_or_else(|| problem!("a result too many: its section has all results"))?;
         if (claim, obstacle) != (subject.claim, subject.obstacle) {
             let first = if self.about == About::Events { "contact, stall, lock, path_end" } else { "least_clearance" };
-            return Err(format!("the results are not {first} and the obstacles in this order"));
+            return Err(problem!("the results are not {first} and the obstacles in this order"));
         }
-        if *dragons != self.dragons() {
-            return Err("it is not the result for this dragon, or for these two".to_owned());
-        }
+        ensure!(*dragons == self.dragons(), "it is not the result for this dragon, or for these two");
         Ok(match (&self.between, &self.alone) {
             (Some(pair), Some(alone)) => pair.known(&self.scenes, alone),
             _ => self.events.known(self.dragon(), &self.steps, &subject),
@@ -125,7 +122,7 @@ impl Checker {
     }
 
     /// Checks and adds a result of a section. Returns another line.
-    fn add_result(&mut self, line: ParsedLine) -> Result<Option<ParsedLine>, String> {
+    fn add_result(&mut self, line: ParsedLine) -> Checked<Option<ParsedLine>> {
         match line {
             ParsedLine::Result(outcome) => {
                 let ProvedEvent { event, obstacle, dragons, .. } = &outcome;
@@ -151,12 +148,12 @@ impl Checker {
     }
 
     /// Ends a section, and adds its counts.
-    fn end_section(&mut self) -> Result<(), String> {
+    fn end_section(&mut self) -> Checked {
         if (self.is_in_section || self.between.is_some()) && !self.is_section_complete() {
-            return Err("the section before it lacks a result".to_owned());
+            return Err(problem!("the section before it lacks a result"));
         }
         let Some(alone) = &mut self.alone else {
-            return Err("the scene has one dragon, and no sections".to_owned());
+            return Err(problem!("the scene has one dragon, and no sections"));
         };
         // All dragons are on one stage.
         let next = Steps::new(self.scenes[0].obstacles.len());
@@ -187,18 +184,18 @@ impl Checker {
     }
 
     /// Handles the lines of a scene of several dragons. Returns false for another line.
-    fn add_of_ensemble(&mut self, line: &ParsedLine) -> Result<bool, String> {
+    fn add_of_ensemble(&mut self, line: &ParsedLine) -> Checked<bool> {
         let has_result = self.between.is_some() && self.results() > self.before;
         let Self { about, scenes, alone, between, .. } = self;
         if has_result && !matches!(line, ParsedLine::Dragon { .. } | ParsedLine::Pair { .. }) {
-            return Err("nothing of two dragons can follow their result".to_owned());
+            return Err(problem!("nothing of two dragons can follow their result"));
         }
         match (line, between, alone) {
             (ParsedLine::Dragon { dragon }, None, _) => {
                 self.end_section()?;
                 let expected = self.alone.as_ref().map_or(0, Vec::len);
                 if *dragon != expected || *dragon >= self.scenes.len() {
-                    return Err(format!("it is about dragon {dragon}, expected {expected}"));
+                    return Err(problem!("it is about dragon {dragon}, expected {expected}"));
                 }
                 self.is_in_section = true;
             }
@@ -207,14 +204,14 @@ impl Checker {
                 self.end_section()?;
                 let are_alone_shown = self.alone.as_ref().is_some_and(|alone| alone.len() == self.scenes.len());
                 if !are_alone_shown || self.next_pair(last) != Some(*dragons) {
-                    return Err("the two dragons are not those that follow".to_owned());
+                    return Err(problem!("the two dragons are not those that follow"));
                 }
                 self.between = Some(Pair::new(*dragons));
             }
             (ParsedLine::Both { from, to, heads, spans: [one, other], apart, at }, Some(pair), Some(_)) => {
                 let claim = match (&about, apart) {
                     (About::Events, None) => PairClaim::Clear,
-                    (About::Events, Some(_)) => return Err("`apart` in a certificate of events".to_owned()),
+                    (About::Events, Some(_)) => return Err(problem!("`apart` in a certificate of events")),
                     (_, None) => PairClaim::Links,
                     (_, Some(metres)) => PairClaim::Apart(*metres, at.each_ref().map(Vec::as_slice)),
                 };
@@ -236,11 +233,11 @@ impl Checker {
                 | ParsedLine::Meeting { .. },
                 ..,
             ) => {
-                return Err("it is not in a section of two dragons, or not in its place".to_owned());
+                return Err(problem!("it is not in a section of two dragons, or not in its place"));
             }
-            (_, Some(_), _) => return Err("it is about one dragon, in a section of two".to_owned()),
+            (_, Some(_), _) => return Err(problem!("it is about one dragon, in a section of two")),
             (_, None, Some(_)) if !self.is_in_section => {
-                return Err("no line says which dragon it is about".to_owned());
+                return Err(problem!("no line says which dragon it is about"));
             }
             _ => return Ok(false),
         }
@@ -261,9 +258,9 @@ impl Checker {
     }
 
     /// Checks the next line.
-    pub fn add(&mut self, line: ParsedLine) -> Result<(), String> {
+    pub fn add(&mut self, line: ParsedLine) -> Checked {
         if self.about != About::Events && self.is_complete() {
-            return Err("nothing can follow the result".to_owned());
+            return Err(problem!("nothing can follow the result"));
         }
         let question = match line {
             ParsedLine::Result(_) => Some(About::Events),
@@ -274,9 +271,7 @@ impl Checker {
             ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
             _ => None,
         };
-        if question.is_some_and(|question| question != self.about) {
-            return Err("it belongs to another question".to_owned());
-        }
+        ensure!(!question.is_some_and(|question| question != self.about), "it belongs to another question");
         if self.add_of_ensemble(&line)? {
             return Ok(());
         }
@@ -284,7 +279,7 @@ impl Checker {
         let section = self.alone.as_ref().map(Vec::len);
         if let (ParsedLine::Branch { link, from, to, behind }, true) = (&line, self.about != About::LeastPitch) {
             if self.steps.end.is_some() || self.greatest.steps > 0 {
-                return Err("a branch has to precede all steps".to_owned());
+                return Err(problem!("a branch has to precede all steps"));
             }
             let Scene { path, team, branches, .. } = &mut self.scenes[section.unwrap_or(0)];
             return branches.add((path, team), *link, Span(*from, *to), *behind);
@@ -293,10 +288,10 @@ impl Checker {
         let Self { about, scenes, steps, events, greatest, pitch, proved, .. } = self;
         let scene = &scenes[section.unwrap_or(0)];
         if question.is_none() && (events.finish.is_some() || so_far > 0) {
-            return Err("nothing but results can follow a lock, the path's end or a result".to_owned());
+            return Err(problem!("nothing but results can follow a lock, the path's end or a result"));
         }
         match line {
-            ParsedLine::Certificate { .. } => Err("a second first line".to_owned()),
+            ParsedLine::Certificate { .. } => Err(problem!("a second first line")),
             ParsedLine::Step { links, from, to, moving, clear, spans, free, apart, beside, at } => {
                 let step = Step { links, head: Span(from, to), moving, clear, spans, free, apart, beside, at };
                 match pitch {
@@ -317,12 +312,12 @@ impl Checker {
                 events.add_reached(scene, steps, (obstacle, bench), Span(from, to), &spans, point)
             }
             ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
-            ParsedLine::Branch { .. } => Err("a branch in a certificate of another question".to_owned()),
+            ParsedLine::Branch { .. } => Err(problem!("a branch in a certificate of another question")),
             ParsedLine::Lock { link, to, spans, last, window, beyond } => {
                 let shown = match (window, beyond) {
                     (Some(window), None) => LockShown::Nearer(window),
                     (None, Some(beyond)) => LockShown::Further(beyond),
-                    _ => return Err("expected one of `window` and `beyond`".to_owned()),
+                    _ => return Err(problem!("expected one of `window` and `beyond`")),
                 };
                 events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
             }
@@ -338,7 +333,7 @@ impl Checker {
                 *pitch = Some(Pitch::new(radius, from, clearance)?);
                 Ok(())
             }
-            ParsedLine::Reach { .. } => Err("a line `reach` of another question, or a second one".to_owned()),
+            ParsedLine::Reach { .. } => Err(problem!("a line `reach` of another question, or a second one")),
             ParsedLine::Overlap { from, to, theta, benches, spans, point, other } => {
                 let points = [point, other.unwrap_or(point)];
                 begun(pitch)?.add_overlap(scene, [from, to], theta, benches, &spans, points)
@@ -352,7 +347,7 @@ impl Checker {
             | ParsedLine::Meeting { .. }
             | ParsedLine::Result(_)
             | ParsedLine::LeastClearance(_)
-            | ParsedLine::ObstacleClearance(_) => Err("it is not in a section".to_owned()),
+            | ParsedLine::ObstacleClearance(_) => Err(problem!("it is not in a section")),
             ParsedLine::LeastPitch(outcome) => {
                 begun(pitch)?.check(&outcome)?;
                 proved.least_pitch = Some(outcome);
@@ -377,6 +372,6 @@ impl Checker {
 }
 
 /// Returns the pitch that a line is about.
-fn begun(pitch: &mut Option<Pitch>) -> Result<&mut Pitch, String> {
-    pitch.as_mut().ok_or_else(|| "no line `reach` precedes it".to_owned())
+fn begun(pitch: &mut Option<Pitch>) -> Checked<&mut Pitch> {
+    pitch.as_mut().ok_or_else(|| problem!("no line `reach` precedes it"))
 }

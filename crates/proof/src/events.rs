@@ -7,6 +7,7 @@ use super::interval::{Interval, Vector};
 use super::lines::EventKind;
 use super::link;
 use super::path::{Place, Span};
+use super::problem::{Checked, ensure, problem};
 use super::results::{Claim, Known, Subject};
 use super::scene::Scene;
 use super::shown::{At, Shown, Witness};
@@ -46,25 +47,23 @@ pub(super) enum LockShown {
 }
 
 /// Checks that an event with the head at `to` is inside the motion, from its start to the path's end.
-fn check_is_in_motion(scene: &Scene, to: Place) -> Result<(), String> {
-    if !Interval::new(0.0).is_at_most(&scene.path.travelled(to)) {
-        return Err("the head has not come to the start".to_owned());
-    }
-    if scene.path.is_within(to) { Ok(()) } else { Err("the head is beyond the end of the path".to_owned()) }
+fn check_is_in_motion(scene: &Scene, to: Place) -> Checked {
+    ensure!(Interval::new(0.0).is_at_most(&scene.path.travelled(to)), "the head has not come to the start");
+    if scene.path.is_within(to) { Ok(()) } else { Err(problem!("the head is beyond the end of the path")) }
 }
 
 /// Returns the handles with the head in a span that ends where the last step ended, or that is at the start.
 ///
 /// # Errors
 /// The condition that does not follow.
-fn touching_chain(scene: &Scene, steps: &Steps, head: Span, spans: &[Span]) -> Result<Chain, String> {
+fn touching_chain(scene: &Scene, steps: &Steps, head: Span, spans: &[Span]) -> Checked<Chain> {
     let chain = Chain::check(scene, head, spans)?;
     let Span(from, to) = head;
     check_is_in_motion(scene, to)?;
     match steps.end {
-        Some(end) if end != to => Err("it is not where the last step ended".to_owned()),
+        Some(end) if end != to => Err(problem!("it is not where the last step ended")),
         None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
-            Err("no step precedes it, and it begins beyond the start".to_owned())
+            Err(problem!("no step precedes it, and it begins beyond the start"))
         }
         _ => Ok(chain),
     }
@@ -75,15 +74,16 @@ fn touching_chain(scene: &Scene, steps: &Steps, head: Span, spans: &[Span]) -> R
 ///
 /// # Errors
 /// The condition that does not follow.
-fn near_step(scene: &Scene, shown: &Shown, head: Span, (spans, at): (&[Span], &[Place])) -> Result<FirstOrder, String> {
+fn near_step(scene: &Scene, shown: &Shown, head: Span, (spans, at): (&[Span], &[Place])) -> Checked<FirstOrder> {
     let (path, Span(from, to)) = (&scene.path, head);
     let chain = Chain::check(scene, head, spans)?;
     if !Interval::new(0.0).is_at_most(&path.travelled(to)) || !path.is_within(from) {
-        return Err("the head is before the start or beyond the end of the path".to_owned());
+        return Err(problem!("the head is before the start or beyond the end of the path"));
     }
-    if !shown.end.is_some_and(|end| matches!(end, At::Head(end) if path.in_order(from, end))) {
-        return Err("no step has come there".to_owned());
-    }
+    ensure!(
+        shown.end.is_some_and(|end| matches!(end, At::Head(end) if path.in_order(from, end))),
+        "no step has come there"
+    );
     FirstOrder::new(scene, &chain, at)
 }
 
@@ -100,22 +100,18 @@ impl Events {
         head: Span,
         spans: &[Span],
         point: [f64; 2],
-    ) -> Result<(), String> {
-        if self.contact.is_some() {
-            return Err("a second contact".to_owned());
-        }
+    ) -> Checked {
+        ensure!(self.contact.is_none(), "a second contact");
         let [a, b] = benches;
         if a.abs_diff(b) < 2 || a.max(b) >= spans.len() {
-            return Err(format!("benches {a} and {b} share a handle, or are not both listed"));
+            return Err(problem!("benches {a} and {b} share a handle, or are not both listed"));
         }
         let chain = touching_chain(scene, steps, head, spans)?;
         let point = Vector::new(point[0], point[1]);
         for bench in benches {
             let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
             let board = Board::new(front, rear, scene.team.size(bench));
-            if !covers(&board, &point) {
-                return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
-            }
+            ensure!(covers(&board, &point), "the point may be outside bench {bench} (Lemma 5)");
         }
         self.contact = Some(Witness::of_event(benches.map(Some), At::Head(head.0)));
         Ok(())
@@ -133,20 +129,19 @@ impl Events {
         head: Span,
         spans: &[Span],
         point: [f64; 2],
-    ) -> Result<(), String> {
-        if self.reached.iter().any(|(other, _)| *other == number) {
-            return Err(format!("obstacle {number} was reached before"));
-        }
-        let obstacle = scene.obstacles.get(number).ok_or_else(|| format!("the scene has no obstacle {number}"))?;
+    ) -> Checked {
+        ensure!(!self.reached.iter().any(|(other, _)| *other == number), "obstacle {number} was reached before");
+        let obstacle = scene.obstacles.get(number).ok_or_else(|| problem!("the scene has no obstacle {number}"))?;
         if bench >= spans.len() {
-            return Err(format!("bench {bench} is not listed"));
+            return Err(problem!("bench {bench} is not listed"));
         }
         let chain = touching_chain(scene, steps, head, spans)?;
         let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
         let board = Board::new(front, rear, scene.team.size(bench));
-        if !obstacle.is_reached_by(&board, &Vector::new(point[0], point[1])) {
-            return Err(format!("bench {bench} may be clear of obstacle {number} (Lemma 9)"));
-        }
+        ensure!(
+            obstacle.is_reached_by(&board, &Vector::new(point[0], point[1])),
+            "bench {bench} may be clear of obstacle {number} (Lemma 9)"
+        );
         self.reached.push((number, Witness::of_event([Some(bench), None], At::Head(head.0))));
         Ok(())
     }
@@ -163,19 +158,18 @@ impl Events {
         head: Span,
         (spans, at): (&[Span], &[Place]),
         most: f64,
-    ) -> Result<(), String> {
-        if self.near.is_some() {
-            return Err("a second line `near`".to_owned());
-        }
+    ) -> Checked {
+        ensure!(self.near.is_none(), "a second line `near`");
         if b < 2 || a > b - 2 || b >= spans.len() {
-            return Err(format!("benches {a} and {b} share a handle, or are not both listed in order"));
+            return Err(problem!("benches {a} and {b} share a handle, or are not both listed in order"));
         }
         let step = near_step(scene, &steps.apart, head, (spans, at))?;
         let [one, other] = [a, b].map(|bench| step.board(bench, &scene.team));
         let most = Interval::new(most);
-        if !one.at_most(&other).is_at_most(&most) {
-            return Err(format!("benches {a} and {b} may be further apart than it says (Lemma 6)"));
-        }
+        ensure!(
+            one.at_most(&other).is_at_most(&most),
+            "benches {a} and {b} may be further apart than it says (Lemma 6)"
+        );
         self.near = Some(Witness { benches: [Some(a), Some(b)], most, at: At::Head(head.0) });
         Ok(())
     }
@@ -192,19 +186,21 @@ impl Events {
         head: Span,
         (spans, at): (&[Span], &[Place]),
         most: f64,
-    ) -> Result<(), String> {
-        if self.near_obstacles.iter().any(|(other, _)| *other == number) {
-            return Err(format!("a second line `near_obstacle` of obstacle {number}"));
-        }
-        let obstacle = scene.obstacles.get(number).ok_or_else(|| format!("the scene has no obstacle {number}"))?;
+    ) -> Checked {
+        ensure!(
+            !self.near_obstacles.iter().any(|(other, _)| *other == number),
+            "a second line `near_obstacle` of obstacle {number}"
+        );
+        let obstacle = scene.obstacles.get(number).ok_or_else(|| problem!("the scene has no obstacle {number}"))?;
         if bench >= spans.len() {
-            return Err(format!("bench {bench} is not listed"));
+            return Err(problem!("bench {bench} is not listed"));
         }
         let step = near_step(scene, &steps.beside[number], head, (spans, at))?;
         let most = Interval::new(most);
-        if !obstacle.at_most(&step.board(bench, &scene.team)).is_at_most(&most) {
-            return Err(format!("bench {bench} may be further from obstacle {number} than it says (Lemma 11)"));
-        }
+        ensure!(
+            obstacle.at_most(&step.board(bench, &scene.team)).is_at_most(&most),
+            "bench {bench} may be further from obstacle {number} than it says (Lemma 11)"
+        );
         let near = Witness { benches: [Some(bench), None], most, at: At::Head(head.0) };
         self.near_obstacles.push((number, near));
         Ok(())
@@ -214,29 +210,17 @@ impl Events {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_stall(
-        &mut self,
-        scene: &Scene,
-        steps: &Steps,
-        link: usize,
-        head: Span,
-        spans: &[Span],
-    ) -> Result<(), String> {
-        if self.stall.is_some() {
-            return Err("a second stall".to_owned());
-        }
+    pub fn add_stall(&mut self, scene: &Scene, steps: &Steps, link: usize, head: Span, spans: &[Span]) -> Checked {
+        ensure!(self.stall.is_none(), "a second stall");
         let chain = Chain::check(scene, head, spans)?;
         check_is_in_motion(scene, head.1)?;
-        if steps.end != Some(head.1) {
-            return Err("it is not where the last step ended".to_owned());
-        }
+        ensure!(steps.end == Some(head.1), "it is not where the last step ended");
         // Otherwise the link may have stalled before the start.
-        if !steps.moving.has_come_to(scene, 0.0) {
-            return Err("no moving step has come to the start".to_owned());
-        }
-        if !chain.products.get(link).is_some_and(Interval::is_negative) {
-            return Err(format!("link {link} may not have stalled (Lemma 5)"));
-        }
+        ensure!(steps.moving.has_come_to(scene, 0.0), "no moving step has come to the start");
+        ensure!(
+            chain.products.get(link).is_some_and(Interval::is_negative),
+            "link {link} may not have stalled (Lemma 5)"
+        );
         self.stall = Some(Witness::of_event([Some(link), None], At::Head(head.0)));
         Ok(())
     }
@@ -252,18 +236,16 @@ impl Events {
         (link, to): (usize, Place),
         (spans, last): (&[Span], &[Span]),
         shown: LockShown,
-    ) -> Result<(), String> {
+    ) -> Checked {
         let path = &scene.path;
         span_is_one(scene, Span(to, to))?;
         check_is_in_motion(scene, to)?;
         let (Some(from), Some(rear)) = (steps.end, steps.spans.get(link)) else {
-            return Err("the last step does not list the rear handle of the link".to_owned());
+            return Err(problem!("the last step does not list the rear handle of the link"));
         };
-        if !Interval::new(0.0).is_at_most(&path.travelled(from)) {
-            return Err("no step has come to the start".to_owned());
-        }
+        ensure!(Interval::new(0.0).is_at_most(&path.travelled(from)), "no step has come to the start");
         if spans.len() != link || last.len() != link {
-            return Err(format!("expected the spans of handles 1 to {link}, twice"));
+            return Err(problem!("expected the spans of handles 1 to {link}, twice"));
         }
         let while_going = Chain::check(scene, Span(from, to), spans)?;
         let at_end = Chain::check(scene, Span(to, to), last)?;
@@ -271,23 +253,23 @@ impl Events {
         let squared = scene.team.link(link).square();
         let is_before = |a: Place, b: Place| a != b && path.in_order(a, b);
         let (LockShown::Nearer(window) | LockShown::Further(window)) = shown;
-        span_is_one(scene, window).map_err(|problem| format!("the window: {problem}"))?;
+        span_is_one(scene, window).map_err(|problem| problem!("the window: {problem}"))?;
         let Span(w1, w2) = window;
-        if !(is_before(w1, rear.0) && is_before(rear.1, w2) && path.in_order(w2, front.span.0)) {
-            return Err("the window is not around the rear's span and behind the front's".to_owned());
-        }
+        ensure!(
+            is_before(w1, rear.0) && is_before(rear.1, w2) && path.in_order(w2, front.span.0),
+            "the window is not around the rear's span and behind the front's"
+        );
         let is_nearer = matches!(shown, LockShown::Nearer(_));
         let cannot_be_at = |place: Place| {
             let test = if is_nearer { link::is_nearer_at } else { link::is_farther };
             test(path, front, place, &squared)
         };
-        if !(cannot_be_at(w1) && cannot_be_at(w2)) {
-            return Err("an end of the window may be at the link's length (Lemma 5)".to_owned());
-        }
+        ensure!(cannot_be_at(w1) && cannot_be_at(w2), "an end of the window may be at the link's length (Lemma 5)");
         let test = if is_nearer { link::is_all_nearer } else { link::is_all_further };
-        if !test(path, front_at_end, window, &squared) {
-            return Err("a place of the window may be at the link's length in the end (Lemma 5)".to_owned());
-        }
+        ensure!(
+            test(path, front_at_end, window, &squared),
+            "a place of the window may be at the link's length in the end (Lemma 5)"
+        );
         self.finish = Some(Finish::Lock(Witness::of_event([Some(link), None], At::Head(to))));
         Ok(())
     }
@@ -296,10 +278,11 @@ impl Events {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_path_end(&mut self, scene: &Scene, steps: &Steps) -> Result<(), String> {
-        if !steps.end.is_some_and(|end| scene.path.is_at_end(end)) {
-            return Err("the last step did not come to the end of the path".to_owned());
-        }
+    pub fn add_path_end(&mut self, scene: &Scene, steps: &Steps) -> Checked {
+        ensure!(
+            steps.end.is_some_and(|end| scene.path.is_at_end(end)),
+            "the last step did not come to the end of the path"
+        );
         self.finish = Some(Finish::PathEnd);
         Ok(())
     }

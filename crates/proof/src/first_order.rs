@@ -8,6 +8,7 @@ use super::handle::Handle;
 use super::interval::Interval;
 use super::path::{Place, Span};
 use super::placement::Mapping;
+use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
 use super::team::Team;
 
@@ -23,7 +24,7 @@ impl FirstOrder {
     ///
     /// # Errors
     /// A place that is missing or not in its span.
-    pub fn new(scene: &Scene, chain: &Chain, at: &[Place]) -> Result<Self, String> {
+    pub fn new(scene: &Scene, chain: &Chain, at: &[Place]) -> Checked<Self> {
         check_places(scene, chain, at)?;
         let Span(from, to) = chain.capsules[0].span;
         let half_step = scene.path.metres_bound(from, at[0]).max(&scene.path.metres_bound(at[0], to));
@@ -35,7 +36,7 @@ impl FirstOrder {
     ///
     /// # Errors
     /// A place that is missing or not in its span.
-    pub fn in_time(scene: &Scene, chain: &Chain, at: &[Place], from: &Interval, to: &Interval) -> Result<Self, String> {
+    pub fn in_time(scene: &Scene, chain: &Chain, at: &[Place], from: &Interval, to: &Interval) -> Checked<Self> {
         check_places(scene, chain, at)?;
         let middle = (from + to) * Interval::new(0.5);
         let half_step = (middle - from).max(&(to - middle)).upper();
@@ -85,17 +86,16 @@ impl FirstOrder {
 }
 
 /// Checks that there is a place in the span of each listed handle.
-fn check_places(scene: &Scene, chain: &Chain, at: &[Place]) -> Result<(), String> {
+fn check_places(scene: &Scene, chain: &Chain, at: &[Place]) -> Checked {
     let path = &scene.path;
-    if at.len() != chain.capsules.len() {
-        return Err(format!("{} places in `at`, expected {}", at.len(), chain.capsules.len()));
-    }
+    ensure!(at.len() == chain.capsules.len(), "{} places in `at`, expected {}", at.len(), chain.capsules.len());
     for (handle, (place, capsule)) in at.iter().zip(&chain.capsules).enumerate() {
-        span_is_one(scene, Span(*place, *place)).map_err(|problem| format!("`at` of handle {handle}: {problem}"))?;
+        span_is_one(scene, Span(*place, *place)).map_err(|problem| problem!("`at` of handle {handle}: {problem}"))?;
         let Span(lo, hi) = capsule.span;
-        if !(path.in_order(lo, *place) && path.in_order(*place, hi)) {
-            return Err(format!("`at` of handle {handle} is not in the handle's span"));
-        }
+        ensure!(
+            path.in_order(lo, *place) && path.in_order(*place, hi),
+            "`at` of handle {handle} is not in the handle's span"
+        );
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ use super::chain::span_is_one;
 use super::interval::Interval;
 use super::lines::ProvedSpeed;
 use super::path::{Place, Span};
+use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
 use super::speeds::Speeds;
 
@@ -24,13 +25,13 @@ impl Greatest {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_step(&mut self, scene: &Scene, head: Span, spans: &[Span], at: &[Place]) -> Result<(), String> {
+    pub fn add_step(&mut self, scene: &Scene, head: Span, spans: &[Span], at: &[Place]) -> Checked {
         let Span(from, to) = head;
-        span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
+        span_is_one(scene, head).map_err(|problem| problem!("the head: {problem}"))?;
         match self.so_far {
-            Some((end, _)) if end != from => return Err("it does not begin where the step before it ended".to_owned()),
+            Some((end, _)) if end != from => return Err(problem!("it does not begin where the step before it ended")),
             None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
-                return Err("the first step begins beyond the start".to_owned());
+                return Err(problem!("the first step begins beyond the start"));
             }
             _ => {}
         }
@@ -46,18 +47,16 @@ impl Greatest {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_fast(&mut self, scene: &Scene, handle: usize, spans: &[Span], at: &[Place]) -> Result<(), String> {
-        let Some(&head) = at.first() else { return Err("no place is listed".to_owned()) };
-        span_is_one(scene, Span(head, head)).map_err(|problem| format!("the head: {problem}"))?;
+    pub fn add_fast(&mut self, scene: &Scene, handle: usize, spans: &[Span], at: &[Place]) -> Checked {
+        let Some(&head) = at.first() else { return Err(problem!("no place is listed")) };
+        span_is_one(scene, Span(head, head)).map_err(|problem| problem!("the head: {problem}"))?;
         let travelled = scene.path.travelled(head);
         if !Interval::new(0.0).is_at_most(&travelled) || !scene.path.is_within(head) {
-            return Err("the head is before the start or beyond the end of the path".to_owned());
+            return Err(problem!("the head is before the start or beyond the end of the path"));
         }
-        if !self.so_far.is_some_and(|(end, _)| scene.path.in_order(head, end)) {
-            return Err("no step has come there".to_owned());
-        }
+        ensure!(self.so_far.is_some_and(|(end, _)| scene.path.in_order(head, end)), "no step has come there");
         let (Speeds { at_place, .. }, _) = Speeds::new(scene, Span(head, head), spans, at)?;
-        let ratio = at_place.get(handle).ok_or_else(|| format!("handle {handle} is not listed"))?;
+        let ratio = at_place.get(handle).ok_or_else(|| problem!("handle {handle} is not listed"))?;
         self.fast = Some((handle, ratio.abs(), travelled));
         Ok(())
     }
@@ -66,31 +65,32 @@ impl Greatest {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn check(&self, scene: &Scene, outcome: &ProvedSpeed) -> Result<(), String> {
+    pub fn check(&self, scene: &Scene, outcome: &ProvedSpeed) -> Checked {
         let ProvedSpeed { limit, value_lo, value_hi, ratio_lo, ratio_hi, handle, time_until } = *outcome;
         let [limit, value_lo, value_hi, ratio_lo, ratio_hi, until] =
             [limit, value_lo, value_hi, ratio_lo, ratio_hi, time_until].map(Interval::new);
         let zero = Interval::new(0.0);
-        let Some((end, most)) = self.so_far else { return Err("no step precedes it".to_owned()) };
-        if !(zero.is_at_most(&until) && (until * scene.head_speed).is_at_most(&scene.path.travelled(end))) {
-            return Err("time_until does not follow".to_owned());
-        }
-        if !most.is_at_most(&ratio_hi) {
-            return Err("ratio_hi does not follow".to_owned());
-        }
+        let Some((end, most)) = self.so_far else { return Err(problem!("no step precedes it")) };
+        ensure!(
+            zero.is_at_most(&until) && (until * scene.head_speed).is_at_most(&scene.path.travelled(end)),
+            "time_until does not follow"
+        );
+        ensure!(most.is_at_most(&ratio_hi), "ratio_hi does not follow");
         let fastest = if handle == 0 { Some((0, Interval::new(1.0), zero)) } else { self.fast };
         let is_before = |travelled: &Interval| travelled.is_at_most(&(until * scene.head_speed));
-        if !fastest
-            .is_some_and(|(fastest, ratio, at)| fastest == handle && ratio_lo.is_at_most(&ratio) && is_before(&at))
-        {
-            return Err("ratio_lo of this handle does not follow".to_owned());
-        }
-        if !(zero.is_at_most(&value_lo) && (value_lo * ratio_hi).is_at_most(&limit)) {
-            return Err("value_lo does not follow from limit and ratio_hi".to_owned());
-        }
-        if !(ratio_lo.is_positive() && limit.is_at_most(&(value_hi * ratio_lo))) {
-            return Err("value_hi does not follow from limit and ratio_lo".to_owned());
-        }
+        ensure!(
+            fastest
+                .is_some_and(|(fastest, ratio, at)| fastest == handle && ratio_lo.is_at_most(&ratio) && is_before(&at)),
+            "ratio_lo of this handle does not follow"
+        );
+        ensure!(
+            zero.is_at_most(&value_lo) && (value_lo * ratio_hi).is_at_most(&limit),
+            "value_lo does not follow from limit and ratio_hi"
+        );
+        ensure!(
+            ratio_lo.is_positive() && limit.is_at_most(&(value_hi * ratio_lo)),
+            "value_hi does not follow from limit and ratio_lo"
+        );
         Ok(())
     }
 }

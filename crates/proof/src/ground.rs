@@ -7,6 +7,7 @@ use super::boards::{Board, covers};
 use super::first_order_board::FirstOrderBoard;
 use super::interval::{Interval, Vector};
 use super::placement::Mapping;
+use super::problem::{Checked, problem};
 
 /// Limit of obstacles and of the corners of one.
 const MOST: usize = 64;
@@ -188,9 +189,9 @@ impl StageText {
     ///
     /// # Errors
     /// A sentence about the field that is wrong.
-    pub fn read(&self, mapping: &Mapping) -> Result<Vec<Obstacle>, String> {
+    pub fn read(&self, mapping: &Mapping) -> Checked<Vec<Obstacle>> {
         if self.obstacles.len() > MOST {
-            return Err("the number of obstacles is out of range".to_owned());
+            return Err(problem!("the number of obstacles is out of range"));
         }
         let of = |text: &ObstacleText| match (&text.circle, &text.polygon, &text.line) {
             (Some(circle), None, None) => {
@@ -198,7 +199,7 @@ impl StageText {
             }
             (None, Some(corners), None) => obstacle(mapping, Kind::Polygon, corners, 0.0, text.keep_out),
             (None, None, Some(corners)) => obstacle(mapping, Kind::Line, corners, 0.0, text.keep_out),
-            _ => Err("an obstacle has one of circle, polygon and line".to_owned()),
+            _ => Err(problem!("an obstacle has one of circle, polygon and line")),
         };
         let obstacles = self.obstacles.iter().map(of);
         let boundary = self.boundary.iter();
@@ -207,24 +208,18 @@ impl StageText {
     }
 }
 
-fn obstacle(
-    mapping: &Mapping,
-    kind: Kind,
-    corners: &[[f64; 2]],
-    radius: f64,
-    keep_out: f64,
-) -> Result<Obstacle, String> {
+fn obstacle(mapping: &Mapping, kind: Kind, corners: &[[f64; 2]], radius: f64, keep_out: f64) -> Checked<Obstacle> {
     let least = match kind {
         Kind::Circle => 1,
         Kind::Line => 2,
         Kind::Polygon | Kind::Boundary => 3,
     };
     if corners.len() < least || corners.len() > MOST || !corners.iter().flatten().all(|number| number.is_finite()) {
-        return Err(format!("an obstacle has {} corners, or one that is no number", corners.len()));
+        return Err(problem!("an obstacle has {} corners, or one that is no number", corners.len()));
     }
     let is_length = |metres: f64| metres.is_finite() && metres >= 0.0;
     if !is_length(radius) || !is_length(keep_out) {
-        return Err(format!("a radius or keep_out of an obstacle is {radius:?} or {keep_out:?}"));
+        return Err(problem!("a radius or keep_out of an obstacle is {radius:?} or {keep_out:?}"));
     }
     let points = corners.iter().map(|corner| mapping.on_path(*corner)).collect();
     Ok(Obstacle { kind, points, radius: Interval::new(radius), keep_out: Interval::new(keep_out) })

@@ -10,6 +10,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::number::Number;
 use super::number::Round::{Down, Up};
+use super::problem::{Checked, problem};
 
 /// All real numbers from `lo` to `hi`.
 #[derive(Debug, Clone, Copy)]
@@ -37,11 +38,11 @@ impl Interval {
     ///
     /// # Errors
     /// A sentence about the field, for another number.
-    pub fn finite(field: &str, number: f64) -> Result<Self, String> {
+    pub fn finite(field: &str, number: f64) -> Checked<Self> {
         if number.is_finite() {
             Ok(Self::new(number))
         } else {
-            Err(format!("{field} is {number:?}, expected a number"))
+            Err(problem!("{field} is {number:?}, expected a number"))
         }
     }
 
@@ -49,11 +50,11 @@ impl Interval {
     ///
     /// # Errors
     /// A sentence about the field, for another number.
-    pub fn positive(field: &str, number: f64) -> Result<Self, String> {
+    pub fn positive(field: &str, number: f64) -> Checked<Self> {
         if number.is_finite() && number > 0.0 {
             Ok(Self::new(number))
         } else {
-            Err(format!("{field} is {number:?}, expected a positive number"))
+            Err(problem!("{field} is {number:?}, expected a positive number"))
         }
     }
 

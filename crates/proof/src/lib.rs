@@ -27,6 +27,7 @@ mod path;
 mod pieces;
 mod pitch;
 mod placement;
+mod problem;
 mod results;
 mod scene;
 mod several;
@@ -49,6 +50,7 @@ use self::lines::{About, ParsedLine};
 pub use self::lines::{
     EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, ProvedPitch, ProvedSpeed, Status, Until,
 };
+use self::problem::{Problem, problem};
 
 /// The most bytes of a line. The first line holds the text of the scene.
 pub const LONGEST_LINE: u64 = 1 << 26;
@@ -123,16 +125,16 @@ pub fn scene_hash(text: &str) -> [u8; 32] {
 /// # Errors
 /// [`Refused::Form`] for a line that is not the first of a certificate of events.
 pub fn scene_of(first_line: &[u8]) -> Result<String, Refused> {
-    let form = |problem: String| Refused::Form { line: 1, problem };
-    let parsed = serde_json::from_slice(first_line).map_err(|error| form(error.to_string()))?;
+    let form = |problem: Problem| Refused::Form { line: 1, problem: problem.into() };
+    let parsed = serde_json::from_slice(first_line).map_err(|error| form(problem!("{error}")))?;
     let Checker { about, alone, proved, .. } = Checker::begin(parsed).map_err(form)?;
     if alone.is_some() {
-        return Err(form("it is a certificate of several dragons, expected one of a scene with [team]".to_owned()));
+        return Err(form(problem!("it is a certificate of several dragons, expected one of a scene with [team]")));
     }
     if about == About::Events {
         return Ok(proved.scene);
     }
-    Err(form("it is a certificate of another question, expected one of events (events --certify)".to_owned()))
+    Err(form(problem!("it is a certificate of another question, expected one of events (events --certify)")))
 }
 
 /// Checks a certificate. `progress` receives the number of bytes read.
@@ -148,7 +150,7 @@ fn verify_lines(lines: &mut dyn BufRead, progress: &mut dyn FnMut(u64)) -> Resul
     let mut bytes = 0;
     let mut checker: Option<Checker> = None;
     for line in 1.. {
-        let form = |problem: String| Refused::Form { line, problem };
+        let form = |problem: Problem| Refused::Form { line, problem: problem.into() };
         let mut text = Vec::new();
         let read = (&mut *lines).take(LONGEST_LINE).read_until(b'\n', &mut text).map_err(Refused::Unreadable)?;
         if read == 0 {
@@ -156,11 +158,11 @@ fn verify_lines(lines: &mut dyn BufRead, progress: &mut dyn FnMut(u64)) -> Resul
         }
         bytes += read as u64;
         progress(bytes);
-        let parsed: ParsedLine = serde_json::from_slice(&text).map_err(|error| form(error.to_string()))?;
+        let parsed: ParsedLine = serde_json::from_slice(&text).map_err(|error| form(problem!("{error}")))?;
         match (&mut checker, parsed) {
             (None, first) => checker = Some(Checker::begin(first).map_err(form)?),
             (Some(checker), parsed) => {
-                checker.add(parsed).map_err(|problem| Refused::DoesNotFollow { line, problem })?;
+                checker.add(parsed).map_err(|problem| Refused::DoesNotFollow { line, problem: problem.into() })?;
             }
         }
     }

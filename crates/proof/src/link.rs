@@ -4,6 +4,7 @@ use super::capsule::{Capsule, Pair};
 use super::elementary;
 use super::interval::{Interval, Vector};
 use super::path::{Path, Place, Span};
+use super::problem::{Checked, ensure, problem};
 
 /// Limit of stretches of the path that are tested for one link: some seconds. A certificate that the search has written
 /// needs a few.
@@ -24,14 +25,12 @@ pub(super) fn check(
     (rear, [x1, x2]): (&Capsule, [Vector; 2]),
     link: &Interval,
     rules: &[(Span, Option<Place>)],
-) -> Result<Interval, String> {
-    if !path.in_order(rear.span.1, front.span.0) {
-        return Err("the rear's span is not behind the front's".to_owned());
-    }
+) -> Checked<Interval> {
+    ensure!(path.in_order(rear.span.1, front.span.0), "the rear's span is not behind the front's");
     let pair = Pair::new(front, rear);
     let falls = |stretch: Span| falls(path, &Pair::new(front, &Capsule::new(path, stretch)));
     if !pair.rear_product().is_positive() && !all_stretches(path, rear.span, falls) {
-        return Err("the rear product may be 0".to_owned());
+        return Err(problem!("the rear product may be 0"));
     }
     let product = front_product(path, &pair);
     let squared = link.square();
@@ -43,17 +42,14 @@ pub(super) fn check(
     } else {
         (over_front(front, &x1), over_front(front, &x2))
     };
-    if !squared.is_below(&longest) {
-        return Err("the earliest place of the rear may be too near".to_owned());
-    }
-    if !shortest.is_below(&squared) {
-        return Err("the latest place of the rear may be too far".to_owned());
-    }
+    ensure!(squared.is_below(&longest), "the earliest place of the rear may be too near");
+    ensure!(shortest.is_below(&squared), "the latest place of the rear may be too far");
     for (stretch, behind) in rules {
         let part = (*stretch != front.span).then(|| Capsule::new(path, *stretch));
-        if !is_first(path, part.as_ref().unwrap_or(front), rear.span, *behind, &squared) {
-            return Err("a place between the handles may be at the link's length".to_owned());
-        }
+        ensure!(
+            is_first(path, part.as_ref().unwrap_or(front), rear.span, *behind, &squared),
+            "a place between the handles may be at the link's length"
+        );
     }
     Ok(product)
 }

@@ -7,6 +7,7 @@ use super::curve::{Curve, direction};
 use super::elementary;
 use super::interval::{Interval, Vector};
 use super::path::{Path, PathEnd, Segment};
+use super::problem::{Checked, ensure, problem};
 
 /// Limit of the pieces of a route, as in a show: the cost of a step grows with them.
 const MOST_PIECES: usize = 4096;
@@ -93,9 +94,9 @@ struct Route {
 }
 
 /// Reads a route, in its own coordinates: no statement of a certificate depends on the place of its start.
-pub(super) fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Result<Path, String> {
+pub(super) fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -> Checked<Path> {
     if pieces.is_empty() || pieces.len() > MOST_PIECES {
-        return Err(format!("path.pieces has {} pieces, expected from 1 to {MOST_PIECES}", pieces.len()));
+        return Err(problem!("path.pieces has {} pieces, expected from 1 to {MOST_PIECES}", pieces.len()));
     }
     Interval::finite("path.heading_turns", heading_turns)?;
     Interval::finite("path.start", start[0]).and(Interval::finite("path.start", start[1]))?;
@@ -114,7 +115,7 @@ pub(super) fn route(start: [f64; 2], heading_turns: f64, pieces: &[PieceText]) -
 }
 
 impl Route {
-    fn read(&mut self, piece: &PieceText) -> Result<(), String> {
+    fn read(&mut self, piece: &PieceText) -> Checked {
         let before = std::mem::replace(&mut self.ending, Ending::Any);
         match *piece {
             PieceText::Line { length } => {
@@ -130,7 +131,7 @@ impl Route {
                         elementary::turns(turns)
                     }
                     (None, Some(length)) => Interval::positive("path.pieces.length", length)? / radius,
-                    _ => return Err("an arc has either turns or a length".to_owned()),
+                    _ => return Err(problem!("an arc has either turns or a length")),
                 };
                 self.arc(side, radius, angle);
             }
@@ -143,9 +144,9 @@ impl Route {
                         (OnSpiral { side, a, angle }, way)
                     }
                     _ => {
-                        return Err(
-                            "a spiral has a pitch, a radius, a direction and a side, or follows a turn".to_owned()
-                        );
+                        return Err(problem!(
+                            "a spiral has a pitch, a radius, a direction and a side, or follows a turn"
+                        ));
                     }
                 };
                 let last = last_of_spiral(&begin, way, [turns, length, to_radius])?;
@@ -153,7 +154,7 @@ impl Route {
             }
             PieceText::Turn { arc_ratio } => {
                 let Ending::Inward(begin) = before else {
-                    return Err("a turn has to follow an inward spiral".to_owned());
+                    return Err(problem!("a turn has to follow an inward spiral"));
                 };
                 self.turn(&begin, Interval::positive("path.pieces.arc_ratio", arc_ratio.unwrap_or(ARC_RATIO))?);
             }
@@ -201,11 +202,7 @@ impl Route {
 }
 
 /// Returns the last polar angle of a spiral, from its turns, its length or its last radius.
-fn last_of_spiral(
-    begin: &OnSpiral,
-    way: Way,
-    [turns, length, to_radius]: [Option<f64>; 3],
-) -> Result<Interval, String> {
+fn last_of_spiral(begin: &OnSpiral, way: Way, [turns, length, to_radius]: [Option<f64>; 3]) -> Checked<Interval> {
     let OnSpiral { side: _, a, angle: first } = *begin;
     let is_inward = way == Way::In;
     let last = match (turns, length, to_radius) {
@@ -221,20 +218,18 @@ fn last_of_spiral(
         (None, None, Some(radius)) => {
             let last = Interval::positive("path.pieces.to_radius", radius)? / a;
             let (inner, outer) = if is_inward { (last, first) } else { (first, last) };
-            if !inner.is_below(&outer) {
-                return Err("a spiral leads to the radius from which it begins, or past it".to_owned());
-            }
+            ensure!(inner.is_below(&outer), "a spiral leads to the radius from which it begins, or past it");
             last
         }
-        _ => return Err("a spiral has one of turns, a length and a to_radius".to_owned()),
+        _ => return Err(problem!("a spiral has one of turns, a length and a to_radius")),
     };
-    if last.is_positive() { Ok(last) } else { Err("a spiral leads to its centre or past it".to_owned()) }
+    if last.is_positive() { Ok(last) } else { Err(problem!("a spiral leads to its centre or past it")) }
 }
 
 /// Returns the polar angle `metres` of a spiral further out than `first`, further in if they are negative. The angle
 /// comes from a step of Newton's method from a guess. The root is within an interval if the step from its middle leads
 /// into the interval with every rate in it.
-fn last_angle(a: &Interval, first: &Interval, metres: &Interval) -> Result<Interval, String> {
+fn last_angle(a: &Interval, first: &Interval, metres: &Interval) -> Checked<Interval> {
     let outward = Curve::outward(*a);
     let step = |from: f64, within: &Interval| {
         let rate = a * (within.square() + Interval::new(1.0)).sqrt();
@@ -246,7 +241,7 @@ fn last_angle(a: &Interval, first: &Interval, metres: &Interval) -> Result<Inter
     let within = Interval::new(guess) + Interval::new(1e-9 * guess.abs()).around_zero();
     let last = Interval::new(guess) + step(guess, &within);
     let is_found = guess > 0.0 && (last - Interval::new(guess)).abs().is_below(&Interval::new(1e-9 * guess));
-    if is_found { Ok(last) } else { Err("a spiral's length leads to its centre or past it".to_owned()) }
+    if is_found { Ok(last) } else { Err(problem!("a spiral's length leads to its centre or past it")) }
 }
 
 /// Returns a double near the polar angle that is `length` further out than `first` on the spiral r = theta.

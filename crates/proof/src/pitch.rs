@@ -7,6 +7,7 @@ use super::far;
 use super::interval::{Interval, Vector};
 use super::lines::ProvedPitch;
 use super::path::{Place, Span};
+use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
 use super::shown::At;
 use super::steps::{Step, Steps};
@@ -48,14 +49,10 @@ impl Pitch {
     ///
     /// # Errors
     /// A radius or pitch that is not positive, or a negative clearance.
-    pub fn new(radius: f64, from: f64, clearance: f64) -> Result<Self, String> {
+    pub fn new(radius: f64, from: f64, clearance: f64) -> Checked<Self> {
         let is_positive = |number: f64| number.is_finite() && number > 0.0;
-        if !(is_positive(radius) && is_positive(from)) {
-            return Err("the radius and the least pitch are not both positive".to_owned());
-        }
-        if !(clearance.is_finite() && clearance >= 0.0) {
-            return Err(format!("the clearance is {clearance:?} m, expected 0 or more"));
-        }
+        ensure!(is_positive(radius) && is_positive(from), "the radius and the least pitch are not both positive");
+        ensure!(clearance.is_finite() && clearance >= 0.0, "the clearance is {clearance:?} m, expected 0 or more");
         Ok(Self { radius, from, blocked: from, clearance, free: None, intervals: 0, links: 0 })
     }
 
@@ -65,9 +62,9 @@ impl Pitch {
     }
 
     /// Checks that the interval from `from` to `to` follows the last one.
-    fn next(&mut self, from: f64, to: f64) -> Result<(), String> {
+    fn next(&mut self, from: f64, to: f64) -> Checked {
         if self.free.is_some() || from != self.blocked || !(to > from && to.is_finite()) {
-            return Err("the interval of pitches does not follow the one before".to_owned());
+            return Err(problem!("the interval of pitches does not follow the one before"));
         }
         self.blocked = to;
         self.intervals += 1;
@@ -87,19 +84,17 @@ impl Pitch {
         [a, b]: [usize; 2],
         spans: &[Span],
         points: [[f64; 2]; 2],
-    ) -> Result<(), String> {
+    ) -> Checked {
         self.next(from, to)?;
         if b < 2 || a > b - 2 || b >= spans.len() {
-            return Err(format!("benches {a} and {b} share a handle, or are not both listed in order"));
+            return Err(problem!("benches {a} and {b} share a handle, or are not both listed in order"));
         }
-        if !self.theta(from, to).is_at_most(&Interval::new(theta)) {
-            return Err("the head may be inside the radius".to_owned());
-        }
+        ensure!(self.theta(from, to).is_at_most(&Interval::new(theta)), "the head may be inside the radius");
         let unit = growth(from, to);
         let [one, other] = points.map(|[x, y]| Vector::new(x, y));
         let clearance = Interval::new(self.clearance) / unit;
         if points[0] != points[1] && !one.minus(&other).norm().is_below(&clearance) {
-            return Err("the two points may be as far apart as the clearance".to_owned());
+            return Err(problem!("the two points may be as far apart as the clearance"));
         }
         let scene = scene.in_units(&unit);
         let head = Place(0, theta, 0.0);
@@ -108,9 +103,7 @@ impl Pitch {
         for (bench, point) in [(a, one), (b, other)] {
             let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
             let board = Board::new(front, rear, scene.team.size(bench));
-            if !covers(&board, &point) {
-                return Err(format!("the point may be outside bench {bench} (Lemma 5)"));
-            }
+            ensure!(covers(&board, &point), "the point may be outside bench {bench} (Lemma 5)");
         }
         Ok(())
     }
@@ -119,13 +112,11 @@ impl Pitch {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_lock(&mut self, scene: &Scene, from: f64, to: f64) -> Result<(), String> {
+    pub fn add_lock(&mut self, scene: &Scene, from: f64, to: f64) -> Checked {
         self.next(from, to)?;
         let theta = self.theta(from, from).upper();
         let squared = (scene.team.link(0) / growth(to, to)).square();
-        if !Interval::new(1.0).is_below(&theta) {
-            return Err("the radius is within the first radian".to_owned());
-        }
+        ensure!(Interval::new(1.0).is_below(&theta), "the radius is within the first radian");
         let mut pieces = vec![(0.0, THREE_QUARTERS)];
         for _ in 0..MOST_PIECES {
             let Some((first, last)) = pieces.pop() else { return Ok(()) };
@@ -138,22 +129,23 @@ impl Pitch {
             }
             pieces.extend([(first, middle), (middle, last)]);
         }
-        Err("the head's link may not lock".to_owned())
+        Err(problem!("the head's link may not lock"))
     }
 
     /// Checks Lemma 8 for a pitch and a radius `far`.
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_far(&mut self, scene: &Scene, pitch: f64, far: f64) -> Result<(), String> {
+    pub fn add_far(&mut self, scene: &Scene, pitch: f64, far: f64) -> Checked {
         let is_positive = |number: f64| number.is_finite() && number > 0.0;
         if self.free.is_some() || !(is_positive(pitch) && is_positive(far)) {
-            return Err("a second pitch, or a number that is not positive".to_owned());
+            return Err(problem!("a second pitch, or a number that is not positive"));
         }
         let half = Interval::new(self.clearance) * Interval::new(0.5);
-        if !far::holds(&scene.team.grown(&half), pitch, &Interval::new(far)) {
-            return Err(format!("boards may touch or be too near further out than {far:?} m (Lemma 8)"));
-        }
+        ensure!(
+            far::holds(&scene.team.grown(&half), pitch, &Interval::new(far)),
+            "boards may touch or be too near further out than {far:?} m (Lemma 8)"
+        );
         self.free = Some(Free { pitch, far, scene: scene.on_spiral(growth(pitch, pitch)), steps: Steps::far_out() });
         Ok(())
     }
@@ -162,14 +154,14 @@ impl Pitch {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_step(&mut self, step: Step) -> Result<(), String> {
-        let Some(free) = &mut self.free else { return Err("no pitch precedes it".to_owned()) };
+    pub fn add_step(&mut self, step: Step) -> Checked {
+        let Some(free) = &mut self.free else { return Err(problem!("no pitch precedes it")) };
         let begin = step.head.0;
         let is_first = free.steps.end.is_none();
         free.steps.add(&free.scene, step)?;
         let radius = free.scene.path.spiral_radius(begin);
         if is_first && !radius.is_some_and(|radius| Interval::new(free.far).is_at_most(&radius)) {
-            return Err("the first step begins where Lemma 8 does not hold".to_owned());
+            return Err(problem!("the first step begins where Lemma 8 does not hold"));
         }
         Ok(())
     }
@@ -185,14 +177,15 @@ impl Pitch {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn check(&self, outcome: &ProvedPitch) -> Result<(), String> {
+    pub fn check(&self, outcome: &ProvedPitch) -> Checked {
         let ProvedPitch { radius, from, clearance, value_lo, value_hi } = *outcome;
         if radius != self.radius || from != self.from || clearance != self.clearance {
-            return Err("the radius, the least pitch or the clearance is another".to_owned());
+            return Err(problem!("the radius, the least pitch or the clearance is another"));
         }
-        if value_lo.is_some_and(|value_lo| !(self.intervals > 0 && value_lo <= self.blocked)) {
-            return Err("value_lo does not follow".to_owned());
-        }
+        ensure!(
+            value_lo.is_none_or(|value_lo| self.intervals > 0 && value_lo <= self.blocked),
+            "value_lo does not follow"
+        );
         let Some(value_hi) = value_hi else { return Ok(()) };
         let reached = self.free.as_ref().filter(|free| free.pitch == value_hi).is_some_and(|free| {
             let Steps { end, apart, .. } = &free.steps;
@@ -203,7 +196,7 @@ impl Pitch {
                     && end.map(At::Head) == apart.end
                     && end.and_then(|end| free.scene.path.spiral_radius(end)).is_some_and(|metres| within(&metres))
         });
-        if reached { Ok(()) } else { Err("value_hi does not follow".to_owned()) }
+        if reached { Ok(()) } else { Err(problem!("value_hi does not follow")) }
     }
 }
 

@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::elementary;
 use super::interval::{Interval, Vector};
+use super::problem::{Checked, ensure};
 
 /// The table `[placement]`.
 #[derive(Deserialize, Default)]
@@ -31,11 +32,9 @@ impl Mapping {
     ///
     /// # Errors
     /// A sentence about a number that is out of range.
-    pub fn new(placement: &PlacementText, start: [f64; 2]) -> Result<Self, String> {
+    pub fn new(placement: &PlacementText, start: [f64; 2]) -> Checked<Self> {
         let numbers = [placement.origin[0], placement.origin[1], placement.rotation_turns, start[0], start[1]];
-        if !numbers.iter().all(|number| number.is_finite()) {
-            return Err("the placement is out of range".to_owned());
-        }
+        ensure!(numbers.iter().all(|number| number.is_finite()), "the placement is out of range");
         let (sine, cosine) = elementary::sin_cos(&elementary::turns(placement.rotation_turns));
         let [origin, start] = [placement.origin, start].map(|[x, y]| Vector::new(x, y));
         Ok(Self { origin, sine, cosine, mirror: placement.mirror, start })

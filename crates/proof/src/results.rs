@@ -2,6 +2,7 @@
 
 use super::interval::Interval;
 use super::lines::{About, EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, Status, Until};
+use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
 use super::shown::{Shown, Witness};
 
@@ -91,7 +92,7 @@ impl Known<'_> {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn check_event(&self, outcome: &ProvedEvent) -> Result<(), String> {
+    pub fn check_event(&self, outcome: &ProvedEvent) -> Checked {
         let ProvedEvent { status, time_lo, time_hi, bench_a, bench_b, .. } = *outcome;
         let benches = [bench_a, bench_b];
         let (follows, claim) = match (status, time_lo, time_hi) {
@@ -104,16 +105,14 @@ impl Known<'_> {
                 (begins && hi.is_none() && benches == [None; 2], "the status undecided with this time_lo")
             }
             (Status::Proved, Some(lo), Some(hi)) => {
-                let Some(event) = self.event else { return Err("the status proved does not follow".to_owned()) };
-                if event.benches != benches {
-                    return Err("the benches are not those of the event".to_owned());
-                }
+                let Some(event) = self.event else { return Err(problem!("the status proved does not follow")) };
+                ensure!(event.benches == benches, "the benches are not those of the event");
                 let is_by = hi.is_finite() && event.at.seconds(self.scene).is_at_most(&Interval::new(hi));
                 (self.begins(lo) && is_by, "the interval from time_lo to time_hi")
             }
-            (Status::Proved, ..) => return Err("a time is missing".to_owned()),
+            (Status::Proved, ..) => return Err(problem!("a time is missing")),
         };
-        if follows { Ok(()) } else { Err(format!("{claim} does not follow")) }
+        if follows { Ok(()) } else { Err(problem!("{claim} does not follow")) }
     }
 
     /// Returns true if the event certainly does not happen before a time.
@@ -137,41 +136,40 @@ impl Known<'_> {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn check_clearance(&self, outcome: &Clearance) -> Result<(), String> {
+    pub fn check_clearance(&self, outcome: &Clearance) -> Checked {
         let Clearance { lo, hi, until, time_until, benches } = *outcome;
         let (shown, scene) = (&self.shown, self.scene);
-        if lo.is_some_and(|lo| !(lo.is_finite() && lo <= shown.least && shown.has_come_to(scene, 0.0))) {
-            return Err("the clearance lo does not follow".to_owned());
-        }
+        ensure!(
+            lo.is_none_or(|lo| lo.is_finite() && lo <= shown.least && shown.has_come_to(scene, 0.0)),
+            "the clearance lo does not follow"
+        );
         let near = match until {
             Until::PathEnd if self.is_whole => self.near,
-            Until::PathEnd => return Err("the steps that say how far boards are apart end before the path".to_owned()),
+            Until::PathEnd => return Err(problem!("the steps that say how far boards are apart end before the path")),
             Until::Contact => {
                 // Boards are apart at the start, and two overlap later.
                 let begins = shown.least >= 0.0 && lo.is_none_or(|lo| lo <= 0.0) && shown.has_come_to(scene, 0.0);
-                Some(self.event.filter(|_| begins).ok_or("a first contact does not follow")?)
+                Some(self.event.filter(|_| begins).ok_or_else(|| problem!("a first contact does not follow"))?)
             }
             Until::Time => {
                 let is_reached = |time: f64| lo.is_none() || shown.has_come_to(scene, time);
                 let Some(time) = time_until.filter(|time| *time >= 0.0 && is_reached(*time)) else {
-                    return Err("time_until does not follow".to_owned());
+                    return Err(problem!("time_until does not follow"));
                 };
                 self.near.filter(|near| near.at.is_by(scene, time))
             }
         };
-        if (until == Until::Time) != time_until.is_some() {
-            return Err("time_until is of another end".to_owned());
-        }
+        ensure!((until == Until::Time) == time_until.is_some(), "time_until is of another end");
         match (hi, near) {
             (None, _) if benches == [None; 2] => Ok(()),
             (Some(hi), Some(near)) if near.benches == benches => {
                 if near.most.is_at_most(&Interval::new(hi)) {
                     Ok(())
                 } else {
-                    Err("the clearance hi does not follow".to_owned())
+                    Err(problem!("the clearance hi does not follow"))
                 }
             }
-            _ => Err("the clearance hi, or its benches, do not follow".to_owned()),
+            _ => Err(problem!("the clearance hi, or its benches, do not follow")),
         }
     }
 }

@@ -12,6 +12,7 @@ use super::interval::Interval;
 use super::path::{Path, PathEnd, Segment};
 use super::pieces::{PieceText, route};
 use super::placement::{Mapping, PlacementText};
+use super::problem::{Checked, ensure, problem};
 use super::team::{Team, TeamText};
 
 /// The greatest number of dragons.
@@ -98,8 +99,8 @@ enum PathText {
 }
 
 /// Reads a text.
-fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
-    toml::from_str(text).map_err(|error: toml::de::Error| error.message().trim().replace('\n', ", "))
+fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Checked<T> {
+    toml::from_str(text).map_err(|error: toml::de::Error| problem!("{}", error.message().trim().replace('\n', ", ")))
 }
 
 impl Scene {
@@ -107,7 +108,7 @@ impl Scene {
     ///
     /// # Errors
     /// A sentence for a text that is not a scene.
-    pub fn read(text: &str) -> Result<Self, String> {
+    pub fn read(text: &str) -> Checked<Self> {
         let Text { team, path, motion, placement, stage } = parsed(text)?;
         let placement = placement.unwrap_or_default();
         Self::of(DragonText { name: String::new(), delay: 0.0, team, path, placement, motion }, stage.as_ref())
@@ -117,27 +118,30 @@ impl Scene {
     ///
     /// # Errors
     /// A sentence for a text that is not a scene.
-    pub fn read_ensemble(text: &str) -> Result<Vec<Self>, String> {
+    pub fn read_ensemble(text: &str) -> Checked<Vec<Self>> {
         let EnsembleText { dragons, team, stage } = parsed(text)?;
         if dragons.len() > MOST_DRAGONS || !dragons.is_empty() && team.is_some() {
-            return Err("expected [team], or from 1 to 16 [[dragons]]".to_owned());
+            return Err(problem!("expected [team], or from 1 to 16 [[dragons]]"));
         }
         dragons.into_iter().map(|dragon| Self::of(dragon, stage.as_ref())).collect()
     }
 
-    fn of(text: DragonText, stage: Option<&StageText>) -> Result<Self, String> {
-        if !(text.delay.is_finite() && text.delay >= 0.0) {
-            return Err(format!("a delay is {:?}, expected a number that is not negative", text.delay));
-        }
+    fn of(text: DragonText, stage: Option<&StageText>) -> Checked<Self> {
+        ensure!(
+            text.delay.is_finite() && text.delay >= 0.0,
+            "a delay is {:?}, expected a number that is not negative",
+            text.delay
+        );
         let team = text.team.read()?;
         let path = match &text.path {
             PathText::Spiral { pitch, start_turn } => spiral(*pitch, *start_turn)?,
             PathText::Turnaround { .. } => turnaround(&text.path, &team)?,
             PathText::Pieces { start, heading_turns, pieces } => route(*start, *heading_turns, pieces)?,
         };
-        if text.motion.solver.as_deref() == Some("paper") {
-            return Err("the scene names the solver \"paper\", whose motion is not the exact one".to_owned());
-        }
+        ensure!(
+            text.motion.solver.as_deref() != Some("paper"),
+            "the scene names the solver \"paper\", whose motion is not the exact one"
+        );
         let head_speed = Interval::positive("motion.head_speed", text.motion.head_speed)?;
         let start = if let PathText::Pieces { start, .. } = &text.path { *start } else { [0.0; 2] };
         let frame = Mapping::new(&text.placement, start)?;
@@ -211,11 +215,11 @@ impl Scene {
 }
 
 /// Returns the metres of radius per radian.
-fn growth(pitch: f64) -> Result<Interval, String> {
+fn growth(pitch: f64) -> Checked<Interval> {
     Ok(Interval::positive("path.pitch", pitch)? / elementary::turns(1.0))
 }
 
-fn spiral(pitch: f64, start_turn: f64) -> Result<Path, String> {
+fn spiral(pitch: f64, start_turn: f64) -> Checked<Path> {
     Interval::positive("path.start_turn", start_turn)?;
     let curve = Curve::inward(growth(pitch)?);
     let inward = Segment { curve, begin: None, end: Some(Interval::new(0.0)) };
@@ -224,9 +228,9 @@ fn spiral(pitch: f64, start_turn: f64) -> Result<Path, String> {
     Ok(Path::new(vec![inward], length, PathEnd::Coordinate(Interval::new(0.0)), length))
 }
 
-fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
+fn turnaround(text: &PathText, team: &Team) -> Checked<Path> {
     let PathText::Turnaround { pitch, turn_radius, arc_ratio, start_turn, lead_in, lead_out } = text else {
-        return Err("the path is no turnaround".to_owned());
+        return Err(problem!("the path is no turnaround"));
     };
     let a = growth(*pitch)?;
     let radius = Interval::positive("path.turn_radius", *turn_radius)?;
@@ -240,12 +244,10 @@ fn turnaround(text: &PathText, team: &Team) -> Result<Path, String> {
             // 2 pi start_turn is not less than turn_radius / a: both sides are divided by 2 pi and multiplied by the
             // pitch.
             let outside = radius.is_at_most(&(Interval::positive("path.start_turn", *turns)? * Interval::new(*pitch)));
-            if !outside {
-                return Err("path.start_turn is inside the turn".to_owned());
-            }
+            ensure!(outside, "path.start_turn is inside the turn");
             inward.metres(&elementary::turns(*turns), &turn)
         }
-        _ => return Err("expected path.lead_in or path.start_turn, and not both".to_owned()),
+        _ => return Err(problem!("expected path.lead_in or path.start_turn, and not both")),
     };
     let lead_out = match lead_out {
         Some(metres) if *metres == 0.0 => Interval::new(0.0),

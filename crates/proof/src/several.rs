@@ -9,6 +9,7 @@ use super::first_order_board::FirstOrderBoard;
 use super::handle::When;
 use super::interval::{Interval, Vector};
 use super::path::{Place, Span};
+use super::problem::{Checked, ensure, problem};
 use super::results::Known;
 use super::scene::Scene;
 use super::shown::{At, Shown, Witness};
@@ -89,19 +90,15 @@ fn is_in_span(scene: &Scene, Span(lo, hi): Span, from: &Interval, to: &Interval)
 
 impl Together {
     /// Checks that both heads are in their spans from one time to another, and Lemma 1 for the listed links.
-    fn new(scenes: [&Scene; 2], [from, to]: [f64; 2], heads: [Span; 2], spans: [&[Span]; 2]) -> Result<Self, String> {
+    fn new(scenes: [&Scene; 2], [from, to]: [f64; 2], heads: [Span; 2], spans: [&[Span]; 2]) -> Checked<Self> {
         let [from, to] = [from, to].map(Interval::new);
         let mut together =
             Self { chains: Vec::new(), capsules: Default::default(), runs: Default::default(), links: 0 };
         for (k, scene) in scenes.into_iter().enumerate() {
-            span_is_one(scene, heads[k]).map_err(|problem| format!("head {k} of the two: {problem}"))?;
-            if !is_in_span(scene, heads[k], &from, &to) {
-                return Err(format!("head {k} of the two may be outside its span"));
-            }
+            span_is_one(scene, heads[k]).map_err(|problem| problem!("head {k} of the two: {problem}"))?;
+            ensure!(is_in_span(scene, heads[k], &from, &to), "head {k} of the two may be outside its span");
             // A run of boards of one size begins behind the head.
-            if spans[k].is_empty() {
-                return Err("no span is listed".to_owned());
-            }
+            ensure!(!spans[k].is_empty(), "no span is listed");
             let chain = Chain::check(scene, heads[k], spans[k])?;
             let on_stage = |capsule: &Capsule| capsule.placed(&scene.frame);
             together.links += chain.products.len() as u64;
@@ -124,11 +121,11 @@ impl Together {
     }
 
     /// Returns all boards of a dragon, those on the line without end as one.
-    fn boards<'c>(&'c self, scene: &Scene, k: usize) -> Result<Vec<Board<'c>>, String> {
+    fn boards<'c>(&'c self, scene: &Scene, k: usize) -> Checked<Vec<Board<'c>>> {
         let listed = self.capsules[k].len() - 1;
         let mut boards: Vec<Board> = (0..listed).map(|bench| self.board(scene, k, bench)).collect();
         if self.runs[k].is_empty() && listed < scene.team.benches {
-            return Err("not all links are listed, and the last handle is not on a line without end".to_owned());
+            return Err(problem!("not all links are listed, and the last handle is not on a line without end"));
         }
         boards.extend(self.runs[k].iter().map(|(_, front, rear, size)| Board::new(front, rear, *size)));
         Ok(boards)
@@ -137,17 +134,12 @@ impl Together {
 
 impl Together {
     /// Encloses both dragons to the first order on the stage.
-    fn first_order(
-        &self,
-        scenes: [&Scene; 2],
-        [from, to]: [f64; 2],
-        at: [&[Place]; 2],
-    ) -> Result<[FirstOrder; 2], String> {
+    fn first_order(&self, scenes: [&Scene; 2], [from, to]: [f64; 2], at: [&[Place]; 2]) -> Checked<[FirstOrder; 2]> {
         let [from, to] = [from, to].map(Interval::new);
         let of = |k: usize| {
             let step = FirstOrder::in_time(scenes[k], &self.chains[k], at[k], &from, &to);
             step.map(|step| step.placed(&scenes[k].frame))
-                .map_err(|problem| format!("dragon {k} of the two: {problem}"))
+                .map_err(|problem| problem!("dragon {k} of the two: {problem}"))
         };
         Ok([of(0)?, of(1)?])
     }
@@ -179,16 +171,12 @@ impl Pair {
         [from, to]: [f64; 2],
         (heads, spans): ([Span; 2], [&[Span]; 2]),
         claim: PairClaim,
-    ) -> Result<(), String> {
-        if self.meeting.is_some() {
-            return Err("a step after a contact of the two".to_owned());
-        }
-        if !(from.is_finite() && to.is_finite() && from < to) {
-            return Err("it does not go forward in time".to_owned());
-        }
+    ) -> Checked {
+        ensure!(self.meeting.is_none(), "a step after a contact of the two");
+        ensure!(from.is_finite() && to.is_finite() && from < to, "it does not go forward in time");
         match self.end {
-            Some(end) if end != from => return Err("it does not begin when the step before it ended".to_owned()),
-            None if from > 0.0 => return Err("the first step begins after the start".to_owned()),
+            Some(end) if end != from => return Err(problem!("it does not begin when the step before it ended")),
+            None if from > 0.0 => return Err(problem!("the first step begins after the start")),
             _ => {}
         }
         let scenes = self.scenes(scenes);
@@ -202,9 +190,7 @@ impl Pair {
             }
             PairClaim::Apart(metres, at) => {
                 self.shown.continues("says how far boards are apart")?;
-                if !metres.is_finite() {
-                    return Err(format!("`apart` is {metres:?}, expected a number"));
-                }
+                ensure!(metres.is_finite(), "`apart` is {metres:?}, expected a number");
                 let steps = together.first_order(scenes, [from, to], at)?;
                 let first_order = [0, 1].map(|k| together.first_order_boards(scenes[k], k, &steps[k]));
                 let limit = Interval::new(metres);
@@ -235,32 +221,28 @@ impl Pair {
         (benches, time): ([usize; 2], f64),
         (heads, spans): ([Span; 2], [&[Span]; 2]),
         (at, most): ([&[Place]; 2], f64),
-    ) -> Result<(), String> {
-        if self.near.is_some() {
-            return Err("a second line `near_both`".to_owned());
-        }
+    ) -> Checked {
+        ensure!(self.near.is_none(), "a second line `near_both`");
         self.is_reached(time)?;
         let scenes = self.scenes(scenes);
         let together = Together::new(scenes, [time; 2], heads, spans)?;
         let steps = together.first_order(scenes, [time; 2], at)?;
         if let Some(k) = (0..2).find(|k| benches[*k] >= spans[*k].len()) {
-            return Err(format!("bench {} is not listed", benches[k]));
+            return Err(problem!("bench {} is not listed", benches[k]));
         }
         let [one, other] = [0, 1].map(|k| steps[k].board(benches[k], &scenes[k].team));
         let most = Interval::new(most);
-        if !one.at_most(&other).is_at_most(&most) {
-            return Err("the two benches may be further apart than it says (Lemma 6)".to_owned());
-        }
+        ensure!(one.at_most(&other).is_at_most(&most), "the two benches may be further apart than it says (Lemma 6)");
         self.near = Some(Witness { benches: benches.map(Some), most, at: At::Time(time) });
         Ok(())
     }
 
     /// Checks that the steps have come to a time: no link has locked until then.
-    fn is_reached(&self, time: f64) -> Result<(), String> {
+    fn is_reached(&self, time: f64) -> Checked {
         if time >= 0.0 && self.end.is_some_and(|end| time <= end) {
             Ok(())
         } else {
-            Err("the steps of the two have not come to the time".to_owned())
+            Err(problem!("the steps of the two have not come to the time"))
         }
     }
 
@@ -276,13 +258,9 @@ impl Pair {
         (benches, time): ([usize; 2], f64),
         (heads, spans): ([Span; 2], [&[Span]; 2]),
         [x, y]: [f64; 2],
-    ) -> Result<(), String> {
-        if self.meeting.is_some() {
-            return Err("a second contact of the two".to_owned());
-        }
-        if !(time.is_finite() && time >= 0.0) {
-            return Err("the time is before the start".to_owned());
-        }
+    ) -> Checked {
+        ensure!(self.meeting.is_none(), "a second contact of the two");
+        ensure!(time.is_finite() && time >= 0.0, "the time is before the start");
         if alone.is_none() {
             self.is_reached(time)?;
         }
@@ -293,15 +271,19 @@ impl Pair {
             let has_come = |Alone { end, ends_with_path, .. }: &Alone| {
                 *ends_with_path || end.is_some_and(|end| scene.path.in_order(heads[k].1, end))
             };
-            if !alone.is_none_or(|alone| has_come(&alone[self.dragons[k]])) {
-                return Err(format!("no step of dragon {} has come there", self.dragons[k]));
-            }
+            ensure!(
+                alone.is_none_or(|alone| has_come(&alone[self.dragons[k]])),
+                "no step of dragon {} has come there",
+                self.dragons[k]
+            );
             if benches[k] >= spans[k].len() {
-                return Err(format!("bench {} is not listed", benches[k]));
+                return Err(problem!("bench {} is not listed", benches[k]));
             }
-            if !covers(&together.board(scene, k, benches[k]), &point) {
-                return Err(format!("the point may be outside bench {} (Lemma 5)", benches[k]));
-            }
+            ensure!(
+                covers(&together.board(scene, k, benches[k]), &point),
+                "the point may be outside bench {} (Lemma 5)",
+                benches[k]
+            );
         }
         self.meeting = Some(Witness::of_event(benches.map(Some), At::Time(time)));
         Ok(())
@@ -328,10 +310,10 @@ impl Pair {
 }
 
 /// Checks each board of the one with each of the other, by a lemma. Returns the number of pairs.
-fn check_pairs(boards: &[Vec<Board>; 2], are_apart: impl Fn([usize; 2]) -> bool, lemma: &str) -> Result<u64, String> {
+fn check_pairs(boards: &[Vec<Board>; 2], are_apart: impl Fn([usize; 2]) -> bool, lemma: &str) -> Checked<u64> {
     for a in 0..boards[0].len() {
         if let Some(b) = (0..boards[1].len()).find(|b| !are_apart([a, *b])) {
-            return Err(format!("bench {a} of the first and bench {b} of the second may be too near (Lemma {lemma})"));
+            return Err(problem!("bench {a} of the first and bench {b} of the second may be too near (Lemma {lemma})"));
         }
     }
     Ok((boards[0].len() * boards[1].len()) as u64)

@@ -2,6 +2,7 @@
 
 use super::interval::Interval;
 use super::path::Place;
+use super::problem::{Checked, problem};
 use super::scene::Scene;
 
 /// A moment of a section.
@@ -68,8 +69,8 @@ impl Shown {
     ///
     /// # Errors
     /// The sentence about a step before that does not.
-    pub fn continues(&self, what: &str) -> Result<(), String> {
-        if self.all { Ok(()) } else { Err(format!("it {what} after a step that does not")) }
+    pub fn continues(&self, what: &str) -> Checked {
+        if self.all { Ok(()) } else { Err(problem!("it {what} after a step that does not")) }
     }
 
     /// Adds a step that makes the claim.

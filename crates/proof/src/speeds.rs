@@ -6,6 +6,7 @@ use super::first_order::FirstOrder;
 use super::handle::Handle;
 use super::interval::Interval;
 use super::path::{Place, Span};
+use super::problem::{Checked, problem};
 use super::scene::Scene;
 
 /// The number of times that the bounds of a link's ratio are narrowed by the bounds of its rate.
@@ -25,7 +26,7 @@ impl Speeds {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn new(scene: &Scene, head: Span, spans: &[Span], at: &[Place]) -> Result<(Self, u64), String> {
+    pub fn new(scene: &Scene, head: Span, spans: &[Span], at: &[Place]) -> Checked<(Self, u64)> {
         let chain = Chain::check(scene, head, spans)?;
         check_tail(scene, &chain)?;
         let FirstOrder { handles, half_step } = FirstOrder::new(scene, &chain, at)?;
@@ -54,7 +55,7 @@ impl Speeds {
 }
 
 /// Checks that no handle behind the last listed one can be faster (Lemma 7, *Tail*).
-fn check_tail(scene: &Scene, chain: &Chain) -> Result<(), String> {
+fn check_tail(scene: &Scene, chain: &Chain) -> Checked {
     let team = &scene.team;
     if chain.last() == team.benches || chain.ends_on_line(scene) {
         return Ok(());
@@ -68,7 +69,7 @@ fn check_tail(scene: &Scene, chain: &Chain) -> Result<(), String> {
             let turned = longest * (square + Interval::new(2.0));
             turned.is_at_most(&(Interval::new(2.0) * radius * (square + Interval::new(1.0))))
         });
-    if is_slower { Ok(()) } else { Err("a handle behind the last one listed may be faster (Lemma 7)".to_owned()) }
+    if is_slower { Ok(()) } else { Err(problem!("a handle behind the last one listed may be faster (Lemma 7)")) }
 }
 
 /// Returns true if both handles are on one line or one circle throughout (Lemma 7, *Rigid*).

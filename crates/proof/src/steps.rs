@@ -8,6 +8,7 @@ use super::first_order::FirstOrder;
 use super::interval::Interval;
 use super::lines::Links;
 use super::path::{Place, Span};
+use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
 use super::shown::{At, Shown};
 use super::team::Size;
@@ -84,20 +85,20 @@ impl Steps {
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add(&mut self, scene: &Scene, step: Step) -> Result<(), String> {
+    pub fn add(&mut self, scene: &Scene, step: Step) -> Checked {
         let Step { links, head, moving, clear, spans, free, apart, beside, at } = step;
         let Span(from, to) = head;
-        span_is_one(scene, head).map_err(|problem| format!("the head: {problem}"))?;
+        span_is_one(scene, head).map_err(|problem| problem!("the head: {problem}"))?;
         match self.end {
-            Some(end) if end != from => return Err("it does not begin where the step before it ended".to_owned()),
-            Some(_) if from == to => return Err("it is empty".to_owned()),
+            Some(end) if end != from => return Err(problem!("it does not begin where the step before it ended")),
+            Some(_) if from == to => return Err(problem!("it is empty")),
             None if !scene.path.travelled(from).is_at_most(&Interval::new(0.0)) => {
-                return Err("the first step begins beyond the start".to_owned());
+                return Err(problem!("the first step begins beyond the start"));
             }
             _ => {}
         }
         let chain = Chain::check(scene, head, &spans)?;
-        let Some(first) = spans.first() else { return Err("no span is listed".to_owned()) };
+        let Some(first) = spans.first() else { return Err(problem!("no span is listed")) };
         let start_of_second = *self.start_of_second.get_or_insert(first.1);
         match links {
             Links::All => self.check_all(scene, &chain, start_of_second)?,
@@ -118,9 +119,9 @@ impl Steps {
     }
 
     /// Checks that the step shows all links, and prepares Lemma 4.
-    fn check_all(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Result<(), String> {
+    fn check_all(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Checked {
         if chain.last() < scene.team.benches && !chain.ends_on_line(scene) {
-            return Err("not all links are listed, and the last handle listed is not on a line without end".to_owned());
+            return Err(problem!("not all links are listed, and the last handle listed is not on a line without end"));
         }
         self.bodies_moving &= chain.products[1..].iter().all(Interval::is_positive);
         let handle_2 = chain.capsules.get(2).map(|capsule| capsule.span.0);
@@ -130,14 +131,14 @@ impl Steps {
     }
 
     /// Checks Lemma 4 for the links that are not listed.
-    fn check_front(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Result<(), String> {
+    fn check_front(&mut self, scene: &Scene, chain: &Chain, start_of_second: Place) -> Checked {
         if scene.team.benches == 1 {
             return Ok(());
         }
-        let Some(body) = chain.products.get(1) else { return Err("links 0 and 1 are not both listed".to_owned()) };
+        let Some(body) = chain.products.get(1) else { return Err(problem!("links 0 and 1 are not both listed")) };
         let lists_tail = chain.last() == scene.team.benches || chain.ends_on_line(scene);
         if scene.team.own_tail().is_some() && !lists_tail {
-            return Err("the tail has a size of its own, but not all links are listed (Lemma 4)".to_owned());
+            return Err(problem!("the tail has a size of its own, but not all links are listed (Lemma 4)"));
         }
         self.bodies_moving &= body.is_positive();
         let is_ahead = scene.path.in_order(start_of_second, chain.capsules[1].span.0);
@@ -150,23 +151,23 @@ impl Steps {
         } else {
             return Ok(());
         };
-        Err(format!("{problem} (Lemma 4)"))
+        Err(problem!("{problem} (Lemma 4)"))
     }
 
-    fn add_moving(&mut self, moving: bool, to: Place, chain: &Chain) -> Result<(), String> {
+    fn add_moving(&mut self, moving: bool, to: Place, chain: &Chain) -> Checked {
         if !moving {
             self.moving.all = false;
             return Ok(());
         }
         self.moving.continues("claims to be moving")?;
         if let Some(link) = chain.products.iter().position(|product| !product.is_positive()) {
-            return Err(format!("it claims to be moving, but link {link} may stall"));
+            return Err(problem!("it claims to be moving, but link {link} may stall"));
         }
         self.moving.extend(At::Head(to), 0.0);
         Ok(())
     }
 
-    fn add_clear(&mut self, scene: &Scene, links: Links, clear: bool, to: Place, chain: &Chain) -> Result<(), String> {
+    fn add_clear(&mut self, scene: &Scene, links: Links, clear: bool, to: Place, chain: &Chain) -> Checked {
         if !clear {
             self.clear.all = false;
             return Ok(());
@@ -178,19 +179,12 @@ impl Steps {
     }
 
     /// Checks that all boards stay clear of some obstacles (Lemma 9).
-    fn add_free(
-        &mut self,
-        scene: &Scene,
-        links: Links,
-        free: &[usize],
-        to: Place,
-        chain: &Chain,
-    ) -> Result<(), String> {
+    fn add_free(&mut self, scene: &Scene, links: Links, free: &[usize], to: Place, chain: &Chain) -> Checked {
         if scene.obstacles.is_empty() && free.is_empty() {
             return Ok(());
         }
         if let Some(obstacle) = free.iter().find(|obstacle| **obstacle >= scene.obstacles.len()) {
-            return Err(format!("it names the obstacle {obstacle}, which the scene has not"));
+            return Err(problem!("it names the obstacle {obstacle}, which the scene has not"));
         }
         let runs = runs_on_ground(scene, links, chain);
         let boards = boards_on_ground(scene, links, chain, &runs);
@@ -201,7 +195,7 @@ impl Steps {
             }
             shown.continues(&format!("claims to be clear of obstacle {number}"))?;
             if let Some((bench, _)) = boards.iter().find(|(_, board)| !obstacle.is_avoided_by(board)) {
-                return Err(format!("bench {bench}, or one behind it, may be at obstacle {number} (Lemma 9)"));
+                return Err(problem!("bench {bench}, or one behind it, may be at obstacle {number} (Lemma 9)"));
             }
             shown.extend(At::Head(to), 0.0);
         }
@@ -215,15 +209,13 @@ impl Steps {
         apart: Option<(f64, &FirstOrder)>,
         to: Place,
         chain: &Chain,
-    ) -> Result<(), String> {
+    ) -> Checked {
         let Some((metres, step)) = apart else {
             self.apart.all = false;
             return Ok(());
         };
         self.apart.continues("says how far boards are apart")?;
-        if !metres.is_finite() {
-            return Err(format!("`apart` is {metres:?}, expected a number"));
-        }
+        ensure!(metres.is_finite(), "`apart` is {metres:?}, expected a number");
         self.pairs += apart::check(scene, links, chain, step, metres)?;
         self.apart.extend(At::Head(to), metres);
         Ok(())
@@ -237,9 +229,9 @@ impl Steps {
         (claims, step): (&[Option<f64>], Option<&FirstOrder>),
         to: Place,
         chain: &Chain,
-    ) -> Result<(), String> {
+    ) -> Checked {
         if claims.len() > scene.obstacles.len() {
-            return Err(format!("it names {} obstacles, expected at most {}", claims.len(), scene.obstacles.len()));
+            return Err(problem!("it names {} obstacles, expected at most {}", claims.len(), scene.obstacles.len()));
         }
         let runs = runs_on_ground(scene, links, chain);
         let boards = step.map_or_else(Vec::new, |_| boards_on_ground(scene, links, chain, &runs));
@@ -254,15 +246,13 @@ impl Steps {
                 continue;
             };
             shown.continues(&format!("states a clearance of obstacle {number}"))?;
-            if !metres.is_finite() {
-                return Err(format!("`beside` of obstacle {number} is {metres:?}, expected a number"));
-            }
+            ensure!(metres.is_finite(), "`beside` of obstacle {number} is {metres:?}, expected a number");
             let far = Interval::new(metres);
             let mut pairs = boards.iter().zip(&first_order);
             if let Some(((bench, _), _)) =
                 pairs.find(|((_, board), first)| !obstacle.is_further_than(&far, board, first))
             {
-                return Err(format!("bench {bench}, or one behind it, may be nearer to obstacle {number} (Lemma 11)"));
+                return Err(problem!("bench {bench}, or one behind it, may be nearer to obstacle {number} (Lemma 11)"));
             }
             shown.extend(At::Head(to), metres);
         }
@@ -300,7 +290,7 @@ fn boards_on_ground<'c>(scene: &Scene, links: Links, chain: &'c Chain, runs: &'c
 }
 
 /// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs of Lemma 4. Returns the number of pairs.
-fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String> {
+fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Checked<u64> {
     let team = &scene.team;
     let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
         .map(|(index, pair)| Board::new(&pair[0], &pair[1], team.size(index)))
@@ -310,7 +300,7 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
         let Some(first) = first_partner(scene, links, a) else { break };
         for b in first..boards.len() {
             if !boards[a].is_apart_from(&boards[b]) && check_ring(scene, chain, a..a + 1, b, &zero).is_err() {
-                return Err(format!("it claims to be clear, but benches {a} and {b} may touch (Lemma 2)"));
+                return Err(problem!("it claims to be clear, but benches {a} and {b} may touch (Lemma 2)"));
             }
             pairs += 1;
         }
@@ -330,21 +320,23 @@ fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Result<u64, String
 
 /// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The listed boards that the step
 /// concerns are apart from them, and they are apart from each other.
-fn check_line(scene: &Scene, links: Links, chain: &Chain, boards: &[Board]) -> Result<(), String> {
+fn check_line(scene: &Scene, links: Links, chain: &Chain, boards: &[Board]) -> Checked {
     let team = &scene.team;
     let last = chain.last();
-    if !(team.hole_inset + team.hole_inset).is_below(team.link(1)) {
-        return Err("it claims to be clear, but benches on a line touch (Lemma 3)".to_owned());
-    }
+    ensure!(
+        (team.hole_inset + team.hole_inset).is_below(team.link(1)),
+        "it claims to be clear, but benches on a line touch (Lemma 3)"
+    );
     for (a, board) in boards.iter().enumerate() {
         let Some(first) = first_partner(scene, links, a) else { break };
         let is_apart = |first: usize| {
             let (front, rear, size) = straight_run(scene, chain, first);
             board.is_apart_from(&Board::new(&front, &rear, size))
         };
-        if !team.runs(last.max(first)).all(is_apart) {
-            return Err(format!("it claims to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"));
-        }
+        ensure!(
+            team.runs(last.max(first)).all(is_apart),
+            "it claims to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"
+        );
     }
     Ok(())
 }

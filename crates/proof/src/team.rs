@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use super::interval::Interval;
+use super::problem::{Checked, problem};
 
 /// The sizes that a scene may leave out, metres: those of the paper.
 const HEAD_LENGTH: f64 = 3.41;
@@ -138,18 +139,18 @@ pub(super) struct TeamText {
 }
 
 impl TeamText {
-    pub fn read(&self) -> Result<Team, String> {
+    pub fn read(&self) -> Checked<Team> {
         if self.benches == 0 || self.benches > MOST {
-            return Err(format!("team.benches is {}, expected from 1 to {MOST}", self.benches));
+            return Err(problem!("team.benches is {}, expected from 1 to {MOST}", self.benches));
         }
         let hole_inset = Interval::positive("team.hole_inset", self.hole_inset.unwrap_or(HOLE_INSET))?;
         let link = |field: &str, length: f64| {
             let link = Interval::positive(field, length)? - Interval::new(2.0) * hole_inset;
-            if link.is_positive() { Ok(link) } else { Err(format!("{field} leaves no bench between its holes")) }
+            if link.is_positive() { Ok(link) } else { Err(problem!("{field} leaves no bench between its holes")) }
         };
         let (body_length, width) = (self.body_length.unwrap_or(BODY_LENGTH), self.width.unwrap_or(WIDTH));
         let of_end = |field: &str, given: Option<f64>| match given {
-            Some(own) if own > MOST_WIDTHS * width => Err(format!("{field} is more than 10 times team.width")),
+            Some(own) if own > MOST_WIDTHS * width => Err(problem!("{field} is more than 10 times team.width")),
             given => Interval::positive(field, given.unwrap_or(width)),
         };
         let tail_length = self.tail_length.unwrap_or(body_length);

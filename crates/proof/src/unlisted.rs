@@ -8,6 +8,7 @@ use super::chain::Chain;
 use super::interval::Interval;
 use super::lines::Links;
 use super::path::Span;
+use super::problem::{Checked, problem};
 use super::scene::Scene;
 use super::team::Size;
 
@@ -41,10 +42,12 @@ pub(super) fn check_ring(
     boards: Range<usize>,
     from_handle: usize,
     metres: &Interval,
-) -> Result<(), String> {
+) -> Checked {
     let Span(_, latest) = chain.capsules[from_handle].span;
     let ring = scene.path.spiral_radius(latest).filter(|_| latest.0 == 0);
-    let ring = ring.ok_or("it claims to be clear, but the last handle listed is not on segment 0, an inward spiral")?;
+    let ring = ring.ok_or_else(|| {
+        problem!("it claims to be clear, but the last handle listed is not on segment 0, an inward spiral")
+    })?;
     let of_boards = |bench| scene.team.size(bench).width;
     let width = boards.clone().map(of_boards).fold(Interval::new(0.0), |most, width| most.max(&width));
     let reach = (chain.capsules[boards.start..=boards.end].iter())
@@ -53,6 +56,6 @@ pub(super) fn check_ring(
     if is_inside_ring(&scene.team, (&reach, &width), &ring, metres) {
         Ok(())
     } else {
-        Err("it claims to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)".to_owned())
+        Err(problem!("it claims to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)"))
     }
 }
