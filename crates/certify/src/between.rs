@@ -6,13 +6,14 @@ mod side;
 
 use std::io;
 
+use super::bracket::nearest_shown;
 use super::first_order::When;
 use super::interval::Interval;
 use super::lines::{CertificateLine, CertifiedEvent, Status, WIDE};
 use super::search::{
-    AROUND, BESIDE, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, STOPPED, Section,
-    first_line,
+    AROUND, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, STOPPED, Section, first_line,
 };
+use super::walk::Stride;
 use super::{CertifyError, Given, certify_alone, ground};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
@@ -121,8 +122,8 @@ struct PairSearch<'a, 'w> {
     shown: Option<f64>,
     /// The time up to which stretches have come, in seconds.
     time: f64,
-    /// The length of the next step to try, in seconds.
-    step: f64,
+    /// The next step to try, in seconds; any step at first.
+    stride: Option<Stride>,
     steps: u64,
     most_steps: u64,
     write: Write<'w>,
@@ -130,7 +131,7 @@ struct PairSearch<'a, 'w> {
 
 impl<'a, 'w> PairSearch<'a, 'w> {
     fn new(sides: [Side<'a>; 2], aim: Aim, most_steps: u64, write: Write<'w>) -> Self {
-        Self { sides, aim, upper: None, shown: None, time: 0.0, step: 0.0, steps: 0, most_steps, write }
+        Self { sides, aim, upper: None, shown: None, time: 0.0, stride: None, steps: 0, most_steps, write }
     }
 }
 
@@ -198,9 +199,7 @@ impl PairSearch<'_, '_> {
             let longest = moving().map(of_link).fold(f64::INFINITY, f64::min);
             let least = moving().map(|side| side.seconds(LEAST_STEP * (1.0 + side.chain.path.length())));
             let least = least.fold(4.0 * f64::EPSILON * self.time, f64::max);
-            if self.step == 0.0 {
-                self.step = 0.25 * longest;
-            }
+            let mut stride = self.stride.unwrap_or(Stride::new(0.25 * longest, GROWTH));
             // While no dragon moves, a step must not cross the next start, but any length up to there is valid.
             let starts = self.sides.iter().map(|side| side.delay).filter(|start| *start > self.time);
             let until = if longest.is_finite() { to } else { starts.fold(to, f64::min) };
@@ -208,20 +207,24 @@ impl PairSearch<'_, '_> {
             let is_close = matches!(self.aim, Aim::Apart(_));
             let breaks = self.sides.iter().flat_map(Side::breaks).filter(|time| is_close && *time > self.time);
             let until = breaks.fold(until, f64::min);
-            let length = self.step.min(longest).min(until - self.time);
-            let next = if length >= 0.9 * (until - self.time) { until } else { self.time + length };
+            let remaining = until - self.time;
+            stride.limit(longest.min(remaining));
+            let length = stride.within(remaining);
+            let next = if stride.is_to_target(remaining) { until } else { self.time + length };
             match self.show_until(next) {
                 Ok(line) => {
                     (self.write)(&line)?;
                     if let Aim::Apart(metres) = self.aim {
                         self.shown = Some(self.shown.map_or(metres, |least| least.min(metres)));
                     }
-                    (self.time, self.step) = (next, GROWTH * length);
+                    self.time = next;
+                    stride.grow(f64::INFINITY);
                 }
                 Err(Refused::Pair(benches)) if self.lower(0.5 * (self.time + next), benches) => {}
                 Err(refused) if length <= least => return Ok(Some(sentence(&refused))),
-                Err(_) => self.step = SHRINK * length,
+                Err(_) => stride.shrink(SHRINK, remaining),
             }
+            self.stride = Some(stride);
             self.steps += 1;
             if self.steps > self.most_steps {
                 return Ok(Some(format!("the search was given up after {} steps", self.steps)));
@@ -273,21 +276,7 @@ impl PairSearch<'_, '_> {
     fn found_meeting(&self, contact: f64, benches: [usize; 2]) -> Option<(f64, CertificateLine<'static>)> {
         let (around, most) = (self.around(), self.near().max(self.around()));
         let at_start = (contact == 0.0).then(|| self.touch(0.0, benches)).flatten().map(|line| (0.0, line));
-        let mut found = at_start.or_else(|| {
-            let mut far = (0..).map(|power| around * 2f64.powi(power)).take_while(|far| *far <= most);
-            far.find_map(|far| self.touch(contact + far, benches).map(|line| (far, line)))
-        });
-        if let Some((far, _)) = &found {
-            let (mut not_shown, mut far) = (if *far > around { 0.5 * far } else { *far }, *far);
-            while far - not_shown > BESIDE * far {
-                let middle = 0.5 * (not_shown + far);
-                match self.touch(contact + middle, benches) {
-                    Some(line) => (found, far) = (Some((middle, line)), middle),
-                    None => not_shown = middle,
-                }
-            }
-        }
-        found
+        at_start.or_else(|| nearest_shown(around, most, |far| self.touch(contact + far, benches)))
     }
 
     /// Writes the line of a contact at the nearest time after `contact` at which it is found, and returns the status.

@@ -22,6 +22,7 @@ use super::path::ExactPath;
 use super::place::Place;
 use super::search::{LEAST, path_end};
 use super::step::{Chain, Obstacle};
+use super::walk::{Covered, Stride};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::contact::LeastClearance;
@@ -140,9 +141,8 @@ pub(super) struct Descent<'a, 'w> {
     /// The end of the certified stretch.
     finish: Option<Finish>,
     at: GridPoint,
-    links: Links,
-    covered: bool,
-    step: f64,
+    covered: Covered,
+    stride: Stride,
     steps: u64,
     most_steps: u64,
     /// The travel at the end of the show, in metres.
@@ -183,7 +183,7 @@ enum Finish {
 impl<'a, 'w> Descent<'a, 'w> {
     /// Creates a search from the start to `end`, metres of travel. `write` receives each step that is shown.
     pub fn new(chain: Chain<'a>, end: f64, most_steps: u64, write: Option<Write<'w>>) -> Self {
-        let step = 0.25 * chain.team.shortest_link();
+        let stride = Stride::new(0.25 * chain.team.shortest_link(), steps::GROWTH);
         let at = GridPoint::at(Place(0, 0.0, 0.0), 0.0);
         let beside = vec![Beside::default(); chain.barriers.len()];
         let mut descent = Self {
@@ -193,9 +193,8 @@ impl<'a, 'w> Descent<'a, 'w> {
             shown: None,
             finish: None,
             at,
-            links: Links::All,
-            covered: true,
-            step,
+            covered: Covered::new(),
+            stride,
             steps: 0,
             most_steps,
             end,
@@ -265,10 +264,7 @@ impl<'a, 'w> Descent<'a, 'w> {
 
     /// Returns the nearest grid point on one side of a place for which `holds` is proved.
     fn beside(&self, travelled: f64, side: f64, holds: impl Fn(Interval) -> bool) -> Option<GridPoint> {
-        let Chain { path, exact, .. } = &self.chain;
-        let least = f64::EPSILON * (1.0 + path.length());
-        let mut points = (0..40).map(|power| GridPoint::new(path, exact, travelled + side * least * 2f64.powi(power)));
-        points.find(|point| holds(exact.travelled(point.head)))
+        GridPoint::beside(self.chain.path, &self.chain.exact, travelled, side, holds)
     }
 
     /// Encloses the least clearance from the start to `target`.
@@ -336,7 +332,7 @@ impl<'a, 'w> Descent<'a, 'w> {
     /// front handle is at the first place or further out, no two boards touch and no link locks. See "The least pitch"
     /// in `docs/proofs.md`.
     pub fn after_all_further_out(mut self) -> Self {
-        self.links = Links::Front;
+        self.covered.links = Links::Front;
         self.chain.start = Some(Place(0, f64::INFINITY, 0.0));
         self
     }

@@ -1,6 +1,7 @@
 //! Grid points of the search: the handles for one place of the head, in doubles. They are the starting guess of the
 //! spans, so correctness does not depend on them.
 
+use super::interval::Interval;
 use super::path::ExactPath;
 use super::place::{Place, Span};
 use bench_dragon_motion::linkage::{NoFollower, follower, link_pose};
@@ -38,6 +39,19 @@ impl GridPoint {
     pub fn at(head: Place, travelled: f64) -> Self {
         let handle = Handle { param: param(head), front_cosine: 1.0, rear_cosine: 1.0 };
         Self { travelled, head, handles: vec![handle] }
+    }
+
+    /// Returns the nearest grid point on one side of a travel for the travel of which `holds` is proved.
+    pub fn beside(
+        path: &Path,
+        exact: &ExactPath,
+        travelled: f64,
+        side: f64,
+        holds: impl Fn(Interval) -> bool,
+    ) -> Option<Self> {
+        let least = f64::EPSILON * (1.0 + path.length());
+        let mut points = (0..40).map(|power| Self::new(path, exact, travelled + side * least * 2f64.powi(power)));
+        points.find(|point| holds(exact.travelled(point.head)))
     }
 
     /// Returns the grid point some metres further on. If they are less than the distance of two doubles, it is at the

@@ -7,6 +7,7 @@
 
 mod between;
 mod boards;
+mod bracket;
 mod branch;
 mod capsule;
 mod clearance;
@@ -28,6 +29,7 @@ mod spaced;
 pub mod speed;
 mod step;
 mod turn;
+mod walk;
 
 use std::io;
 

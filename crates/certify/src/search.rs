@@ -14,6 +14,7 @@ use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
 use super::path::ExactPath;
 use super::place::{Place, Span};
 use super::step::{Chain, Claim, Obstacle, Shown};
+use super::walk::{Covered, Stride};
 use super::{CertifyError, Given};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::{Event, Progress};
@@ -31,10 +32,7 @@ const OF_TIMES: f64 = 1e-14;
 /// The shortest step, as a share of the path length in metres.
 pub(super) const LEAST_STEP: f64 = 2e-15;
 
-/// The share of the distance from an event to which the nearest place beyond it is found at which the event is shown.
-pub(super) const BESIDE: f64 = 0.1;
-
-/// The factors of the step length after a step that is shown, and after a step that is not.
+/// The factors of the length of a step after one that is shown, and after one that is not.
 pub(super) const GROWTH: f64 = 1.3;
 pub(super) const SHRINK: f64 = 0.5;
 
@@ -52,20 +50,17 @@ pub(super) struct CertificateSearch<'a, 'w> {
     at: GridPoint,
     /// The spans of the last step, from handle 1 on.
     spans: Vec<Span>,
-    links: Links,
+    covered: Covered,
     /// The claims that steps still make.
     moving: bool,
     clear: bool,
-    /// True if Lemma 4 may still be used.
-    covered: bool,
     proofs: [Option<Status>; 4],
     /// True if the path's end is shown.
     ends_with_path: bool,
     /// The obstacles that steps still claim to avoid, and the result of each obstacle.
     free: Vec<usize>,
     of_obstacles: Vec<Option<Status>>,
-    /// The length of the next step to try, in metres.
-    step: f64,
+    stride: Stride,
     steps: u64,
     /// Spans that were written.
     written: usize,
@@ -119,8 +114,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         // The steps begin a little before the start: a motion that begins earlier includes this one.
         let before = -LEAST * (1.0 + given.path.length());
         let at = GridPoint::new(given.path, &chain.exact, before);
-        let step = 0.25 * given.team.shortest_link();
-        let (links, proofs) = (Links::All, [const { None }; 4]);
+        let stride = Stride::new(0.25 * given.team.shortest_link(), GROWTH);
+        let proofs = [const { None }; 4];
         let (free, of_obstacles) = ((0..chain.barriers.len()).collect(), chain.barriers.iter().map(|_| None).collect());
         Self {
             given,
@@ -128,15 +123,14 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             write,
             at,
             spans: Vec::new(),
-            links,
+            covered: Covered::new(),
             moving: true,
             clear: true,
-            covered: true,
             proofs,
             ends_with_path: false,
             free,
             of_obstacles,
-            step,
+            stride,
             steps: 0,
             written: 0,
         }
@@ -300,24 +294,24 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             let remaining = target.travelled - self.at.travelled;
             if let Some(lock) = event.filter(|event| event.kind == EventKind::Lock) {
                 // The window of the lock must be around the spans of the last step.
-                self.step = self.step.min((0.5 * (lock.travelled - self.at.travelled)).max(least));
+                self.stride.limit((0.5 * (lock.travelled - self.at.travelled)).max(least));
             }
-            let mut to = if self.step >= 0.9 * remaining {
+            let mut to = if self.stride.is_to_target(remaining) {
                 target.clone()
             } else {
-                self.at.further(self.chain.path, &self.chain.exact, self.step)
+                self.at.further(self.chain.path, &self.chain.exact, self.stride.within(remaining))
             };
-            let claim = Claim { links: self.links, moving: self.moving, clear: self.clear };
+            let claim = Claim { links: self.covered.links, moving: self.moving, clear: self.clear };
             match self.chain.show(&mut self.at, &mut to, claim, &self.free) {
                 Ok(shown) => {
                     self.accept(to, shown)?;
-                    self.step = (self.step * GROWTH).min(longest);
+                    self.stride.grow(longest);
                 }
-                Err(obstacle) if self.step.min(remaining) > least => {
-                    self.step = SHRINK * self.step.min(remaining);
+                Err(obstacle) if self.stride.within(remaining) > least => {
+                    self.stride.shrink(SHRINK, remaining);
                     // The links of boards 0 and 1 do not show turns of the handles behind.
-                    if self.links == Links::Front && obstacle == Obstacle::Stall(1) && !self.moving {
-                        self.links = Links::All;
+                    if obstacle == Obstacle::Stall(1) && !self.moving {
+                        self.covered.links = Links::All;
                     }
                 }
                 Err(obstacle) => {
@@ -340,18 +334,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
 
     fn accept(&mut self, to: GridPoint, shown: Shown) -> Result<(), Halt> {
         let Shown { step, body_forward } = shown;
-        let exact = &self.chain.exact;
-        if self.chain.start.is_none() {
-            self.chain.start = step.spans.first().map(|span| span.1);
-        }
-        self.covered &= body_forward;
-        if !self.covered {
-            self.links = Links::All;
-        } else if let (Links::All, Some(start), Some(second)) = (step.links, self.chain.start, step.spans.get(1))
-            && exact.in_order(start, second.0)
-        {
-            self.links = Links::Front;
-        }
+        self.covered.add(&mut self.chain, &step.spans, body_forward);
         let line = CertificateLine::Step(step);
         (self.write)(&line)?;
         if let CertificateLine::Step(step) = line {
@@ -404,11 +387,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 self.free.retain(|other| *other != number);
                 Ok(())
             }
-            Obstacle::Stall(_) | Obstacle::Behind if self.links == Links::Front => {
-                self.links = Links::All;
-                self.covered = false;
-                Ok(())
-            }
+            Obstacle::Stall(_) | Obstacle::Behind if self.covered.give_up() => Ok(()),
             Obstacle::Link(link) => Err(Halt::Stuck(format!(
                 "the rear handle of bench {} (counting from 1) cannot be enclosed there",
                 link + 1

@@ -80,16 +80,14 @@ impl<'a> Side<'a> {
     /// Returns grid points that the head is surely between from one time to another.
     fn ends(&self, from: f64, to: f64) -> Option<[GridPoint; 2]> {
         let Chain { path, exact, .. } = &self.chain;
-        let least = f64::EPSILON * (1.0 + path.length());
-        let beside = |travelled: f64, side: f64, holds: &dyn Fn(Interval) -> bool| {
-            let mut points =
-                (0..40).map(|power| GridPoint::new(path, exact, travelled + side * least * 2f64.powi(power)));
-            points.find(|point| holds(exact.travelled(point.head)))
-        };
         let [first, last] = [from, to].map(|time| self.travelled(Interval::point(time)));
-        let before = beside(first.lo, -1.0, &|at| at.hi <= first.lo)?;
+        let before = GridPoint::beside(path, exact, first.lo, -1.0, |at| at.hi <= first.lo)?;
         let is_at_end = last.hi >= path.length() * (1.0 - LEAST) - LEAST;
-        let after = if is_at_end { Some(path_end(exact, path)) } else { beside(last.hi, 1.0, &|at| at.lo >= last.hi) };
+        let after = if is_at_end {
+            Some(path_end(exact, path))
+        } else {
+            GridPoint::beside(path, exact, last.hi, 1.0, |at| at.lo >= last.hi)
+        };
         Some([before, after?])
     }
 

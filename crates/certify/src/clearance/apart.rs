@@ -40,7 +40,7 @@ impl Descent<'_, '_> {
         });
         // Lemma 4 applies if handle 1 is lost.
         let is_covered = handles.len() == 2 && chain.start.is_some_and(|start| chain.exact.in_order(start, window.0));
-        let links = if is_covered { self.links } else { Links::All };
+        let links = if is_covered { self.covered.links } else { Links::All };
         let mut listed = Listed::behind(chain, handles, f64::INFINITY);
         while listed.handles.len() <= chain.team.benches && !self.is_enough(&listed, links) {
             if listed.extend(&mut from, &mut to, Claim { links, moving: false, clear: false }).is_err() {

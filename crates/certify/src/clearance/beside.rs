@@ -85,7 +85,7 @@ impl Descent<'_, '_> {
             return Ok(Vec::new());
         }
         let listed = first_order.listed.handles.len() - 1;
-        for (bench, moving) in first_order.listed.boards_on_ground(self.links) {
+        for (bench, moving) in first_order.listed.boards_on_ground(self.covered.links) {
             let first = if bench < listed { first_order.board(bench) } else { first_order.straight_run(bench) };
             let board = BoardOverStep { moving, first_order: Some((&first, When::Always)) };
             for (number, (barrier, threshold)) in self.chain.barriers.iter().zip(&thresholds).enumerate() {

@@ -11,7 +11,7 @@ use bench_dragon_motion::event::Progress;
 
 /// The factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and
 /// later shrinks. Steps close to the longest need more attempts, but make the certificate shorter.
-const GROWTH: f64 = 1.1;
+pub(super) const GROWTH: f64 = 1.1;
 const SHRINK: f64 = 0.8;
 const SHRINK_FURTHER: f64 = 0.5;
 
@@ -30,8 +30,8 @@ impl Descent<'_, '_> {
                 return Some(self.travelled());
             }
             let remaining = target.travelled - self.at.travelled;
-            let length = self.step.min(remaining);
-            let mut to = if self.step >= 0.9 * remaining {
+            let length = self.stride.within(remaining);
+            let mut to = if self.stride.is_to_target(remaining) {
                 target.clone()
             } else {
                 self.at.further(self.chain.path, &self.chain.exact, length)
@@ -40,7 +40,7 @@ impl Descent<'_, '_> {
             let given_up = match self.show(&mut to) {
                 Ok(()) => {
                     self.at = to;
-                    self.step = (self.step * GROWTH).min(longest);
+                    self.stride.grow(longest);
                     shrink = SHRINK;
                     false
                 }
@@ -53,17 +53,13 @@ impl Descent<'_, '_> {
                     false
                 }
                 Err(Refused { obstacle, .. }) if length > least => {
-                    self.step = std::mem::replace(&mut shrink, SHRINK_FURTHER) * length;
-                    if self.links == Links::Front && obstacle == Obstacle::Stall(1) {
-                        self.links = Links::All;
+                    self.stride.shrink(std::mem::replace(&mut shrink, SHRINK_FURTHER), remaining);
+                    if obstacle == Obstacle::Stall(1) {
+                        self.covered.links = Links::All;
                     }
                     false
                 }
-                Err(Refused { obstacle: Obstacle::Stall(_) | Obstacle::Behind, .. }) if self.links == Links::Front => {
-                    self.links = Links::All;
-                    self.covered = false;
-                    false
-                }
+                Err(Refused { obstacle: Obstacle::Stall(_) | Obstacle::Behind, .. }) if self.covered.give_up() => false,
                 Err(Refused { obstacle: Obstacle::Stage(number), .. }) => {
                     self.beside[number].is_lost = true;
                     false
@@ -84,22 +80,13 @@ impl Descent<'_, '_> {
         let shown = self.show_between(&mut StepPoints { from: &mut from, middle: &mut middle, to });
         self.at = from;
         let ShownStep { step, body_forward } = shown?;
-        self.chain.start = self.chain.start.or(step.spans.first().map(|span| span.1));
+        self.covered.add(&mut self.chain, &step.spans, body_forward);
         self.add_beside(&step);
         if let Some(metres) = step.apart {
             let least = self.shown.map_or(metres, |(least, _)| least.min(metres));
             self.shown = Some((least, step.to));
         }
-        let second = step.spans.get(1).copied();
         self.write(&CertificateLine::Step(step));
-        self.covered &= body_forward;
-        if !self.covered {
-            self.links = Links::All;
-        } else if let (Links::All, Some(start), Some(second)) = (self.links, self.chain.start, second)
-            && self.chain.exact.in_order(start, second.0)
-        {
-            self.links = Links::Front;
-        }
         Ok(())
     }
 
@@ -107,13 +94,13 @@ impl Descent<'_, '_> {
     fn show_between(&self, points: &mut StepPoints) -> Result<ShownStep, Refused> {
         let mut first_order = FirstOrderStep::new(&self.chain, points);
         while first_order.listed.handles.len() <= self.chain.team.benches
-            && !self.is_enough(&first_order.listed, self.links)
+            && !self.is_enough(&first_order.listed, self.covered.links)
         {
             let points = step_points(points.from, points.middle, points.to);
-            first_order.extend(points, self.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
+            first_order.extend(points, self.covered.links).map_err(|obstacle| Refused { obstacle, nearer: None })?;
         }
         if self.looks_at_boards() {
-            self.boards_are_apart(&first_order.listed, Some(&first_order), self.links).map_err(|benches| {
+            self.boards_are_apart(&first_order.listed, Some(&first_order), self.covered.links).map_err(|benches| {
                 let [one, other] =
                     benches.map(|bench| first_order.board(bench.min(first_order.listed.handles.len() - 2)));
                 let travelled = self.chain.exact.travelled(first_order.at);
@@ -138,7 +125,7 @@ impl Descent<'_, '_> {
         let Span(from, to) = listed.handles[0].span;
         let apart = looks.then(|| self.threshold());
         let at = if looks || !beside.is_empty() { places } else { Vec::new() };
-        let (links, free) = (self.links, Vec::new());
+        let (links, free) = (self.covered.links, Vec::new());
         let step = Step { links, from, to, moving: false, clear: false, spans, free, apart, beside, at };
         Ok(ShownStep { step, body_forward: listed.body_forward })
     }

@@ -2,12 +2,13 @@
 
 use std::ops::ControlFlow;
 
+use super::super::bracket::nearest_shown;
 use super::super::capsule::Spanned;
 use super::super::grid::GridPoint;
 use super::super::lines::{CertificateLine, Links, Status};
 use super::super::lock::LockWindow;
 use super::super::place::{Place, Span};
-use super::{BESIDE, CertificateSearch, Halt, LEAST, NEAR};
+use super::{CertificateSearch, Halt, LEAST, NEAR};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Event;
 
@@ -142,7 +143,7 @@ impl CertificateSearch<'_, '_> {
         let link = event.bench_a.unwrap_or(0) as usize;
         self.moving = false;
         if link > 0 {
-            self.links = Links::All;
+            self.covered.links = Links::All;
         }
         let found = self.beyond(event, |search, point| {
             let handles = search.chain.spans(&mut point.clone(), point, link + 1)?;
@@ -201,35 +202,17 @@ impl CertificateSearch<'_, '_> {
     ) -> Option<(GridPoint, T)> {
         let around = self.around();
         let most = around.max(NEAR * self.given.team.shortest_link());
-        let try_at = |search: &mut Self, far: f64| {
-            let mut point = search.grid_point(event.travelled + far);
+        let found = nearest_shown(around, most, |far| {
+            let mut point = self.grid_point(event.travelled + far);
             // An event beyond the path's end is none of the scene.
-            let length = search.given.path.length();
-            if search.chain.exact.travelled(point.head).hi > length - LEAST * (1.0 + length) {
+            let length = self.given.path.length();
+            if self.chain.exact.travelled(point.head).hi > length - LEAST * (1.0 + length) {
                 return None;
             }
-            let result = shown(search, &mut point)?;
+            let result = shown(self, &mut point)?;
             Some((point, result))
-        };
-        let (mut not_shown, mut far) = (0.0, around);
-        let mut found = loop {
-            match try_at(self, far) {
-                Some(found) => break found,
-                None => not_shown = far,
-            }
-            far *= 2.0;
-            if far > most {
-                return None;
-            }
-        };
-        while not_shown > 0.0 && far - not_shown > BESIDE * far {
-            let middle = 0.5 * (not_shown + far);
-            match try_at(self, middle) {
-                Some(nearer) => (found, far) = (nearer, middle),
-                None => not_shown = middle,
-            }
-        }
-        Some(found)
+        });
+        found.map(|(_, found)| found)
     }
 }
 
