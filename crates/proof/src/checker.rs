@@ -210,10 +210,12 @@ impl Checker {
             }
             (ParsedLine::Both { from, to, heads, spans: [one, other], apart, at }, Some(pair), Some(_)) => {
                 let claim = match (&about, apart) {
-                    (About::Events, None) => PairClaim::Clear,
+                    (About::Events, None) => Some(PairClaim { metres: 0.0, at: None }),
                     (About::Events, Some(_)) => return Err(problem!("`apart` in a certificate of events")),
-                    (_, None) => PairClaim::Links,
-                    (_, Some(metres)) => PairClaim::Apart(*metres, at.each_ref().map(Vec::as_slice)),
+                    (_, None) => None,
+                    (_, Some(metres)) => {
+                        Some(PairClaim { metres: *metres, at: Some(at.each_ref().map(Vec::as_slice)) })
+                    }
                 };
                 pair.add_both(scenes, [*from, *to], (*heads, [one, other]), claim)?;
             }

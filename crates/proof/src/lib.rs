@@ -5,6 +5,7 @@
 //! parsing nor solver in common with the search, only that page.
 
 mod apart;
+mod beside;
 mod boards;
 mod branch;
 mod capsule;

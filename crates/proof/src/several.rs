@@ -1,5 +1,6 @@
 //! Two of several dragons on the stage: Lemma 12 of docs/proofs.md.
 
+use super::apart::are_apart;
 use super::boards::{Board, covers};
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
@@ -44,14 +45,11 @@ impl Alone {
     }
 }
 
-/// Claim about two dragons over an interval of time in which their links do not lock.
-pub(super) enum PairClaim<'c> {
-    /// No claim about their boards.
-    Links,
-    /// No boards of the two touch.
-    Clear,
-    /// Boards of the two are further apart than some metres. A place of each handle with the heads at one time.
-    Apart(f64, [&'c [Place]; 2]),
+/// The claim about two dragons over an interval of time that boards of the two are further apart than some metres.
+pub(super) struct PairClaim<'c> {
+    pub metres: f64,
+    /// A place of each handle with the heads at one time, for first-order enclosures; without them, the metres are 0.
+    pub at: Option<[&'c [Place]; 2]>,
 }
 
 /// The section of two dragons.
@@ -170,7 +168,7 @@ impl Pair {
         scenes: &[Scene],
         [from, to]: [f64; 2],
         (heads, spans): ([Span; 2], [&[Span]; 2]),
-        claim: PairClaim,
+        claim: Option<PairClaim>,
     ) -> Checked {
         ensure!(self.meeting.is_none(), "a step after a contact of the two");
         ensure!(from.is_finite() && to.is_finite() && from < to, "it does not go forward in time");
@@ -182,28 +180,11 @@ impl Pair {
         let scenes = self.scenes(scenes);
         let together = Together::new(scenes, [from, to], heads, spans)?;
         let boards = [together.boards(scenes[0], 0)?, together.boards(scenes[1], 1)?];
-        match claim {
-            PairClaim::Links => self.shown.all = false,
-            PairClaim::Clear => {
-                self.pairs += check_pairs(&boards, |[a, b]| boards[0][a].is_apart_from(&boards[1][b]), "2")?;
-                self.shown.extend(At::Time(to), 0.0);
-            }
-            PairClaim::Apart(metres, at) => {
-                self.shown.continues("says how far boards are apart")?;
-                ensure!(metres.is_finite(), "`apart` is {metres:?}, expected a number");
-                let steps = together.first_order(scenes, [from, to], at)?;
-                let first_order = [0, 1].map(|k| together.first_order_boards(scenes[k], k, &steps[k]));
-                let limit = Interval::new(metres);
-                let are_apart = |[a, b]: [usize; 2]| {
-                    let (one, other) = (&boards[0][a], &boards[1][b]);
-                    one.is_clearly_apart_by(&limit, other)
-                        || one.is_apart_by(&limit, other)
-                        || first_order[0][a].is_apart_by(&limit, &first_order[1][b], When::Always)
-                        || one.is_apart_somehow(&limit, other)
-                };
-                self.pairs += check_pairs(&boards, are_apart, "6")?;
-                self.shown.extend(At::Time(to), metres);
-            }
+        self.shown.add(At::Time(to), claim.as_ref().map(|claim| claim.metres), "says how far boards are apart")?;
+        if let Some(PairClaim { metres, at }) = claim {
+            let steps = at.map(|at| together.first_order(scenes, [from, to], at)).transpose()?;
+            let first_order = steps.map(|steps| [0, 1].map(|k| together.first_order_boards(scenes[k], k, &steps[k])));
+            self.pairs += check_pairs(&boards, &Interval::new(metres), first_order.as_ref())?;
         }
         self.links += together.links;
         self.steps += 1;
@@ -309,11 +290,19 @@ impl Pair {
     }
 }
 
-/// Checks each board of the one with each of the other, by a lemma. Returns the number of pairs.
-fn check_pairs(boards: &[Vec<Board>; 2], are_apart: impl Fn([usize; 2]) -> bool, lemma: &str) -> Checked<u64> {
-    for a in 0..boards[0].len() {
-        if let Some(b) = (0..boards[1].len()).find(|b| !are_apart([a, *b])) {
-            return Err(problem!("bench {a} of the first and bench {b} of the second may be too near (Lemma {lemma})"));
+/// Checks that each board of the one is further than some metres from each of the other. Returns the number of pairs.
+fn check_pairs(
+    boards: &[Vec<Board>; 2],
+    metres: &Interval,
+    first_order: Option<&[Vec<FirstOrderBoard>; 2]>,
+) -> Checked<u64> {
+    for (a, one) in boards[0].iter().enumerate() {
+        for (b, other) in boards[1].iter().enumerate() {
+            let both = first_order.map(|all| [&all[0][a], &all[1][b]]);
+            ensure!(
+                are_apart(metres, [one, other], both, When::Always),
+                "bench {a} of the first and bench {b} of the second may be too near (Lemmas 2 and 6)"
+            );
         }
     }
     Ok((boards[0].len() * boards[1].len()) as u64)

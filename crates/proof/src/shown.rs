@@ -2,7 +2,7 @@
 
 use super::interval::Interval;
 use super::path::Place;
-use super::problem::{Checked, problem};
+use super::problem::{Checked, ensure};
 use super::scene::Scene;
 
 /// A moment of a section.
@@ -65,17 +65,19 @@ impl Shown {
     /// The claim before the first step.
     pub const NOTHING: Self = Self { end: None, all: true, least: f64::INFINITY };
 
-    /// Checks that all steps so far make the claim; `what` names it.
+    /// Adds a step, with the metres of its claim, or none if it does not make the claim; `what` names it.
     ///
     /// # Errors
-    /// The sentence about a step before that does not.
-    pub fn continues(&self, what: &str) -> Checked {
-        if self.all { Ok(()) } else { Err(problem!("it {what} after a step that does not")) }
-    }
-
-    /// Adds a step that makes the claim.
-    pub fn extend(&mut self, to: At, metres: f64) {
+    /// A step before did not make the claim; the metres are no number.
+    pub fn add(&mut self, to: At, metres: Option<f64>, what: &str) -> Checked {
+        let Some(metres) = metres else {
+            self.all = false;
+            return Ok(());
+        };
+        ensure!(self.all, "it {what} after a step that does not");
+        ensure!(metres.is_finite(), "it {what} of {metres:?} m, expected a number");
         (self.end, self.least) = (Some(to), self.least.min(metres));
+        Ok(())
     }
 
     /// Returns true if steps that make the claim have come to a time of the show, in seconds.

@@ -1,8 +1,7 @@
-//! The steps of a certificate and their consequences: the rules of a step, Lemmas 3 and 4 of docs/proofs.md.
+//! The steps of a certificate and their consequences: the rules of a step and Lemma 4 of docs/proofs.md.
 
 use super::apart;
-use super::boards::Board;
-use super::capsule::Capsule;
+use super::beside;
 use super::chain::{Chain, span_is_one};
 use super::first_order::FirstOrder;
 use super::interval::Interval;
@@ -11,8 +10,6 @@ use super::path::{Place, Span};
 use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
 use super::shown::{At, Shown};
-use super::team::Size;
-use super::unlisted::{check_ring, first_partner, straight_run};
 
 /// A step of the file.
 pub(super) struct Step {
@@ -104,13 +101,12 @@ impl Steps {
             Links::All => self.check_all(scene, &chain, start_of_second)?,
             Links::Front => self.check_front(scene, &chain, start_of_second)?,
         }
-        self.add_moving(moving, to, &chain)?;
-        self.add_clear(scene, links, clear, to, &chain)?;
-        self.add_free(scene, links, &free, to, &chain)?;
-        let claims = apart.is_some() || beside.iter().any(Option::is_some);
-        let first_order = if claims { Some(FirstOrder::new(scene, &chain, &at)?) } else { None };
-        self.add_apart(scene, links, apart.zip(first_order.as_ref()), to, &chain)?;
-        self.add_beside(scene, links, (&beside, first_order.as_ref()), to, &chain)?;
+        self.moving.add(At::Head(to), moving.then_some(0.0), "claims to be moving")?;
+        if let Some(link) = chain.products.iter().position(|product| moving && !product.is_positive()) {
+            return Err(problem!("it claims to be moving, but link {link} may stall"));
+        }
+        self.add_clear(scene, links, &chain, (clear, &free), to)?;
+        self.add_apart(scene, links, &chain, (apart, &beside, &at), to)?;
         self.steps += 1;
         self.links += chain.products.len() as u64;
         self.end = Some(to);
@@ -154,189 +150,58 @@ impl Steps {
         Err(problem!("{problem} (Lemma 4)"))
     }
 
-    fn add_moving(&mut self, moving: bool, to: Place, chain: &Chain) -> Checked {
-        if !moving {
-            self.moving.all = false;
-            return Ok(());
+    /// Adds the claims that boards do not touch and stay clear of some obstacles.
+    fn add_clear(
+        &mut self,
+        scene: &Scene,
+        links: Links,
+        chain: &Chain,
+        (clear, free): (bool, &[usize]),
+        to: Place,
+    ) -> Checked {
+        self.clear.add(At::Head(to), clear.then_some(0.0), "claims to be clear")?;
+        if clear {
+            self.pairs += apart::check(scene, links, chain, 0.0, None)?;
         }
-        self.moving.continues("claims to be moving")?;
-        if let Some(link) = chain.products.iter().position(|product| !product.is_positive()) {
-            return Err(problem!("it claims to be moving, but link {link} may stall"));
+        let mut claims = vec![None; scene.obstacles.len()];
+        for obstacle in free {
+            let claim = claims.get_mut(*obstacle);
+            let claim = claim.ok_or_else(|| problem!("it names the obstacle {obstacle}, which the scene has not"))?;
+            *claim = Some(0.0);
         }
-        self.moving.extend(At::Head(to), 0.0);
-        Ok(())
+        add_all(&mut self.free, &claims, to)?;
+        beside::check(scene, links, chain, &claims, None)
     }
 
-    fn add_clear(&mut self, scene: &Scene, links: Links, clear: bool, to: Place, chain: &Chain) -> Checked {
-        if !clear {
-            self.clear.all = false;
-            return Ok(());
-        }
-        self.clear.continues("claims to be clear")?;
-        self.pairs += check_clear(scene, links, chain)?;
-        self.clear.extend(At::Head(to), 0.0);
-        Ok(())
-    }
-
-    /// Checks that all boards stay clear of some obstacles (Lemma 9).
-    fn add_free(&mut self, scene: &Scene, links: Links, free: &[usize], to: Place, chain: &Chain) -> Checked {
-        if scene.obstacles.is_empty() && free.is_empty() {
-            return Ok(());
-        }
-        if let Some(obstacle) = free.iter().find(|obstacle| **obstacle >= scene.obstacles.len()) {
-            return Err(problem!("it names the obstacle {obstacle}, which the scene has not"));
-        }
-        let runs = runs_on_ground(scene, links, chain);
-        let boards = boards_on_ground(scene, links, chain, &runs);
-        for (number, (obstacle, shown)) in scene.obstacles.iter().zip(&mut self.free).enumerate() {
-            if !free.contains(&number) {
-                shown.all = false;
-                continue;
-            }
-            shown.continues(&format!("claims to be clear of obstacle {number}"))?;
-            if let Some((bench, _)) = boards.iter().find(|(_, board)| !obstacle.is_avoided_by(board)) {
-                return Err(problem!("bench {bench}, or one behind it, may be at obstacle {number} (Lemma 9)"));
-            }
-            shown.extend(At::Head(to), 0.0);
-        }
-        Ok(())
-    }
-
+    /// Adds the claims that boards are further apart than some metres, and further from obstacles.
     fn add_apart(
         &mut self,
         scene: &Scene,
         links: Links,
-        apart: Option<(f64, &FirstOrder)>,
-        to: Place,
         chain: &Chain,
+        (apart, claims, at): (Option<f64>, &[Option<f64>], &[Place]),
+        to: Place,
     ) -> Checked {
-        let Some((metres, step)) = apart else {
-            self.apart.all = false;
+        let (named, obstacles) = (claims.len(), scene.obstacles.len());
+        ensure!(named <= obstacles, "it names {named} obstacles, expected at most {obstacles}");
+        self.apart.add(At::Head(to), apart, "says how far boards are apart")?;
+        add_all(&mut self.beside, claims, to)?;
+        if apart.is_none() && claims.iter().all(Option::is_none) {
             return Ok(());
-        };
-        self.apart.continues("says how far boards are apart")?;
-        ensure!(metres.is_finite(), "`apart` is {metres:?}, expected a number");
-        self.pairs += apart::check(scene, links, chain, step, metres)?;
-        self.apart.extend(At::Head(to), metres);
-        Ok(())
-    }
-
-    /// Checks the clearances of obstacles (Lemma 11).
-    fn add_beside(
-        &mut self,
-        scene: &Scene,
-        links: Links,
-        (claims, step): (&[Option<f64>], Option<&FirstOrder>),
-        to: Place,
-        chain: &Chain,
-    ) -> Checked {
-        if claims.len() > scene.obstacles.len() {
-            return Err(problem!("it names {} obstacles, expected at most {}", claims.len(), scene.obstacles.len()));
         }
-        let runs = runs_on_ground(scene, links, chain);
-        let boards = step.map_or_else(Vec::new, |_| boards_on_ground(scene, links, chain, &runs));
-        let first_order = |step: &FirstOrder, bench: usize| {
-            let is_listed = bench < chain.last();
-            if !is_listed { step.straight_run(bench, &scene.team) } else { step.board(bench, &scene.team) }
-        };
-        let first_order: Vec<_> = boards.iter().filter_map(|(bench, _)| Some(first_order(step?, *bench))).collect();
-        for (number, (obstacle, shown)) in scene.obstacles.iter().zip(&mut self.beside).enumerate() {
-            let Some(metres) = claims.get(number).copied().flatten() else {
-                shown.all = false;
-                continue;
-            };
-            shown.continues(&format!("states a clearance of obstacle {number}"))?;
-            ensure!(metres.is_finite(), "`beside` of obstacle {number} is {metres:?}, expected a number");
-            let far = Interval::new(metres);
-            let mut pairs = boards.iter().zip(&first_order);
-            if let Some(((bench, _), _)) =
-                pairs.find(|((_, board), first)| !obstacle.is_further_than(&far, board, first))
-            {
-                return Err(problem!("bench {bench}, or one behind it, may be nearer to obstacle {number} (Lemma 11)"));
-            }
-            shown.extend(At::Head(to), metres);
+        let step = FirstOrder::new(scene, chain, at)?;
+        if let Some(metres) = apart {
+            self.pairs += apart::check(scene, links, chain, metres, Some(&step))?;
         }
-        Ok(())
+        beside::check(scene, links, chain, claims, Some(&step))
     }
 }
 
-/// The first of some boards on the line without end, the first and the last handle, and their size.
-type Run = (usize, Capsule, Capsule, Size);
-
-/// Returns the boards on the line without end that a step does not list: all, or of a step of the front links a tail
-/// with a size of its own.
-fn runs_on_ground(scene: &Scene, links: Links, chain: &Chain) -> Vec<Run> {
-    let last = chain.last();
-    let first = if links == Links::All { Some(last) } else { scene.team.own_tail() };
-    let first = first.filter(|first| (last..scene.team.benches).contains(first));
-    let run = |first: usize| {
-        let (front, rear, size) = straight_run(scene, chain, first);
-        (first, front, rear, size)
-    };
-    first.into_iter().flat_map(|first| scene.team.runs(first)).map(run).collect()
-}
-
-/// Returns the boards that obstacles concern, with their benches: all, those on the line as one, or boards 0 and 1 and
-/// a tail with a size of its own.
-fn boards_on_ground<'c>(scene: &Scene, links: Links, chain: &'c Chain, runs: &'c [Run]) -> Vec<(usize, Board<'c>)> {
-    let team = &scene.team;
-    let concerns = |bench: &usize| links == Links::All || *bench < 2 || team.own_tail() == Some(*bench);
-    let mut boards: Vec<(usize, Board)> = (chain.capsules.windows(2).enumerate())
-        .filter(|(bench, _)| concerns(bench))
-        .map(|(bench, pair)| (bench, Board::new(&pair[0], &pair[1], team.size(bench))))
-        .collect();
-    boards.extend(runs.iter().map(|(first, front, rear, size)| (*first, Board::new(front, rear, *size))));
-    boards
-}
-
-/// Checks that no two boards touch that share no handle. A step of the front links concerns only the pairs of Lemma 4. Returns the number of pairs.
-fn check_clear(scene: &Scene, links: Links, chain: &Chain) -> Checked<u64> {
-    let team = &scene.team;
-    let boards: Vec<Board> = (chain.capsules.windows(2).enumerate())
-        .map(|(index, pair)| Board::new(&pair[0], &pair[1], team.size(index)))
-        .collect();
-    let (mut pairs, zero) = (0, Interval::new(0.0));
-    for a in 0..boards.len() {
-        let Some(first) = first_partner(scene, links, a) else { break };
-        for b in first..boards.len() {
-            if !boards[a].is_apart_from(&boards[b]) && check_ring(scene, chain, a..a + 1, b, &zero).is_err() {
-                return Err(problem!("it claims to be clear, but benches {a} and {b} may touch (Lemma 2)"));
-            }
-            pairs += 1;
-        }
-    }
-    if chain.last() == team.benches {
-        return Ok(pairs);
-    }
-    if chain.ends_on_line(scene) {
-        check_line(scene, links, chain, &boards)?;
-        let about = if links == Links::All { boards.len() } else { boards.len().min(2) };
-        return Ok(pairs + about as u64);
-    }
-    // Only a step of the front links gets here.
-    check_ring(scene, chain, 0..2, chain.last(), &zero)?;
-    Ok(pairs + 2)
-}
-
-/// Checks Lemma 3, *Line*: the boards behind the last listed handle are on one line. The listed boards that the step
-/// concerns are apart from them, and they are apart from each other.
-fn check_line(scene: &Scene, links: Links, chain: &Chain, boards: &[Board]) -> Checked {
-    let team = &scene.team;
-    let last = chain.last();
-    ensure!(
-        (team.hole_inset + team.hole_inset).is_below(team.link(1)),
-        "it claims to be clear, but benches on a line touch (Lemma 3)"
-    );
-    for (a, board) in boards.iter().enumerate() {
-        let Some(first) = first_partner(scene, links, a) else { break };
-        let is_apart = |first: usize| {
-            let (front, rear, size) = straight_run(scene, chain, first);
-            board.is_apart_from(&Board::new(&front, &rear, size))
-        };
-        ensure!(
-            team.runs(last.max(first)).all(is_apart),
-            "it claims to be clear, but bench {a} may touch one on the line (Lemmas 2 and 3)"
-        );
+/// Adds a step's claims about obstacles: metres by number, none for those after the last.
+fn add_all(shown: &mut [Shown], claims: &[Option<f64>], to: Place) -> Checked {
+    for (number, shown) in shown.iter_mut().enumerate() {
+        let metres = claims.get(number).copied().flatten();
+        shown.add(At::Head(to), metres, &format!("states a clearance of obstacle {number}"))?;
     }
     Ok(())
 }

@@ -46,7 +46,9 @@ pub(super) fn check_ring(
     let Span(_, latest) = chain.capsules[from_handle].span;
     let ring = scene.path.spiral_radius(latest).filter(|_| latest.0 == 0);
     let ring = ring.ok_or_else(|| {
-        problem!("it claims to be clear, but the last handle listed is not on segment 0, an inward spiral")
+        problem!(
+            "boards may touch those that are not listed: the last handle listed is not on segment 0, an inward spiral"
+        )
     })?;
     let of_boards = |bench| scene.team.size(bench).width;
     let width = boards.clone().map(of_boards).fold(Interval::new(0.0), |most, width| most.max(&width));
@@ -56,6 +58,6 @@ pub(super) fn check_ring(
     if is_inside_ring(&scene.team, (&reach, &width), &ring, metres) {
         Ok(())
     } else {
-        Err(problem!("it claims to be clear, but benches 0 and 1 may touch one that is not listed (Lemma 3)"))
+        Err(problem!("benches 0 and 1 may touch one that is not listed, or be nearer than it says (Lemma 3)"))
     }
 }
