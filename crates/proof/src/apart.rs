@@ -52,8 +52,9 @@ pub(super) fn check(
     for a in 0..boards.len() {
         let Some(first) = first_partner(scene, links, a) else { break };
         for b in first..boards.len() {
-            let when = if are_on_one_circle(scene, chain, a, b) { When::Middle } else { When::Always };
             let both = first_order.map(|all| [&all[a], &all[b]]);
+            let is_rigid = both.is_some() && are_on_one_circle(scene, chain, a, b);
+            let when = if is_rigid { When::Middle } else { When::Always };
             let is_apart = are_apart(&metres, [&boards[a], &boards[b]], both, when)
                 || check_ring(scene, chain, a..a + 1, b, &far).is_ok();
             ensure!(is_apart, "benches {a} and {b} may touch, or be nearer than it says (Lemmas 2 and 6)");

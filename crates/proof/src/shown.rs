@@ -1,5 +1,7 @@
 //! What the steps of a section show one after another, and the lines that show what happens.
 
+use std::fmt::Display;
+
 use super::interval::Interval;
 use super::path::Place;
 use super::problem::{Checked, ensure};
@@ -69,7 +71,7 @@ impl Shown {
     ///
     /// # Errors
     /// A step before did not make the claim; the metres are no number.
-    pub fn add(&mut self, to: At, metres: Option<f64>, what: &str) -> Checked {
+    pub fn add(&mut self, to: At, metres: Option<f64>, what: impl Display) -> Checked {
         let Some(metres) = metres else {
             self.all = false;
             return Ok(());

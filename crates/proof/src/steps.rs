@@ -201,7 +201,7 @@ impl Steps {
 fn add_all(shown: &mut [Shown], claims: &[Option<f64>], to: Place) -> Checked {
     for (number, shown) in shown.iter_mut().enumerate() {
         let metres = claims.get(number).copied().flatten();
-        shown.add(At::Head(to), metres, &format!("states a clearance of obstacle {number}"))?;
+        shown.add(At::Head(to), metres, format_args!("states a clearance of obstacle {number}"))?;
     }
     Ok(())
 }
