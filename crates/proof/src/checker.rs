@@ -1,7 +1,7 @@
 //! The lines of a certificate in their order: which may follow which, and the room that checks each.
 
 use super::Proved;
-use super::events::{Events, LockShown};
+use super::events::{Events, LockShown, Whom};
 use super::greatest::Greatest;
 use super::lines::{About, ParsedLine, ProvedEvent};
 use super::path::Span;
@@ -302,16 +302,16 @@ impl Checker {
                 }
             }
             ParsedLine::Near { benches, from, to, spans, at, most } => {
-                events.add_near(scene, steps, benches, Span(from, to), (&spans, &at), most)
+                events.add_near(scene, steps, Whom::Own(benches), (Span(from, to), &spans, &at), most)
             }
-            ParsedLine::NearObstacle { obstacle, bench, from, to, spans, at, most } => {
-                events.add_near_obstacle(scene, steps, (obstacle, bench), Span(from, to), (&spans, &at), most)
+            ParsedLine::NearObstacle { obstacle: number, bench, from, to, spans, at, most } => {
+                events.add_near(scene, steps, Whom::Obstacle { number, bench }, (Span(from, to), &spans, &at), most)
             }
             ParsedLine::Contact { benches, from, to, spans, point } => {
-                events.add_contact(scene, steps, benches, Span(from, to), &spans, point)
+                events.add_touch(scene, steps, Whom::Own(benches), (Span(from, to), &spans), point)
             }
-            ParsedLine::Reached { obstacle, bench, from, to, spans, point } => {
-                events.add_reached(scene, steps, (obstacle, bench), Span(from, to), &spans, point)
+            ParsedLine::Reached { obstacle: number, bench, from, to, spans, point } => {
+                events.add_touch(scene, steps, Whom::Obstacle { number, bench }, (Span(from, to), &spans), point)
             }
             ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
             ParsedLine::Branch { .. } => Err(problem!("a branch in a certificate of another question")),

@@ -16,18 +16,57 @@ use super::steps::Steps;
 /// The events that are shown so far.
 #[derive(Default)]
 pub(super) struct Events {
-    /// Two benches that overlap.
-    pub contact: Option<Witness>,
+    /// Two benches that overlap, and a bench at each obstacle that was reached, by its number.
+    touched: Vec<(Option<usize>, Witness)>,
     /// A link that has stalled.
-    pub stall: Option<Witness>,
-    /// The obstacles that were reached, each with a bench.
-    pub reached: Vec<(usize, Witness)>,
+    stall: Option<Witness>,
     /// The end of the motion.
     pub finish: Option<Finish>,
-    /// Two benches that are near each other.
-    pub near: Option<Witness>,
-    /// Benches near obstacles.
-    pub near_obstacles: Vec<(usize, Witness)>,
+    /// Two benches that are near each other, and benches near obstacles.
+    near: Vec<(Option<usize>, Witness)>,
+}
+
+/// A board and another thing that it touches or is near.
+#[derive(Clone, Copy)]
+pub(super) enum Whom {
+    /// Two boards of the dragon.
+    Own([usize; 2]),
+    /// A board and an obstacle.
+    Obstacle { number: usize, bench: usize },
+}
+
+impl Whom {
+    /// Returns the number of the obstacle.
+    fn obstacle(self) -> Option<usize> {
+        if let Self::Obstacle { number, .. } = self { Some(number) } else { None }
+    }
+
+    fn benches(self) -> [Option<usize>; 2] {
+        match self {
+            Self::Own(benches) => benches.map(Some),
+            Self::Obstacle { bench, .. } => [Some(bench), None],
+        }
+    }
+
+    /// Checks that the boards are listed and share no handle, that there is such an obstacle, and that no witness of
+    /// the same kind precedes.
+    fn check(self, scene: &Scene, earlier: &[(Option<usize>, Witness)], spans: &[Span]) -> Checked {
+        ensure!(
+            earlier.iter().all(|(other, _)| *other != self.obstacle()),
+            "a second line about two boards, or about the same obstacle"
+        );
+        match self {
+            Self::Own([a, b]) => ensure!(
+                a.abs_diff(b) >= 2 && a.max(b) < spans.len(),
+                "benches {a} and {b} share a handle, or are not both listed"
+            ),
+            Self::Obstacle { number, bench } => {
+                ensure!(number < scene.obstacles.len(), "the scene has no obstacle {number}");
+                ensure!(bench < spans.len(), "bench {bench} is not listed");
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The end of a motion.
@@ -88,65 +127,41 @@ fn near_step(scene: &Scene, shown: &Shown, head: Span, (spans, at): (&[Span], &[
 }
 
 impl Events {
-    /// Checks and adds a contact: Lemma 5, *Contact*.
+    /// Checks and adds two boards that have a point in common, or a board that has come to an obstacle: Lemma 5,
+    /// *Contact*, and Lemma 9, *Reached*.
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_contact(
+    pub fn add_touch(
         &mut self,
         scene: &Scene,
         steps: &Steps,
-        benches: [usize; 2],
-        head: Span,
-        spans: &[Span],
-        point: [f64; 2],
+        whom: Whom,
+        (head, spans): (Span, &[Span]),
+        [x, y]: [f64; 2],
     ) -> Checked {
-        ensure!(self.contact.is_none(), "a second contact");
-        let [a, b] = benches;
-        if a.abs_diff(b) < 2 || a.max(b) >= spans.len() {
-            return Err(problem!("benches {a} and {b} share a handle, or are not both listed"));
-        }
+        whom.check(scene, &self.touched, spans)?;
         let chain = touching_chain(scene, steps, head, spans)?;
-        let point = Vector::new(point[0], point[1]);
-        for bench in benches {
-            let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
-            let board = Board::new(front, rear, scene.team.size(bench));
-            ensure!(covers(&board, &point), "the point may be outside bench {bench} (Lemma 5)");
+        let point = Vector::new(x, y);
+        let board =
+            |bench: usize| Board::new(&chain.capsules[bench], &chain.capsules[bench + 1], scene.team.size(bench));
+        match whom {
+            Whom::Own(benches) => {
+                for bench in benches {
+                    ensure!(covers(&board(bench), &point), "the point may be outside bench {bench} (Lemma 5)");
+                }
+            }
+            Whom::Obstacle { number, bench } => ensure!(
+                scene.obstacles[number].is_reached_by(&board(bench), &point),
+                "bench {bench} may be clear of obstacle {number} (Lemma 9)"
+            ),
         }
-        self.contact = Some(Witness::of_event(benches.map(Some), At::Head(head.0)));
+        self.touched.push((whom.obstacle(), Witness::of_event(whom.benches(), At::Head(head.0))));
         Ok(())
     }
 
-    /// Checks and adds a board that has come to an obstacle: Lemma 9, *Reached*.
-    ///
-    /// # Errors
-    /// The condition that does not follow.
-    pub fn add_reached(
-        &mut self,
-        scene: &Scene,
-        steps: &Steps,
-        (number, bench): (usize, usize),
-        head: Span,
-        spans: &[Span],
-        point: [f64; 2],
-    ) -> Checked {
-        ensure!(!self.reached.iter().any(|(other, _)| *other == number), "obstacle {number} was reached before");
-        let obstacle = scene.obstacles.get(number).ok_or_else(|| problem!("the scene has no obstacle {number}"))?;
-        if bench >= spans.len() {
-            return Err(problem!("bench {bench} is not listed"));
-        }
-        let chain = touching_chain(scene, steps, head, spans)?;
-        let (front, rear) = (&chain.capsules[bench], &chain.capsules[bench + 1]);
-        let board = Board::new(front, rear, scene.team.size(bench));
-        ensure!(
-            obstacle.is_reached_by(&board, &Vector::new(point[0], point[1])),
-            "bench {bench} may be clear of obstacle {number} (Lemma 9)"
-        );
-        self.reached.push((number, Witness::of_event([Some(bench), None], At::Head(head.0))));
-        Ok(())
-    }
-
-    /// Checks and adds two boards that are no further apart than `most` metres: Lemma 6, *From above*.
+    /// Checks and adds two boards that are no further apart than `most` metres, or a board whose clearance from an
+    /// obstacle is no more: Lemmas 6 and 11, *From above*.
     ///
     /// # Errors
     /// The condition that does not follow.
@@ -154,55 +169,24 @@ impl Events {
         &mut self,
         scene: &Scene,
         steps: &Steps,
-        [a, b]: [usize; 2],
-        head: Span,
-        (spans, at): (&[Span], &[Place]),
+        whom: Whom,
+        (head, spans, at): (Span, &[Span], &[Place]),
         most: f64,
     ) -> Checked {
-        ensure!(self.near.is_none(), "a second line `near`");
-        if b < 2 || a > b - 2 || b >= spans.len() {
-            return Err(problem!("benches {a} and {b} share a handle, or are not both listed in order"));
-        }
-        let step = near_step(scene, &steps.apart, head, (spans, at))?;
-        let [one, other] = [a, b].map(|bench| step.board(bench, &scene.team));
+        whom.check(scene, &self.near, spans)?;
+        let shown = whom.obstacle().map_or(&steps.apart, |number| &steps.beside[number]);
+        let step = near_step(scene, shown, head, (spans, at))?;
+        let board = |bench: usize| step.board(bench, &scene.team);
+        let clearance = match whom {
+            Whom::Own([a, b]) => {
+                ensure!(a < b, "benches {a} and {b} are not in order");
+                board(a).at_most(&board(b))
+            }
+            Whom::Obstacle { number, bench } => scene.obstacles[number].at_most(&board(bench)),
+        };
         let most = Interval::new(most);
-        ensure!(
-            one.at_most(&other).is_at_most(&most),
-            "benches {a} and {b} may be further apart than it says (Lemma 6)"
-        );
-        self.near = Some(Witness { benches: [Some(a), Some(b)], most, at: At::Head(head.0) });
-        Ok(())
-    }
-
-    /// Checks and adds a board whose clearance from an obstacle is no more than `most` metres: Lemma 11.
-    ///
-    /// # Errors
-    /// The condition that does not follow.
-    pub fn add_near_obstacle(
-        &mut self,
-        scene: &Scene,
-        steps: &Steps,
-        (number, bench): (usize, usize),
-        head: Span,
-        (spans, at): (&[Span], &[Place]),
-        most: f64,
-    ) -> Checked {
-        ensure!(
-            !self.near_obstacles.iter().any(|(other, _)| *other == number),
-            "a second line `near_obstacle` of obstacle {number}"
-        );
-        let obstacle = scene.obstacles.get(number).ok_or_else(|| problem!("the scene has no obstacle {number}"))?;
-        if bench >= spans.len() {
-            return Err(problem!("bench {bench} is not listed"));
-        }
-        let step = near_step(scene, &steps.beside[number], head, (spans, at))?;
-        let most = Interval::new(most);
-        ensure!(
-            obstacle.at_most(&step.board(bench, &scene.team)).is_at_most(&most),
-            "bench {bench} may be further from obstacle {number} than it says (Lemma 11)"
-        );
-        let near = Witness { benches: [Some(bench), None], most, at: At::Head(head.0) };
-        self.near_obstacles.push((number, near));
+        ensure!(clearance.is_at_most(&most), "the boards may be further apart than it says (Lemmas 6 and 11)");
+        self.near.push((whom.obstacle(), Witness { benches: whom.benches(), most, at: At::Head(head.0) }));
         Ok(())
     }
 
@@ -289,8 +273,8 @@ impl Events {
 
     /// Returns what a section of one dragon has shown about the subject of a result.
     pub fn known<'s>(&self, scene: &'s Scene, steps: &Steps, subject: &Subject) -> Known<'s> {
-        let of_obstacle = |found: &[(usize, Witness)]| {
-            found.iter().find(|(number, _)| Some(*number) == subject.obstacle).map(|(_, witness)| *witness)
+        let of_subject = |found: &[(Option<usize>, Witness)]| {
+            found.iter().find(|(obstacle, _)| *obstacle == subject.obstacle).map(|(_, witness)| *witness)
         };
         let (ends, lock) = match self.finish {
             Some(Finish::PathEnd) => (true, None),
@@ -299,7 +283,7 @@ impl Events {
         };
         let up_to = |end: Option<At>| Shown { end, ..Shown::NOTHING };
         let (shown, event, near) = match (subject.claim, subject.obstacle) {
-            (Claim::Event(EventKind::Contact), _) => (steps.clear, self.contact, None),
+            (Claim::Event(EventKind::Contact), _) => (steps.clear, of_subject(&self.touched), None),
             (Claim::Event(EventKind::Stall), _) => (steps.moving, self.stall, None),
             (Claim::Event(EventKind::Lock), _) => (up_to(steps.end.map(At::Head)), lock, None),
             (Claim::Event(EventKind::PathEnd), _) => {
@@ -308,10 +292,10 @@ impl Events {
                 return Known { scene, shown, event, near: None, is_whole: lock.is_some(), locks: Vec::new() };
             }
             (Claim::Event(EventKind::Obstacle), number) => {
-                (number.map_or(Shown::NOTHING, |number| steps.free[number]), of_obstacle(&self.reached), None)
+                (number.map_or(Shown::NOTHING, |number| steps.free[number]), of_subject(&self.touched), None)
             }
-            (Claim::Clearance, None) => (steps.apart, self.contact, self.near),
-            (Claim::Clearance, Some(number)) => (steps.beside[number], None, of_obstacle(&self.near_obstacles)),
+            (Claim::Clearance, None) => (steps.apart, of_subject(&self.touched), of_subject(&self.near)),
+            (Claim::Clearance, Some(number)) => (steps.beside[number], None, of_subject(&self.near)),
         };
         let zero = Interval::new(0.0);
         // A lock has happened itself.
