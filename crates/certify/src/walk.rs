@@ -1,4 +1,4 @@
-//! What the searches by steps have in common: the length of the next step, and the links that it shows.
+//! Parts that the searches by steps share: the length of the next step, and the links that it shows.
 
 use super::lines::Links;
 use super::place::Span;

@@ -47,7 +47,7 @@ impl Subject {
     }
 }
 
-/// What a section has shown about the subject of a result.
+/// The facts that a section has shown about the subject of a result.
 pub(super) struct Known<'s> {
     /// The dragon, or one of the two.
     pub scene: &'s Scene,

@@ -1,4 +1,4 @@
-//! What the steps of a section show one after another, and the lines that show what happens.
+//! The claims that the steps of a section make one after another, and the witnesses of its events.
 
 use std::fmt::Display;
 
