@@ -57,7 +57,8 @@ pub(super) struct Known<'s> {
     pub event: Option<Witness>,
     /// The upper bound of the least clearance.
     pub near: Option<Witness>,
-    /// True if that is shown for the whole motion, which ends without a lock.
+    /// True if that is shown for the whole motion, which ends without a lock. A path's end does not happen if the
+    /// motion ends with one.
     pub is_whole: bool,
     /// For each lock that ends the motion, the first and the last time in seconds up to which a result may state it.
     /// Between the last step and the lock nothing is known.
