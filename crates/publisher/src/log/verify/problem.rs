@@ -126,7 +126,7 @@ pub enum Problem {
     Totals {
         /// Frames, skipped periods and lost frames of the last line.
         found: [u64; 3],
-        /// Those of the lines before it.
+        /// The same totals, of the lines before it.
         expected: [u64; 3],
     },
 }
