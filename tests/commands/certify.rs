@@ -11,7 +11,7 @@ mod second_judge;
 mod tampering;
 mod truth;
 
-use bench_dragon::proof::{Proved, Refused, Status, verify};
+use bench_dragon::proof::{EventKind, Proved, Refused, Status, verify};
 use serde_json::Value;
 use truth::{Found, certificate};
 
@@ -40,6 +40,17 @@ fn certificates_are_proofs() {
         assert!(decided >= least, "{name}: {:?}", proved.results);
         assert_eq!(proved.scene, text);
     }
+}
+
+/// A team whose head's link points backward at the start already.
+#[test]
+fn a_stall_at_the_start_is_proved() {
+    let text = &scene_text("stalled_start");
+    let proved = check(&certificate(text)).unwrap_or_else(|refused| panic!("{refused}"));
+    assert_eq!(Found::new(text).unwrap().contradiction(&proved), None);
+    let stall = proved.results.iter().find(|outcome| outcome.event == EventKind::Stall).unwrap();
+    assert_eq!((stall.status, stall.time_lo), (Status::Proved, Some(0.0)), "{stall:?}");
+    assert!(stall.time_hi.is_some_and(|time| time < 1e-9), "{stall:?}");
 }
 
 /// Heads and tails of their own size: an inward spiral, and a route past an obstacle on which the tail's link stalls.

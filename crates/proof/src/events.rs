@@ -199,8 +199,6 @@ impl Events {
         let chain = Chain::check(scene, head, spans)?;
         check_is_in_motion(scene, head.1)?;
         ensure!(steps.end == Some(head.1), "it is not where the last step ended");
-        // Otherwise the link may have stalled before the start.
-        ensure!(steps.moving.has_come_to(scene, 0.0), "no moving step has come to the start");
         ensure!(
             chain.products.get(link).is_some_and(Interval::is_negative),
             "link {link} may not have stalled (Lemma 5)"

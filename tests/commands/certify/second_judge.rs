@@ -297,11 +297,11 @@ fn a_second_judge_agrees_and_refuses_what_was_changed() {
     // `long` is proved for minutes, and `ros2` is the paper's scene.
     let config: &[&str] =
         if all() { &["school", "paper", "wide", "procession", "turnaround", "tight", "square"] } else { &["school"] };
-    let all = cases(10, 50, 500);
+    let all = cases(11, 50, 500);
     let read = |name: &&str| (name.to_string(), std::fs::read_to_string(format!("config/{name}.toml")).unwrap());
     let mut scenes: Vec<_> = config.iter().map(read).collect();
     scenes.push(("turn".to_owned(), TURN.to_owned()));
-    scenes.extend(["tail_locks", "lk_25"].map(|name| (name.to_owned(), scene_text(name))));
+    scenes.extend(["tail_locks", "lk_25", "stalled_start"].map(|name| (name.to_owned(), scene_text(name))));
     let random = (0..).map(|number| (format!("random{number}"), scene(number)));
     let left = Mutex::new(scenes.into_iter().chain(random).enumerate());
     let found = Mutex::new(Vec::new());

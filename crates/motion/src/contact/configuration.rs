@@ -48,9 +48,7 @@ impl Configuration {
             }
             let (front, link) = (self.places[bench], team.link(bench));
             let rear = follower(path, front, link)?;
-            let direction = link_pose(path, front, rear, link).direction;
-            let width = team.board_width(bench);
-            self.boards.push(Board::from_front(path.point(front), direction, link, team.hole_inset, width));
+            self.boards.push(board(path, team, bench, [front, rear]));
             self.places.push(rear);
         }
         Ok(())
@@ -70,8 +68,7 @@ impl Configuration {
             at.solve_to(bench + 1, path, team, budget)?;
             let (front, link) = (at.places[bench], team.link(bench));
             if let Some(rear) = perpendicular(path, front, at.places[bench + 1], link) {
-                let direction = link_pose(path, front, rear, link).direction;
-                at.boards[bench] = Board::from_front(path.point(front), direction, link, team.hole_inset, team.width);
+                at.boards[bench] = board(path, team, bench, [front, rear]);
                 at.places[bench + 1] = rear;
             }
         }
@@ -98,6 +95,13 @@ impl Configuration {
         let boards = &self.boards[..benches];
         near_pairs(boards, boards, motion, |(a, b)| b >= a + 2)
     }
+}
+
+/// Returns a board with its front and its rear handle at two places of the path.
+fn board(path: &Path, team: &Team, bench: usize, [front, rear]: [Param; 2]) -> Board {
+    let link = team.link(bench);
+    let direction = link_pose(path, front, rear, link).direction;
+    Board::from_front(path.point(front), direction, link, team.hole_inset, team.board_width(bench))
 }
 
 /// The cosine, in absolute value, below which a link counts as all but perpendicular; and the metres behind its rear

@@ -61,6 +61,22 @@ fn the_least_clearance_at_a_lock_has_its_digits() {
     assert!((travelled - 2.082_175_601_857_538_4 * 28.884_510_050_333_898).abs() < 1e-12 && travelled == end);
 }
 
+/// The same with 50 digits for boards of three widths: the head's link locks, and its board is not as wide as the body.
+#[test]
+fn the_least_clearance_at_a_lock_is_that_of_boards_of_their_own_size() {
+    let ends = Ends {
+        head_width: Some(0.158_966_245_735_522_4),
+        tail_width: Some(1.778_867_732_431_596_5),
+        tail_length: Some(0.108),
+    };
+    let (width, hole_inset) = (0.529_887_485_785_074_7, 0.005);
+    let team = Team { benches: 3, head_length: 1.753_705_563_082_050_2, body_length: 0.5, width, hole_inset, ends };
+    let (contact, least, end) = search(&Path::spiral(1.501_138_711_251_048, 2.0), &team, None);
+    let LeastClearance { value, travelled, .. } = least.unwrap();
+    assert!((value - 0.063_119_201_761_604_89).abs() < 1e-12 && contact.is_none(), "{value}");
+    assert!((travelled - 18.654_484_663_820_426).abs() < 1e-12 && travelled == end, "{travelled}");
+}
+
 /// Checks that equally spaced configurations do not contradict the searches.
 fn check(path: &Path, team: &Team, samples: usize) -> Result<(), TestCaseError> {
     let (contact, least, end) = search(path, team, None);
