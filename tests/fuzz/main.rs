@@ -32,6 +32,8 @@ const HUNG: Duration = Duration::from_secs(300);
 
 /// The name of the threads that run cases.
 const CASES: &str = "cases";
+/// The name of the test of files, whose panics are of no target.
+const FILES: &str = "every_target_is_built_for_libfuzzer_and_every_kept_input_belongs_to_one";
 
 /// Panics so far in threads that a target has started, such as a server's. No one knows which target: several run at
 /// the same time. The place in the sentence shows it.
@@ -47,8 +49,9 @@ fn count_panics() {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
             let thread = std::thread::current();
-            let is_own =
-                thread.name().is_some_and(|name| name == CASES || TARGETS.iter().any(|target| name == target.name));
+            let is_own = thread
+                .name()
+                .is_some_and(|name| [CASES, FILES].contains(&name) || TARGETS.iter().any(|target| name == target.name));
             if !is_own {
                 panics().push(info.to_string());
             }

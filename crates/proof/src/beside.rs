@@ -37,14 +37,11 @@ pub(super) fn check(
     for (number, (obstacle, metres)) in scene.obstacles.iter().zip(claims).enumerate() {
         let Some(metres) = metres.map(Interval::new) else { continue };
         for (bench, board, first_order) in &boards {
-            let is_further = match first_order {
-                Some(first_order) => obstacle.is_further_than(&metres, board, first_order),
-                None => obstacle.is_avoided_by(board),
+            let (is_further, wrong, lemma) = match first_order {
+                Some(first) => (obstacle.is_further_than(&metres, board, first), "nearer than it says to", 11),
+                None => (obstacle.is_avoided_by(board), "at", 9),
             };
-            ensure!(
-                is_further,
-                "bench {bench}, or one behind it, may be at obstacle {number}, or nearer than it says (Lemmas 9 and 11)"
-            );
+            ensure!(is_further, "bench {bench}, or one behind it, may be {wrong} obstacle {number} (Lemma {lemma})");
         }
     }
     Ok(())
