@@ -7,8 +7,8 @@ Before each request and response come the client (uint64) and the number of the 
 each response, or null if none came within some seconds. With --calls-of-input the calls are lines of standard input, and
 the clients of all services stay. With --fresh, N clients, each with its own participant, make their first call to the
 first service. With --in-turn, N clients, each the only one for its time, make four first calls at once; prints the
-number of responses to each. With --flood, one client calls the first service N times without waiting for a response. Without a call, prints the
-topics below NAME with their types, including those of services, and /clock and /tf.
+number of responses to each. With --flood, one client calls the first service N times without waiting for a response.
+Without a call, prints the topics below NAME with their types, including those of services, and /clock and /tf.
 """
 
 import argparse
