@@ -133,7 +133,7 @@ fn a_certificate_with_another_clearance_is_refused() {
         });
         assert!(check(&both[..]).is_err(), "{clearance}");
         let result = changed(&lines, |line| {
-            if line["type"] == "least_pitch" {
+            if line["of"] == "least_pitch" {
                 line["clearance"] = json!(clearance);
             }
         });

@@ -192,8 +192,8 @@ fn changed_certificates_of_clearances_are_refused() {
         ("[9, 9], [-12, 9]", "[7, 9], [-12, 9]"),
         ("keep_out = 0.5", "keep_out = 0.5000001"),
         ("[stage]", "[placement]\\norigin = [1e-6, 1e-6]\\n[stage]"),
-        ("\"near_obstacle\",\"obstacle\":0", "\"near_obstacle\",\"obstacle\":1"),
-        ("\"type\":\"obstacle_clearance\",\"obstacle\":0", "\"type\":\"obstacle_clearance\",\"obstacle\":1"),
+        ("\"witness\",\"obstacle\":0", "\"witness\",\"obstacle\":1"),
+        ("\"of\":\"obstacle_clearance\",\"obstacle\":0", "\"of\":\"obstacle_clearance\",\"obstacle\":1"),
     ];
     for (from, to) in changes {
         let changed = lines.replacen(from, to, 1);
@@ -234,8 +234,8 @@ fn claims_of_overlaps_are_checked() {
             changed += &format!("{line}\n");
         }
         changed += &format!(
-            "{{\"type\":\"obstacle_clearance\",\"obstacle\":0,\"lo\":{metres:?},\"hi\":null,\"until\":\"path_end\",\
-             \"time_until\":null,\"bench\":null}}\n"
+            "{{\"type\":\"result\",\"of\":\"obstacle_clearance\",\"obstacle\":0,\"lo\":{metres:?},\"hi\":null,\
+             \"until\":\"path_end\",\"time_until\":null,\"bench\":null}}\n"
         );
         check(&changed).map(|proved| proved.obstacle_clearances[0].lo)
     };

@@ -196,8 +196,8 @@ fn changed_certificates_of_clearances_are_refused() {
     let BetweenEnclosure { lo, hi, benches, .. } = found.between[0];
     assert!(lo.unwrap() > 0.0 && hi.unwrap() - lo.unwrap() < 1e-9, "{:?}", found.between[0]);
     assert_eq!(proved.least_clearances[2].dragons, [0, 1]);
-    let near = format!("\"type\":\"near_both\",\"benches\":{}", serde_json::to_string(&benches).unwrap());
-    let other = format!("\"type\":\"near_both\",\"benches\":[{},{}]", (benches[0] + 1) % 3, benches[1]);
+    let near = format!("\"type\":\"witness\",\"benches\":{}", serde_json::to_string(&benches).unwrap());
+    let other = format!("\"type\":\"witness\",\"benches\":[{},{}]", (benches[0] + 1) % 3, benches[1]);
     let changes = [
         ("origin = [15.0, 4.2]", "origin = [15.0, 4.1999]"),
         ("delay = 2.0", "delay = 1.999"),
@@ -205,9 +205,9 @@ fn changed_certificates_of_clearances_are_refused() {
         ("head_speed = 1.5", "head_speed = 1.501"),
         ("rotation_turns = 0.5", "rotation_turns = 0.501"),
         ("width = 0.3", "width = 0.301"),
-        ("\"type\":\"pair\",\"dragons\":[0,1]", "\"type\":\"pair\",\"dragons\":[1,0]"),
+        ("\"type\":\"section\",\"dragons\":[0,1]", "\"type\":\"section\",\"dragons\":[1,0]"),
         (near.as_str(), other.as_str()),
-        ("\"type\":\"least_clearance\"", "\"type\":\"result\",\"event\":\"contact\",\"status\":\"none\""),
+        ("\"of\":\"least_clearance\"", "\"of\":\"event\",\"event\":\"contact\",\"status\":\"none\""),
     ];
     for (from, to) in changes {
         let changed = lines.replacen(from, to, 1);

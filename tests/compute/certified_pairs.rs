@@ -145,10 +145,10 @@ fn changed_certificates_of_pairs_are_refused() {
         ("head_speed = 1.5", "head_speed = 1.501"),
         ("rotation_turns = 0.5", "rotation_turns = 0.501"),
         ("hole_inset = 0.275", "hole_inset = 0.3"),
-        ("\"type\":\"pair\",\"dragons\":[0,1]", "\"type\":\"pair\",\"dragons\":[1,0]"),
-        ("\"type\":\"dragon\",\"dragon\":1", "\"type\":\"dragon\",\"dragon\":0"),
+        ("\"type\":\"section\",\"dragons\":[0,1]", "\"type\":\"section\",\"dragons\":[1,0]"),
+        ("\"type\":\"section\",\"dragons\":[1]", "\"type\":\"section\",\"dragons\":[0]"),
         ("\"dragons\":[0,1],\"status\":\"proved\"", "\"dragons\":[0],\"status\":\"proved\""),
-        ("\"type\":\"meeting\",\"benches\":[0,0]", "\"type\":\"meeting\",\"benches\":[0,1]"),
+        ("\"type\":\"witness\",\"benches\":[0,0]", "\"type\":\"witness\",\"benches\":[0,1]"),
     ];
     for (from, to) in changes {
         let changed = lines.replacen(from, to, 1);

@@ -174,7 +174,7 @@ fn changed_certificates_of_a_scene_with_obstacles_are_refused() {
         // Claims that continue beyond the touch, a bench that is clear of it, and another obstacle.
         ("\"free\":[1,2]", "\"free\":[0,1,2]"),
         ("\"free\":[0,1,2]", "\"free\":[0,1]"),
-        ("\"type\":\"reached\",\"obstacle\":0,\"bench\":0", "\"type\":\"reached\",\"obstacle\":1,\"bench\":0"),
+        ("\"type\":\"witness\",\"obstacle\":0,\"benches\":[0]", "\"type\":\"witness\",\"obstacle\":1,\"benches\":[0]"),
         (
             "\"event\":\"obstacle\",\"obstacle\":1,\"status\":\"none\"",
             "\"event\":\"obstacle\",\"obstacle\":1,\"status\":\"proved\"",

@@ -122,8 +122,7 @@ class Judge:
     def least_clearance(self, claim, near, until, number):
         """Checks that no two boards are nearer than claimed, and that two are as near."""
         scene, lo = self.scene, claim["lo"]
-        time = float(scene.time_at(read_place(near["at"][0])).mid()) if near else until
-        around = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+        around = self.times_around(near, until, number)
         for at in around + [self.random.uniform(0, until) for _ in range(number)] if lo is not None else []:
             try:
                 boards = scene.boards(self.at(at))
@@ -137,26 +136,31 @@ class Judge:
                 require(nearest >= lo, f"benches {i} and {j} are nearer than {lo} m at t = {at} s")
         if claim["until"] != "contact" and claim["hi"] is not None:
             i, j = claim["bench_a"], claim["bench_b"]
-            self.check_is_by(near, claim)
-            boards = scene.boards(scene.chain(read_place(near["at"][0]), j + 2))
+            boards = scene.boards(scene.chain(self.place_near(near, claim, [i, j]), j + 2))
             nearest = clearance(boards[i], boards[j])
             # The steps have come there.
             require(lo is None or nearest >= lo, f"benches {i} and {j} are nearer than {lo} m")
             require(nearest <= claim["hi"], f"benches {i} and {j} are {float(nearest)} m apart, not {claim['hi']} m")
         self.counts["clearances"] += 1
 
-    def check_is_by(self, near, claim):
-        """Checks that a near place is not after the time up to which the result holds."""
+    def times_around(self, near, until, number):
+        """Returns random times around that of a witness, or else around the end."""
+        time = float(self.scene.time_at(head_of(near)).mid()) if near else until
+        return [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+
+    def place_near(self, near, claim, benches):
+        """Returns the head's place in the witness of a result. It is not after the time up to which that holds."""
+        require(near is not None and near["benches"] == benches, f"no distance of benches {benches} is shown")
+        head = head_of(near)
         if claim["until"] == "time":
-            time = self.scene.time_at(read_place(near["at"][0]))
-            require(not time > claim["time_until"], "the near place is after time_until")
+            require(not self.scene.time_at(head) > claim["time_until"], "the near place is after time_until")
+        return head
 
     def obstacle_clearance(self, claim, near, until, number):
         """Checks that no board is nearer to an obstacle than claimed, and that one is as near."""
         scene, lo, hi = self.scene, claim["lo"], claim["hi"]
         shape = scene.obstacles[claim["obstacle"]]
-        time = float(scene.time_at(read_place(near["at"][0])).mid()) if near else until
-        around = [min(max(time + self.random.uniform(-1, 1) * until / 100, 0.0), until) for _ in range(number)]
+        around = self.times_around(near, until, number)
         # A board that overlaps the shape has no distance here.
         times = around if lo is not None and shape.distance + lo > 0 else []
         for at in times:
@@ -171,8 +175,7 @@ class Judge:
             require(all(avoided), f"a board is nearer to obstacle {claim['obstacle']} than {lo} m at t = {at} s")
         if hi is not None:
             bench = claim["bench"]
-            self.check_is_by(near, claim)
-            board = scene.boards(scene.chain(read_place(near["at"][0]), bench + 2))[bench]
+            board = scene.boards(scene.chain(self.place_near(near, claim, [bench]), bench + 2))[bench]
             wider = Obstacle(shape.kind, shape.points, shape.distance + arb(hi))
             require(wider.is_reached(board), f"bench {bench} is not within {hi} m of obstacle {claim['obstacle']}")
 
@@ -356,8 +359,9 @@ class PairJudge:
         lo, hi, benches = claim["lo"], claim["hi"], [claim["bench_a"], claim["bench_b"]]
         until = claim["time_until"] if claim["until"] == "time" else self.end()
         if claim["until"] == "contact":
+            require(meeting is not None and meeting["benches"] == benches, f"no contact of benches {benches} is shown")
             until = meeting["time"]
-            require(meeting["benches"] == benches and overlap(*self.two(benches, until)), "no contact of two dragons")
+            require(overlap(*self.two(benches, until)), f"benches {benches} of two dragons do not overlap")
         elif hi is not None:
             require(near is not None and near["benches"] == benches, "the benches of the near time are others")
             require(near["time"] <= until, "the near time is after time_until")
@@ -386,3 +390,8 @@ class PairJudge:
 def read_place(place):
     """Returns the segment, and the coordinate: the sum of one or two numbers."""
     return place[0], sum(map(arb, place[1:]), arb(0))
+
+
+def head_of(near):
+    """Returns the place of the first head in a witness of a distance."""
+    return read_place(near["at"][0][0])

@@ -32,25 +32,57 @@ from judge_claims import EVENTS, Judge, PairJudge, read_place
 from judge_curves import Refused, Undecided, require
 from judge_scene import Scene
 
-# Lines of the certificates of each question, beside the first: any other line is refused.
-LINES = {
-    "events": ("branch", "step", "result", "reached", *EVENTS),
-    "least_clearance": (
-        "branch", "step", "near", "near_obstacle", "contact", "path_end", "least_clearance", "obstacle_clearance"
+# Kinds of lines in the certificates of each question, beside the first: any other line is refused.
+KINDS = {
+    "events": (
+        "branch", "step", "witness point", "witness obstacle point", "stall", "lock", "path_end", "result event"
     ),
-    "greatest_speed": ("branch", "speeds", "fast", "greatest_speed"),
-    "least_pitch": ("reach", "overlap", "head_locks", "far", "step", "least_pitch"),
+    "least_clearance": (
+        "branch", "step", "witness point", "witness at most", "witness obstacle at most", "path_end",
+        "result least_clearance", "result obstacle_clearance"
+    ),
+    "greatest_speed": ("branch", "speeds", "fast", "result greatest_speed"),
+    "least_pitch": ("reach", "overlap", "head_locks", "far", "step", "result least_pitch"),
 }
-# The same lines for two of several dragons.
-LINES_OF_TWO = {
-    "events": ("both", "meeting", "result"),
-    "least_clearance": ("both", "near_both", "meeting", "least_clearance"),
+# The same kinds for two of several dragons.
+KINDS_OF_TWO = {
+    "events": ("both", "witness time point", "result event"),
+    "least_clearance": ("both", "witness time point", "witness time at most", "result least_clearance"),
 }
+
+
+def kind_of(line):
+    """Returns the type of a line, with what a result is of, or with the keys by which witnesses differ."""
+    if line["type"] == "result":
+        return f"result {line.get('of')}"
+    keys = ("obstacle", "time", "point", "at", "most") if line["type"] == "witness" else ()
+    return " ".join([str(line["type"]), *(key for key in keys if line.get(key) is not None)])
+
+
+def check_kinds(lines, known, dragons):
+    """Checks that all lines are of known kinds, and that each witness is about a number of dragons."""
+    for number, line in enumerate(lines, 2):
+        kind = kind_of(line)
+        is_known = kind in known and kind.split()[0] == line["type"]
+        require(is_known, f"line {number} is a {kind}, of which nothing is known here")
+        if line["type"] == "witness":
+            lists = [line[key] for key in ("heads", "spans", "at") if line.get(key) is not None]
+            require(all(len(each) == dragons for each in lists), f"line {number} is not about {dragons} dragons")
+            benches = 1 if "obstacle" in kind else 2
+            require(len(line["benches"]) == benches, f"line {number} does not name {benches} benches")
+
+
+def witness(lines, shows, obstacle=None):
+    """Returns the witness with a `point` or with `most`, of an obstacle or else of two boards, or `None`."""
+    of = [line for line in lines if line["type"] == "witness" and line.get("obstacle") == obstacle]
+    of = [line for line in of if line.get(shows) is not None]
+    require(len(of) <= 1, "two witnesses of the same")
+    return of[0] if of else None
 
 
 def judged(lines, places, seed):
     first = json.loads(lines[0])
-    require(first.get("type") == "certificate" and first.get("format") == 3, "no certificate of format 3")
+    require(first.get("type") == "certificate" and first.get("format") == 4, "no certificate of format 4")
     about = first.get("about", "events")
     file = tomllib.loads(first["scene"])
     lines = [json.loads(text) for text in lines[1:]]
@@ -64,11 +96,11 @@ def judged(lines, places, seed):
 def judged_several(file, about, lines, places, seed):
     """Judges the section of each dragon and of each two."""
     scenes = [Scene({"stage": file.get("stage", {}), **dragon}) for dragon in file["dragons"]]
-    require(about in LINES_OF_TWO, f"nothing is known of the {about} of several dragons")
+    require(about in KINDS_OF_TWO, f"nothing is known of the {about} of several dragons")
     sections = []
     for line in lines:
-        if line["type"] in ("dragon", "pair"):
-            sections.append((line.get("dragons", [line.get("dragon")]), []))
+        if line["type"] == "section":
+            sections.append((line.get("dragons"), []))
         else:
             require(sections, f"a {line['type']} before the first section")
             sections[-1][1].append(line)
@@ -76,21 +108,20 @@ def judged_several(file, about, lines, places, seed):
     require([of for of, _ in sections] == alone + two, "the sections are not of each dragon and each two")
     judge = Judge(scenes[0], seed)
     for of, section in sections:
-        results = [line for line in section if line["type"] not in ("pair", "meeting") and "dragons" in line]
-        require(results and all(line["dragons"] == of for line in results), f"a result of {of} is of others")
+        results = [line for line in section if line["type"] == "result"]
+        require(results and all(line.get("dragons") == of for line in results), f"a result of {of} is of others")
         if len(of) == 1:
             judge.scene = scenes[of[0]]
             judged_one(judge, about, section, places)
             continue
-        require(all(line["type"] in LINES_OF_TWO[about] for line in section), f"an unknown line about {of}")
+        check_kinds(section, KINDS_OF_TWO[about], 2)
         require(len(results) == 1 and section[-1] is results[0], f"the result of {of} is not the last line")
         pair = PairJudge([scenes[k] for k in of], judge.random, judge.counts)
-        found = {line["type"]: line for line in section}
         if about == "events":
             require(results[0]["event"] == "contact", f"a {results[0]['event']} of two dragons")
             pair.contact(results[0], places)
         else:
-            pair.least_clearance(results[0], found.get("near_both"), found.get("meeting"), places)
+            pair.least_clearance(results[0], witness(section, "most"), witness(section, "point"), places)
         both = [line for line in section if line["type"] == "both"]
         for line in judge.random.sample(both, min(places, len(both))):
             pair.span(line)
@@ -98,34 +129,35 @@ def judged_several(file, about, lines, places, seed):
 
 
 def judged_one(judge, about, lines, places):
-    for number, line in enumerate(lines, 2):
-        require(line["type"] in LINES[about], f"line {number} is a {line['type']}, of which nothing is known here")
+    check_kinds(lines, KINDS[about], 1)
     if about == "events":
         judged_events(judge, lines, places)
         return
-    beside = [line for line in lines if line["type"] == "obstacle_clearance"]
+    beside = [line for line in lines if kind_of(line) == "result obstacle_clearance"]
     require(len(beside) == (len(judge.scene.obstacles) if about == "least_clearance" else 0), "a result is missing")
     claim = lines[-1 - len(beside)]
-    require(claim["type"] == about, f"the last line is a {claim['type']}")
+    require(kind_of(claim) == f"result {about}", f"the last line is a {kind_of(claim)}")
     if about == "least_pitch":
         judge.least_pitch(claim, lines, places)
         return
-    found = {line["type"]: line for line in lines}
     if about == "greatest_speed":
-        judge.greatest_speed(claim, found.get("fast"), places)
+        fast = next((line for line in reversed(lines) if line["type"] == "fast"), None)
+        judge.greatest_speed(claim, fast, places)
     else:
         scene = judge.scene
         until = claim["time_until"] if claim["until"] == "time" else float(scene.end().mid())
         if claim["until"] == "contact":
-            until, (i, j) = found["contact"]["to"], found["contact"]["benches"]
-            boards = scene.boards(scene.chain(read_place(until), j + 2))
-            require((i, j) == (claim["bench_a"], claim["bench_b"]) and overlap(boards[i], boards[j]), "no contact")
-            until = float(scene.time_at(read_place(until)).mid())
-        judge.least_clearance(claim, found.get("near"), until * (1 - 1e-9), places)
-        near = {line["obstacle"]: line for line in lines if line["type"] == "near_obstacle"}
+            contact, benches = witness(lines, "point"), [claim["bench_a"], claim["bench_b"]]
+            require(contact is not None and contact["benches"] == benches, f"no contact of benches {benches} is shown")
+            (i, j), place = benches, read_place(contact["heads"][0][1])
+            boards = scene.boards(scene.chain(place, j + 2))
+            require(overlap(boards[i], boards[j]), f"benches {i} and {j} do not overlap")
+            until = float(scene.time_at(place).mid())
+        judge.least_clearance(claim, witness(lines, "most"), until * (1 - 1e-9), places)
         for result in beside:
             until = result["time_until"] if result["until"] == "time" else float(scene.end().mid())
-            judge.obstacle_clearance(result, near.get(result["obstacle"]), until * (1 - 1e-9), places)
+            near = witness(lines, "most", result["obstacle"])
+            judge.obstacle_clearance(result, near, until * (1 - 1e-9), places)
     steps = [line for line in lines if line["type"] in ("step", "speeds")]
     for line in judge.random.sample(steps, min(places, len(steps))):
         judge.span(line)

@@ -9,7 +9,7 @@ use std::io;
 use super::bracket::nearest_shown;
 use super::first_order::When;
 use super::interval::Interval;
-use super::lines::{CertificateLine, CertifiedEvent, Status, WIDE};
+use super::lines::{CertificateLine, CertifiedEvent, CertifiedResult, Status, WIDE, Witness};
 use super::search::{
     AROUND, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, STOPPED, Section, first_line,
 };
@@ -50,7 +50,7 @@ pub fn certify(
     let parts = (dragons.len() * (dragons.len() + 1) / 2) as f64;
     let (mut proved, mut sections, mut done) = (Vec::new(), Vec::new(), 0.0);
     for (number, dragon) in dragons.iter().enumerate() {
-        write(&CertificateLine::Dragon { dragon: number })?;
+        write(&CertificateLine::Section { dragons: vec![number] })?;
         let timeline = Ensemble::alone(dragon.motion.clone()).timeline(&mut |_| progress(done / parts));
         let section = alone((number, dragon), &timeline, (scene, most_steps), &mut *write, &mut |share| {
             progress((done + share) / parts)
@@ -60,7 +60,7 @@ pub fn certify(
         done += 1.0;
     }
     for pair in pairs(dragons.len()) {
-        write(&CertificateLine::Pair { dragons: pair })?;
+        write(&CertificateLine::Section { dragons: pair.to_vec() })?;
         let ends = pair.map(|k| {
             let (timeline, section) = &sections[k];
             Side::new(&dragons[k], timeline.end().event, section.locks, Some(section))
@@ -71,7 +71,7 @@ pub fn certify(
         let mut search = PairSearch::new(ends, Aim::Clear, most_steps, &mut *write);
         let status = search.run(hint, to, &mut |share| progress((done + share) / parts))?;
         let event = CertifiedEvent { event: EventKind::Contact, obstacle: None, dragons: pair.to_vec(), status };
-        write(&CertificateLine::Result(event.clone()))?;
+        write(&CertificateLine::Result(CertifiedResult::Event(event.clone())))?;
         proved.push(event);
         done += 1.0;
     }
@@ -266,10 +266,12 @@ impl PairSearch<'_, '_> {
         let boards = [one.boards[benches[0]], other.boards[benches[1]]];
         let [a, b] = boards.map(|board| board.in_doubles());
         let point: [f64; 2] = overlap_centre(&a, &b).into();
-        let heads = [one.head, other.head];
+        let heads = vec![one.head, other.head];
         let holds = boards.iter().all(|board| board.holds(point.map(Interval::point)))
             && (0..2).all(|k| self.sides[k].has_come(heads[k]));
-        holds.then_some(CertificateLine::Meeting { benches, time, heads, spans: [one.spans, other.spans], point })
+        let (benches, spans, point) = (benches.to_vec(), vec![one.spans, other.spans], Some(point));
+        let (obstacle, time, at, most) = (None, Some(time), Vec::new(), None);
+        holds.then_some(CertificateLine::Witness(Witness { obstacle, benches, time, heads, spans, at, point, most }))
     }
 
     /// Returns the nearest time after `contact` at which it is found, as seconds after it, and the line.

@@ -39,7 +39,7 @@ pub use clearance::{
 };
 pub use lines::{
     About, CertificateLine, CertifiedClearance, CertifiedEvent, CertifiedObstacleClearance, CertifiedPitch,
-    CertifiedSpeed, FORMAT, Links, Status, Step, Until, WIDE,
+    CertifiedResult, CertifiedSpeed, FORMAT, Links, Status, Step, Until, WIDE, Witness,
 };
 pub use place::{Place, Span};
 

@@ -4,11 +4,12 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
+use super::capsule::Spanned;
 use super::place::{Place, Span};
 use bench_dragon_messages::state::EventKind;
 
 /// The version of the file format.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 /// The difference of the two times of a proved event, in seconds, beyond which the search gives the reason.
 pub const WIDE: f64 = 1e-9;
@@ -52,66 +53,8 @@ pub enum CertificateLine<'a> {
     },
     /// A step of the head.
     Step(Step),
-    /// Two boards have a point in common.
-    Contact {
-        /// The two benches, counted from 0.
-        benches: [usize; 2],
-        /// The first place of the head.
-        from: Place,
-        /// The last place of the head.
-        to: Place,
-        /// The spans of the handles from 1 on.
-        spans: Vec<Span>,
-        /// The point, in metres.
-        point: [f64; 2],
-    },
-    /// Two boards are no further apart than a number of metres.
-    Near {
-        /// The two benches, counted from 0, the one nearer the head first.
-        benches: [usize; 2],
-        /// The first place of the head.
-        from: Place,
-        /// The last place of the head.
-        to: Place,
-        /// The spans of the handles from 1 on.
-        spans: Vec<Span>,
-        /// A place of each of these spans, the head's first.
-        at: Vec<Place>,
-        /// The bound, in metres.
-        most: f64,
-    },
-    /// The clearance of an obstacle is no more than a number of metres.
-    NearObstacle {
-        /// The obstacle's number on the stage, the boundary last.
-        obstacle: usize,
-        /// The bench, counted from 0.
-        bench: usize,
-        /// The first place of the head.
-        from: Place,
-        /// The last place of the head.
-        to: Place,
-        /// The spans of the handles from 1 on.
-        spans: Vec<Span>,
-        /// A place of each of these spans, the head's first.
-        at: Vec<Place>,
-        /// The bound, in metres.
-        most: f64,
-    },
-    /// A board is within the keep-out of an obstacle.
-    Reached {
-        /// The obstacle's number on the stage, the boundary last.
-        obstacle: usize,
-        /// The bench, counted from 0.
-        bench: usize,
-        /// The first place of the head.
-        from: Place,
-        /// The last place of the head.
-        to: Place,
-        /// The spans of the handles from 1 on.
-        spans: Vec<Span>,
-        /// A point of the board, in metres.
-        point: [f64; 2],
-    },
+    /// Boards that touch, or that are no further apart than a number of metres.
+    Witness(Witness),
     /// The front product of a link is negative.
     Stall {
         /// The link, counted from 0.
@@ -143,15 +86,10 @@ pub enum CertificateLine<'a> {
     },
     /// The last step has reached the path's end.
     PathEnd,
-    /// The lines about one of several dragons follow.
-    Dragon {
-        /// The dragon, counted from 0.
-        dragon: usize,
-    },
-    /// The lines about two of several dragons follow.
-    Pair {
-        /// The two, counted from 0.
-        dragons: [usize; 2],
+    /// The lines about one of several dragons, or about two, follow.
+    Section {
+        /// The dragon or the two, counted from 0.
+        dragons: Vec<usize>,
     },
     /// No boards of the two dragons touch from one time to another; in a certificate of the least clearance, no link
     /// locks.
@@ -171,40 +109,8 @@ pub enum CertificateLine<'a> {
         #[serde(skip_serializing_if = "no_places")]
         at: [Vec<Place>; 2],
     },
-    /// Two boards of the two dragons are no further apart than a number of metres at a time.
-    NearBoth {
-        /// A bench of each, counted from 0.
-        benches: [usize; 2],
-        /// The time of the show, in seconds.
-        time: f64,
-        /// The spans of both heads at that time.
-        heads: [Span; 2],
-        /// The spans of the handles from 1 on of each.
-        spans: [Vec<Span>; 2],
-        /// A place of each span of each dragon, the heads' first.
-        at: [Vec<Place>; 2],
-        /// The bound, in metres.
-        most: f64,
-    },
-    /// Two boards of the two dragons have a point in common at a time.
-    Meeting {
-        /// A bench of each, counted from 0.
-        benches: [usize; 2],
-        /// The time of the show, in seconds.
-        time: f64,
-        /// The spans of both heads at that time.
-        heads: [Span; 2],
-        /// The spans of the handles from 1 on of each.
-        spans: [Vec<Span>; 2],
-        /// The point, metres of the stage.
-        point: [f64; 2],
-    },
-    /// The result for one kind of event.
-    Result(CertifiedEvent),
-    /// The result for the least clearance.
-    LeastClearance(CertifiedClearance),
-    /// The result for the least clearance of an obstacle.
-    ObstacleClearance(CertifiedObstacleClearance),
+    /// A result.
+    Result(CertifiedResult),
     /// The speeds of all handles over a step of the head.
     Speeds {
         /// The first place of the head.
@@ -225,8 +131,6 @@ pub enum CertificateLine<'a> {
         /// A place of each span, the head's first.
         at: Vec<Place>,
     },
-    /// The result for the greatest speed.
-    GreatestSpeed(CertifiedSpeed),
     /// The question about the least pitch.
     Reach {
         /// The radius that the head is to reach, in metres from the centre.
@@ -270,7 +174,57 @@ pub enum CertificateLine<'a> {
         /// The radius, in metres from the centre.
         radius: f64,
     },
-    /// The result for the least pitch.
+}
+
+/// Two boards of one dragon, a board of each of two, or a board and an obstacle: they have a point in common, or are no
+/// further apart than a number of metres.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Witness {
+    /// The obstacle's number on the stage, the boundary last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<usize>,
+    /// The bench at the obstacle, or the two benches, counted from 0 within their dragons.
+    pub benches: Vec<usize>,
+    /// With two dragons, the time of the show, in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// The spans of the heads: of the dragon, or of the two.
+    pub heads: Vec<Span>,
+    /// The spans of the handles from 1 on of each.
+    pub spans: Vec<Vec<Span>>,
+    /// A place of each span of each dragon, the head's first, for `most`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub at: Vec<Vec<Place>>,
+    /// The common point, in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point: Option<[f64; 2]>,
+    /// The bound, in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most: Option<f64>,
+}
+
+impl Witness {
+    /// Returns a witness about one dragon with the handles from the head's on, without a point or a bound.
+    pub(super) fn of_one(obstacle: Option<usize>, benches: Vec<usize>, head: Span, handles: &[Spanned]) -> Self {
+        let spans = handles[1..].iter().map(|handle| handle.span).collect();
+        let (heads, spans) = (vec![head], vec![spans]);
+        Self { obstacle, benches, time: None, heads, spans, at: Vec::new(), point: None, most: None }
+    }
+}
+
+/// The result of a section, or of a question about one dragon.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "of", rename_all = "snake_case")]
+pub enum CertifiedResult {
+    /// The first event of a kind.
+    Event(CertifiedEvent),
+    /// The least clearance of boards.
+    LeastClearance(CertifiedClearance),
+    /// The least clearance of an obstacle.
+    ObstacleClearance(CertifiedObstacleClearance),
+    /// The greatest speed.
+    GreatestSpeed(CertifiedSpeed),
+    /// The least pitch.
     LeastPitch(CertifiedPitch),
 }
 

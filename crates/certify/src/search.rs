@@ -10,7 +10,7 @@ use super::branch::Branch;
 use super::grid::{GridPoint, place};
 use super::ground::Barrier;
 use super::interval::Interval;
-use super::lines::{CertificateLine, CertifiedEvent, Links, Status, WIDE};
+use super::lines::{CertificateLine, CertifiedEvent, CertifiedResult, Links, Status, WIDE};
 use super::path::ExactPath;
 use super::place::{Place, Span};
 use super::step::{Chain, Claim, Obstacle, Shown};
@@ -192,7 +192,8 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             })
             .collect();
         for event in &events {
-            (self.write)(&CertificateLine::Result(event.clone())).map_err(CertifyError::Write)?;
+            (self.write)(&CertificateLine::Result(CertifiedResult::Event(event.clone())))
+                .map_err(CertifyError::Write)?;
         }
         Ok(Section { events, end: self.at.head, ends_with_path: self.ends_with_path, locks: lock.is_some() })
     }
@@ -204,8 +205,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         let mut progress = |at: f64, used: f64| progress((at / end).max(used).clamp(0.0, 1.0));
         for event in self.given.events {
             match event.kind {
-                EventKind::Contact if event.travelled == 0.0 => self.overlap_at_start(event)?,
-                EventKind::Obstacle if event.travelled == 0.0 => self.at_obstacle_at_start(event)?,
+                EventKind::Contact | EventKind::Obstacle if event.travelled == 0.0 => self.touch_at_start(event)?,
                 EventKind::PathEnd => {
                     let beyond = path_end(&self.chain.exact, self.given.path);
                     self.go_to(event.travelled - self.around(), None, &mut progress)?;
@@ -217,8 +217,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 kind => {
                     self.go_to(event.travelled - self.around(), Some(event), &mut progress)?;
                     match kind {
-                        EventKind::Contact => self.contact(event, &mut progress)?,
-                        EventKind::Obstacle => self.obstacle(event, &mut progress)?,
+                        EventKind::Contact | EventKind::Obstacle => self.touch(event, &mut progress)?,
                         EventKind::Stall => self.stall(event, &mut progress)?,
                         _ => self.lock(event)?,
                     }

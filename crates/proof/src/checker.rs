@@ -1,9 +1,9 @@
 //! The lines of a certificate in their order: which may follow which, and the room that checks each.
 
 use super::Proved;
-use super::events::{Events, LockShown, Whom};
+use super::events::{Events, LockShown};
 use super::greatest::Greatest;
-use super::lines::{About, ParsedLine, ProvedEvent};
+use super::lines::{About, ParsedLine, ProvedEvent, ProvedResult};
 use super::path::Span;
 use super::pitch::Pitch;
 use super::problem::{Checked, Problem, ensure, problem};
@@ -13,7 +13,7 @@ use super::several::{Alone, Pair, PairClaim};
 use super::steps::{Step, Steps};
 
 /// The version of the file format.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 /// The state of the check.
 pub struct Checker {
@@ -121,15 +121,15 @@ impl Checker {
         })
     }
 
-    /// Checks and adds a result of a section. Returns another line.
-    fn add_result(&mut self, line: ParsedLine) -> Checked<Option<ParsedLine>> {
-        match line {
-            ParsedLine::Result(outcome) => {
+    /// Checks and adds a result.
+    fn add_result(&mut self, result: ProvedResult) -> Checked {
+        match result {
+            ProvedResult::Event(outcome) => {
                 let ProvedEvent { event, obstacle, dragons, .. } = &outcome;
                 self.known(Claim::Event(*event), *obstacle, dragons)?.check_event(&outcome)?;
                 self.proved.results.push(outcome);
             }
-            ParsedLine::LeastClearance(outcome) => {
+            ProvedResult::LeastClearance(outcome) => {
                 let known = self.known(Claim::Clearance, None, &outcome.dragons)?;
                 known.check_clearance(&Clearance::from(&outcome))?;
                 match self.alone {
@@ -137,14 +137,21 @@ impl Checker {
                     None => self.proved.least_clearance = Some(outcome),
                 }
             }
-            ParsedLine::ObstacleClearance(outcome) => {
+            ProvedResult::ObstacleClearance(outcome) => {
                 let known = self.known(Claim::Clearance, Some(outcome.obstacle), &outcome.dragons)?;
                 known.check_clearance(&Clearance::from(&outcome))?;
                 self.proved.obstacle_clearances.push(outcome);
             }
-            line => return Ok(Some(line)),
+            ProvedResult::GreatestSpeed(outcome) => {
+                self.greatest.check(self.dragon(), &outcome)?;
+                self.proved.greatest_speed = Some(outcome);
+            }
+            ProvedResult::LeastPitch(outcome) => {
+                begun(&mut self.pitch)?.check(&outcome)?;
+                self.proved.least_pitch = Some(outcome);
+            }
         }
-        Ok(None)
+        Ok(())
     }
 
     /// Ends a section, and adds its counts.
@@ -183,67 +190,39 @@ impl Checker {
         (next[1] < count).then_some(next)
     }
 
-    /// Handles the lines of a scene of several dragons. Returns false for another line.
-    fn add_of_ensemble(&mut self, line: &ParsedLine) -> Checked<bool> {
-        let has_result = self.between.is_some() && self.results() > self.before;
-        let Self { about, scenes, alone, between, .. } = self;
-        if has_result && !matches!(line, ParsedLine::Dragon { .. } | ParsedLine::Pair { .. }) {
-            return Err(problem!("nothing of two dragons can follow their result"));
+    /// Begins the section of a dragon or of two. They are those that follow the section before.
+    fn begin_section(&mut self, dragons: &[usize]) -> Checked {
+        let last = self.between.as_ref().map(|pair| pair.dragons);
+        self.end_section()?;
+        let (alone, count) = (self.alone.as_ref().map_or(0, Vec::len), self.scenes.len());
+        match *dragons {
+            [dragon] if last.is_none() && dragon == alone && alone < count => self.is_in_section = true,
+            [a, b] if alone == count && self.next_pair(last) == Some([a, b]) => self.between = Some(Pair::new([a, b])),
+            _ => return Err(problem!("it is not the section that follows: of each dragon, and then of each two")),
         }
-        match (line, between, alone) {
-            (ParsedLine::Dragon { dragon }, None, _) => {
-                self.end_section()?;
-                let expected = self.alone.as_ref().map_or(0, Vec::len);
-                if *dragon != expected || *dragon >= self.scenes.len() {
-                    return Err(problem!("it is about dragon {dragon}, expected {expected}"));
-                }
-                self.is_in_section = true;
-            }
-            (ParsedLine::Pair { dragons }, between, _) => {
-                let last = between.as_ref().map(|pair| pair.dragons);
-                self.end_section()?;
-                let are_alone_shown = self.alone.as_ref().is_some_and(|alone| alone.len() == self.scenes.len());
-                if !are_alone_shown || self.next_pair(last) != Some(*dragons) {
-                    return Err(problem!("the two dragons are not those that follow"));
-                }
-                self.between = Some(Pair::new(*dragons));
-            }
-            (ParsedLine::Both { from, to, heads, spans: [one, other], apart, at }, Some(pair), Some(_)) => {
-                let claim = match (&about, apart) {
-                    (About::Events, None) => Some(PairClaim { metres: 0.0, at: None }),
-                    (About::Events, Some(_)) => return Err(problem!("`apart` in a certificate of events")),
-                    (_, None) => None,
-                    (_, Some(metres)) => {
-                        Some(PairClaim { metres: *metres, at: Some(at.each_ref().map(Vec::as_slice)) })
-                    }
+        Ok(())
+    }
+
+    /// Checks and adds a line of the section of two dragons. Returns another line.
+    fn add_of_two(&mut self, line: ParsedLine) -> Checked<Option<ParsedLine>> {
+        let (Some(alone), Some(pair)) = (&self.alone, &mut self.between) else { return Ok(Some(line)) };
+        let is_about_events = self.about == About::Events;
+        match line {
+            ParsedLine::Both { from, to, heads, spans: [one, other], apart, at } => {
+                let claim = match apart {
+                    None => is_about_events.then_some(PairClaim { metres: 0.0, at: None }),
+                    Some(_) if is_about_events => return Err(problem!("`apart` in a certificate of events")),
+                    Some(metres) => Some(PairClaim { metres, at: Some(at.each_ref().map(Vec::as_slice)) }),
                 };
-                pair.add_both(scenes, [*from, *to], (*heads, [one, other]), claim)?;
+                pair.add_both(&self.scenes, [from, to], (heads, [&one, &other]), claim)?;
             }
-            (ParsedLine::NearBoth { benches, time, heads, spans: [one, other], at, most }, Some(pair), Some(_)) => {
-                let at = at.each_ref().map(Vec::as_slice);
-                pair.add_near(scenes, (*benches, *time), (*heads, [one, other]), (at, *most))?;
+            ParsedLine::Witness(line) => {
+                pair.add_witness(&self.scenes, is_about_events.then_some(alone.as_slice()), &line)?;
             }
-            (ParsedLine::Meeting { benches, time, heads, spans: [one, other], point }, Some(pair), Some(alone)) => {
-                let alone = (*about == About::Events).then_some(alone.as_slice());
-                pair.add_meeting(scenes, alone, (*benches, *time), (*heads, [one, other]), *point)?;
-            }
-            (ParsedLine::Result(_) | ParsedLine::LeastClearance(_), Some(_), _) => return Ok(false),
-            (
-                ParsedLine::Dragon { .. }
-                | ParsedLine::Both { .. }
-                | ParsedLine::NearBoth { .. }
-                | ParsedLine::Meeting { .. },
-                ..,
-            ) => {
-                return Err(problem!("it is not in a section of two dragons, or not in its place"));
-            }
-            (_, Some(_), _) => return Err(problem!("it is about one dragon, in a section of two")),
-            (_, None, Some(_)) if !self.is_in_section => {
-                return Err(problem!("no line says which dragon it is about"));
-            }
-            _ => return Ok(false),
+            ParsedLine::Result(_) => return Ok(Some(line)),
+            _ => return Err(problem!("it is about one dragon, in a section of two")),
         }
-        Ok(true)
+        Ok(None)
     }
 
     /// Returns true if all results of the question are there.
@@ -264,20 +243,26 @@ impl Checker {
         if self.about != About::Events && self.is_complete() {
             return Err(problem!("nothing can follow the result"));
         }
-        let question = match line {
-            ParsedLine::Result(_) => Some(About::Events),
-            ParsedLine::LeastClearance(_) | ParsedLine::ObstacleClearance(_) => Some(About::LeastClearance),
-            ParsedLine::Speeds { .. } | ParsedLine::Fast { .. } | ParsedLine::GreatestSpeed(_) => {
-                Some(About::GreatestSpeed)
-            }
-            ParsedLine::LeastPitch(_) => Some(About::LeastPitch),
+        let question = match &line {
+            ParsedLine::Result(result) => Some(result.about()),
+            ParsedLine::Speeds { .. } | ParsedLine::Fast { .. } => Some(About::GreatestSpeed),
             _ => None,
         };
         ensure!(!question.is_some_and(|question| question != self.about), "it belongs to another question");
-        if self.add_of_ensemble(&line)? {
-            return Ok(());
+        if let ParsedLine::Section { dragons } = &line {
+            return self.begin_section(dragons);
         }
-        let Some(line) = self.add_result(line)? else { return Ok(()) };
+        let is_in_none = self.alone.is_some() && !self.is_in_section && self.between.is_none();
+        ensure!(!is_in_none, "no line says which dragon it is about");
+        ensure!(
+            self.between.is_none() || self.results() == self.before,
+            "nothing of two dragons can follow their result"
+        );
+        let line = match self.add_of_two(line)? {
+            None => return Ok(()),
+            Some(ParsedLine::Result(result)) => return self.add_result(result),
+            Some(line) => line,
+        };
         let section = self.alone.as_ref().map(Vec::len);
         if let (ParsedLine::Branch { link, from, to, behind }, true) = (&line, self.about != About::LeastPitch) {
             if self.steps.end.is_some() || self.greatest.steps > 0 {
@@ -287,7 +272,7 @@ impl Checker {
             return branches.add((path, team), *link, Span(*from, *to), *behind);
         }
         let so_far = self.results() - self.before;
-        let Self { about, scenes, steps, events, greatest, pitch, proved, .. } = self;
+        let Self { about, scenes, steps, events, greatest, pitch, .. } = self;
         let scene = &scenes[section.unwrap_or(0)];
         if question.is_none() && (events.finish.is_some() || so_far > 0) {
             return Err(problem!("nothing but results can follow a lock, the path's end or a result"));
@@ -301,18 +286,7 @@ impl Checker {
                     None => steps.add(scene, step),
                 }
             }
-            ParsedLine::Near { benches, from, to, spans, at, most } => {
-                events.add_near(scene, steps, Whom::Own(benches), (Span(from, to), &spans, &at), most)
-            }
-            ParsedLine::NearObstacle { obstacle: number, bench, from, to, spans, at, most } => {
-                events.add_near(scene, steps, Whom::Obstacle { number, bench }, (Span(from, to), &spans, &at), most)
-            }
-            ParsedLine::Contact { benches, from, to, spans, point } => {
-                events.add_touch(scene, steps, Whom::Own(benches), (Span(from, to), &spans), point)
-            }
-            ParsedLine::Reached { obstacle: number, bench, from, to, spans, point } => {
-                events.add_touch(scene, steps, Whom::Obstacle { number, bench }, (Span(from, to), &spans), point)
-            }
+            ParsedLine::Witness(line) => events.add_witness(scene, steps, &line),
             ParsedLine::Stall { link, from, to, spans } => events.add_stall(scene, steps, link, Span(from, to), &spans),
             ParsedLine::Branch { .. } => Err(problem!("a branch in a certificate of another question")),
             ParsedLine::Lock { link, to, spans, last, window, beyond } => {
@@ -326,11 +300,6 @@ impl Checker {
             ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
             ParsedLine::Speeds { from, to, spans, at } => greatest.add_step(scene, Span(from, to), &spans, &at),
             ParsedLine::Fast { handle, spans, at } => greatest.add_fast(scene, handle, &spans, &at),
-            ParsedLine::GreatestSpeed(outcome) => {
-                greatest.check(scene, &outcome)?;
-                proved.greatest_speed = Some(outcome);
-                Ok(())
-            }
             ParsedLine::Reach { radius, from, clearance } if *about == About::LeastPitch && pitch.is_none() => {
                 *pitch = Some(Pitch::new(radius, from, clearance)?);
                 Ok(())
@@ -342,18 +311,8 @@ impl Checker {
             }
             ParsedLine::HeadLocks { from, to } => begun(pitch)?.add_lock(scene, from, to),
             ParsedLine::Far { pitch: free, radius } => begun(pitch)?.add_far(scene, free, radius),
-            ParsedLine::Dragon { .. }
-            | ParsedLine::Pair { .. }
-            | ParsedLine::Both { .. }
-            | ParsedLine::NearBoth { .. }
-            | ParsedLine::Meeting { .. }
-            | ParsedLine::Result(_)
-            | ParsedLine::LeastClearance(_)
-            | ParsedLine::ObstacleClearance(_) => Err(problem!("it is not in a section")),
-            ParsedLine::LeastPitch(outcome) => {
-                begun(pitch)?.check(&outcome)?;
-                proved.least_pitch = Some(outcome);
-                Ok(())
+            ParsedLine::Section { .. } | ParsedLine::Both { .. } | ParsedLine::Result(_) => {
+                Err(problem!("it is not in a section of two dragons"))
             }
         }
     }

@@ -1,72 +1,27 @@
 //! Events that happen: Lemma 5 of docs/proofs.md.
 
-use super::boards::{Board, covers};
+use super::boards::Board;
 use super::chain::{Chain, span_is_one};
 use super::first_order::FirstOrder;
-use super::interval::{Interval, Vector};
-use super::lines::EventKind;
+use super::interval::Interval;
+use super::lines::{EventKind, WitnessLine};
 use super::link;
 use super::path::{Place, Span};
 use super::problem::{Checked, ensure, problem};
 use super::results::{Claim, Known, Subject};
 use super::scene::Scene;
-use super::shown::{At, Shown, Witness};
+use super::shown::{At, Shown};
 use super::steps::Steps;
+use super::witness::{Evidence, Whom, Witness, Witnesses};
 
 /// The events that are shown so far.
 #[derive(Default)]
 pub(super) struct Events {
-    /// Two benches that overlap, and a bench at each obstacle that was reached, by its number.
-    touched: Vec<(Option<usize>, Witness)>,
+    witnesses: Witnesses,
     /// A link that has stalled.
     stall: Option<Witness>,
     /// The end of the motion.
     pub finish: Option<Finish>,
-    /// Two benches that are near each other, and benches near obstacles.
-    near: Vec<(Option<usize>, Witness)>,
-}
-
-/// A board and another thing that it touches or is near.
-#[derive(Clone, Copy)]
-pub(super) enum Whom {
-    /// Two boards of the dragon.
-    Own([usize; 2]),
-    /// A board and an obstacle.
-    Obstacle { number: usize, bench: usize },
-}
-
-impl Whom {
-    /// Returns the number of the obstacle.
-    fn obstacle(self) -> Option<usize> {
-        if let Self::Obstacle { number, .. } = self { Some(number) } else { None }
-    }
-
-    fn benches(self) -> [Option<usize>; 2] {
-        match self {
-            Self::Own(benches) => benches.map(Some),
-            Self::Obstacle { bench, .. } => [Some(bench), None],
-        }
-    }
-
-    /// Checks that the boards are listed and share no handle, that there is such an obstacle, and that no witness of
-    /// the same kind precedes.
-    fn check(self, scene: &Scene, earlier: &[(Option<usize>, Witness)], spans: &[Span]) -> Checked {
-        ensure!(
-            earlier.iter().all(|(other, _)| *other != self.obstacle()),
-            "a second line about two boards, or about the same obstacle"
-        );
-        match self {
-            Self::Own([a, b]) => ensure!(
-                a.abs_diff(b) >= 2 && a.max(b) < spans.len(),
-                "benches {a} and {b} share a handle, or are not both listed"
-            ),
-            Self::Obstacle { number, bench } => {
-                ensure!(number < scene.obstacles.len(), "the scene has no obstacle {number}");
-                ensure!(bench < spans.len(), "bench {bench} is not listed");
-            }
-        }
-        Ok(())
-    }
 }
 
 /// The end of a motion.
@@ -127,67 +82,32 @@ fn near_step(scene: &Scene, shown: &Shown, head: Span, (spans, at): (&[Span], &[
 }
 
 impl Events {
-    /// Checks and adds two boards that have a point in common, or a board that has come to an obstacle: Lemma 5,
-    /// *Contact*, and Lemma 9, *Reached*.
+    /// Checks and adds boards that touch, or a board that has come to an obstacle: Lemma 5, *Contact*, and Lemma 9,
+    /// *Reached*. Likewise boards that are no further apart than some metres, or a board as near to an obstacle: Lemmas 6
+    /// and 11, *From above*.
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_touch(
-        &mut self,
-        scene: &Scene,
-        steps: &Steps,
-        whom: Whom,
-        (head, spans): (Span, &[Span]),
-        [x, y]: [f64; 2],
-    ) -> Checked {
-        whom.check(scene, &self.touched, spans)?;
-        let chain = touching_chain(scene, steps, head, spans)?;
-        let point = Vector::new(x, y);
-        let board =
-            |bench: usize| Board::new(&chain.capsules[bench], &chain.capsules[bench + 1], scene.team.size(bench));
-        match whom {
-            Whom::Own(benches) => {
-                for bench in benches {
-                    ensure!(covers(&board(bench), &point), "the point may be outside bench {bench} (Lemma 5)");
-                }
+    pub fn add_witness(&mut self, scene: &Scene, steps: &Steps, line: &WitnessLine) -> Checked {
+        let (whom, ([head], [spans])) = (line.whom()?, line.spans()?);
+        ensure!(!matches!(whom, Whom::Dragon(_)), "it has a time, in a section of one dragon");
+        whom.check(&scene.obstacles, &[spans])?;
+        let most = match line.evidence()? {
+            Evidence::Point(point) => {
+                let chain = touching_chain(scene, steps, head, spans)?;
+                let capsules = &chain.capsules;
+                let board = |_, bench| Board::new(&capsules[bench], &capsules[bench + 1], scene.team.size(bench));
+                whom.check_touch(board, &scene.obstacles, &point)?;
+                None
             }
-            Whom::Obstacle { number, bench } => ensure!(
-                scene.obstacles[number].is_reached_by(&board(bench), &point),
-                "bench {bench} may be clear of obstacle {number} (Lemma 9)"
-            ),
-        }
-        self.touched.push((whom.obstacle(), Witness::of_event(whom.benches(), At::Head(head.0))));
-        Ok(())
-    }
-
-    /// Checks and adds two boards that are no further apart than `most` metres, or a board whose clearance from an
-    /// obstacle is no more: Lemmas 6 and 11, *From above*.
-    ///
-    /// # Errors
-    /// The condition that does not follow.
-    pub fn add_near(
-        &mut self,
-        scene: &Scene,
-        steps: &Steps,
-        whom: Whom,
-        (head, spans, at): (Span, &[Span], &[Place]),
-        most: f64,
-    ) -> Checked {
-        whom.check(scene, &self.near, spans)?;
-        let shown = whom.obstacle().map_or(&steps.apart, |number| &steps.beside[number]);
-        let step = near_step(scene, shown, head, (spans, at))?;
-        let board = |bench: usize| step.board(bench, &scene.team);
-        let clearance = match whom {
-            Whom::Own([a, b]) => {
-                ensure!(a < b, "benches {a} and {b} are not in order");
-                board(a).at_most(&board(b))
+            Evidence::Most(most, [at]) => {
+                let shown = whom.obstacle().map_or(&steps.apart, |number| &steps.beside[number]);
+                let step = near_step(scene, shown, head, (spans, at))?;
+                whom.check_near(|_, bench| step.board(bench, &scene.team), &scene.obstacles, &most)?;
+                Some(most)
             }
-            Whom::Obstacle { number, bench } => scene.obstacles[number].at_most(&board(bench)),
         };
-        let most = Interval::new(most);
-        ensure!(clearance.is_at_most(&most), "the boards may be further apart than it says (Lemmas 6 and 11)");
-        self.near.push((whom.obstacle(), Witness { benches: whom.benches(), most, at: At::Head(head.0) }));
-        Ok(())
+        self.witnesses.add(whom, most, At::Head(head.0))
     }
 
     /// Checks and adds a stall: Lemma 5, *Stall*.
@@ -271,9 +191,8 @@ impl Events {
 
     /// Returns what a section of one dragon has shown about the subject of a result.
     pub fn known<'s>(&self, scene: &'s Scene, steps: &Steps, subject: &Subject) -> Known<'s> {
-        let of_subject = |found: &[(Option<usize>, Witness)]| {
-            found.iter().find(|(obstacle, _)| *obstacle == subject.obstacle).map(|(_, witness)| *witness)
-        };
+        let Self { witnesses, stall, .. } = self;
+        let of = subject.obstacle;
         let (ends, lock) = match self.finish {
             Some(Finish::PathEnd) => (true, None),
             Some(Finish::Lock(lock)) => (false, Some(lock)),
@@ -281,8 +200,8 @@ impl Events {
         };
         let up_to = |end: Option<At>| Shown { end, ..Shown::NOTHING };
         let (shown, event, near) = match (subject.claim, subject.obstacle) {
-            (Claim::Event(EventKind::Contact), _) => (steps.clear, of_subject(&self.touched), None),
-            (Claim::Event(EventKind::Stall), _) => (steps.moving, self.stall, None),
+            (Claim::Event(EventKind::Contact), _) => (steps.clear, witnesses.touched(of), None),
+            (Claim::Event(EventKind::Stall), _) => (steps.moving, *stall, None),
             (Claim::Event(EventKind::Lock), _) => (up_to(steps.end.map(At::Head)), lock, None),
             (Claim::Event(EventKind::PathEnd), _) => {
                 let event = ends.then_some(Witness::of_event([None; 2], At::PathEnd));
@@ -290,10 +209,10 @@ impl Events {
                 return Known { scene, shown, event, near: None, is_whole: lock.is_some(), locks: Vec::new() };
             }
             (Claim::Event(EventKind::Obstacle), number) => {
-                (number.map_or(Shown::NOTHING, |number| steps.free[number]), of_subject(&self.touched), None)
+                (number.map_or(Shown::NOTHING, |number| steps.free[number]), witnesses.touched(of), None)
             }
-            (Claim::Clearance, None) => (steps.apart, of_subject(&self.touched), of_subject(&self.near)),
-            (Claim::Clearance, Some(number)) => (steps.beside[number], None, of_subject(&self.near)),
+            (Claim::Clearance, None) => (steps.apart, witnesses.touched(of), witnesses.near(of)),
+            (Claim::Clearance, Some(number)) => (steps.beside[number], None, witnesses.near(of)),
         };
         let zero = Interval::new(0.0);
         // A lock has happened itself.

@@ -38,6 +38,7 @@ mod speeds;
 mod steps;
 mod team;
 mod unlisted;
+mod witness;
 
 #[cfg(test)]
 mod tests;

@@ -37,38 +37,7 @@ pub(super) enum ParsedLine {
         to: Place,
         behind: Place,
     },
-    Near {
-        benches: [usize; 2],
-        from: Place,
-        to: Place,
-        spans: Vec<Span>,
-        at: Vec<Place>,
-        most: f64,
-    },
-    NearObstacle {
-        obstacle: usize,
-        bench: usize,
-        from: Place,
-        to: Place,
-        spans: Vec<Span>,
-        at: Vec<Place>,
-        most: f64,
-    },
-    Contact {
-        benches: [usize; 2],
-        from: Place,
-        to: Place,
-        spans: Vec<Span>,
-        point: [f64; 2],
-    },
-    Reached {
-        obstacle: usize,
-        bench: usize,
-        from: Place,
-        to: Place,
-        spans: Vec<Span>,
-        point: [f64; 2],
-    },
+    Witness(WitnessLine),
     Stall {
         link: usize,
         from: Place,
@@ -86,11 +55,8 @@ pub(super) enum ParsedLine {
         beyond: Option<Span>,
     },
     PathEnd {},
-    Dragon {
-        dragon: usize,
-    },
-    Pair {
-        dragons: [usize; 2],
+    Section {
+        dragons: Vec<usize>,
     },
     Both {
         from: f64,
@@ -102,24 +68,7 @@ pub(super) enum ParsedLine {
         #[serde(default)]
         at: [Vec<Place>; 2],
     },
-    NearBoth {
-        benches: [usize; 2],
-        time: f64,
-        heads: [Span; 2],
-        spans: [Vec<Span>; 2],
-        at: [Vec<Place>; 2],
-        most: f64,
-    },
-    Meeting {
-        benches: [usize; 2],
-        time: f64,
-        heads: [Span; 2],
-        spans: [Vec<Span>; 2],
-        point: [f64; 2],
-    },
-    Result(ProvedEvent),
-    LeastClearance(ProvedClearance),
-    ObstacleClearance(ProvedObstacleClearance),
+    Result(ProvedResult),
     Speeds {
         from: Place,
         to: Place,
@@ -131,7 +80,6 @@ pub(super) enum ParsedLine {
         spans: Vec<Span>,
         at: Vec<Place>,
     },
-    GreatestSpeed(ProvedSpeed),
     Reach {
         radius: f64,
         from: f64,
@@ -156,7 +104,48 @@ pub(super) enum ParsedLine {
         pitch: f64,
         radius: f64,
     },
+}
+
+/// Boards that touch, or that are no further apart than some metres: two of one dragon or of two, or one and an obstacle.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WitnessLine {
+    #[serde(default)]
+    pub obstacle: Option<usize>,
+    pub benches: Vec<usize>,
+    #[serde(default)]
+    pub time: Option<f64>,
+    pub heads: Vec<Span>,
+    pub spans: Vec<Vec<Span>>,
+    #[serde(default)]
+    pub at: Vec<Vec<Place>>,
+    #[serde(default)]
+    pub point: Option<[f64; 2]>,
+    #[serde(default)]
+    pub most: Option<f64>,
+}
+
+/// A result of a section, or of a question about one dragon.
+#[derive(Deserialize)]
+#[serde(tag = "of", rename_all = "snake_case")]
+pub(super) enum ProvedResult {
+    Event(ProvedEvent),
+    LeastClearance(ProvedClearance),
+    ObstacleClearance(ProvedObstacleClearance),
+    GreatestSpeed(ProvedSpeed),
     LeastPitch(ProvedPitch),
+}
+
+impl ProvedResult {
+    /// Returns the question that the result belongs to.
+    pub fn about(&self) -> About {
+        match self {
+            Self::Event(_) => About::Events,
+            Self::LeastClearance(_) | Self::ObstacleClearance(_) => About::LeastClearance,
+            Self::GreatestSpeed(_) => About::GreatestSpeed,
+            Self::LeastPitch(_) => About::LeastPitch,
+        }
+    }
 }
 
 /// The question that a certificate answers.

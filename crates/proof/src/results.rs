@@ -4,7 +4,8 @@ use super::interval::Interval;
 use super::lines::{About, EventKind, ProvedClearance, ProvedEvent, ProvedObstacleClearance, Status, Until};
 use super::problem::{Checked, ensure, problem};
 use super::scene::Scene;
-use super::shown::{Shown, Witness};
+use super::shown::Shown;
+use super::witness::Witness;
 
 /// The claim of a result.
 #[derive(Clone, Copy, PartialEq)]

@@ -1,22 +1,24 @@
 //! Two of several dragons on the stage: Lemma 12 of docs/proofs.md.
 
 use super::apart::are_apart;
-use super::boards::{Board, covers};
+use super::boards::Board;
 use super::capsule::Capsule;
 use super::chain::{Chain, span_is_one};
 use super::events::{Events, Finish};
 use super::first_order::FirstOrder;
 use super::first_order_board::FirstOrderBoard;
 use super::handle::When;
-use super::interval::{Interval, Vector};
+use super::interval::Interval;
+use super::lines::WitnessLine;
 use super::path::{Place, Span};
 use super::problem::{Checked, ensure, problem};
 use super::results::Known;
 use super::scene::Scene;
-use super::shown::{At, Shown, Witness};
+use super::shown::{At, Shown};
 use super::steps::Steps;
 use super::team::Size;
 use super::unlisted::straight_run;
+use super::witness::{Evidence, Witnesses};
 
 /// Facts that the section of a dragon has shown.
 pub(super) struct Alone {
@@ -59,10 +61,7 @@ pub(super) struct Pair {
     end: Option<f64>,
     /// The stretches that are clear, or that have a number `apart`.
     shown: Shown,
-    /// Two benches that overlap.
-    meeting: Option<Witness>,
-    /// Two benches that are near each other.
-    near: Option<Witness>,
+    witnesses: Witnesses,
     /// Counts for the report.
     pub steps: u64,
     pub links: u64,
@@ -152,7 +151,8 @@ impl Together {
 
 impl Pair {
     pub fn new(dragons: [usize; 2]) -> Self {
-        Self { dragons, end: None, shown: Shown::NOTHING, meeting: None, near: None, steps: 0, links: 0, pairs: 0 }
+        let witnesses = Witnesses::default();
+        Self { dragons, end: None, shown: Shown::NOTHING, witnesses, steps: 0, links: 0, pairs: 0 }
     }
 
     fn scenes<'s>(&self, scenes: &'s [Scene]) -> [&'s Scene; 2] {
@@ -170,7 +170,7 @@ impl Pair {
         (heads, spans): ([Span; 2], [&[Span]; 2]),
         claim: Option<PairClaim>,
     ) -> Checked {
-        ensure!(self.meeting.is_none(), "a step after a contact of the two");
+        ensure!(self.witnesses.touched(None).is_none(), "a step after a contact of the two");
         ensure!(from.is_finite() && to.is_finite() && from < to, "it does not go forward in time");
         match self.end {
             Some(end) if end != from => return Err(problem!("it does not begin when the step before it ended")),
@@ -192,82 +192,56 @@ impl Pair {
         Ok(())
     }
 
-    /// Checks and adds two boards that are no further apart than `most` metres at a time that the steps have come to.
+    /// Checks and adds boards of the two that touch at a time, or that are no further apart than some metres. For boards
+    /// that touch, the sections of both dragons alone, if they are given, must prove that the motions continue until
+    /// then; otherwise the steps of the two.
     ///
     /// # Errors
     /// The condition that does not follow.
-    pub fn add_near(
-        &mut self,
-        scenes: &[Scene],
-        (benches, time): ([usize; 2], f64),
-        (heads, spans): ([Span; 2], [&[Span]; 2]),
-        (at, most): ([&[Place]; 2], f64),
-    ) -> Checked {
-        ensure!(self.near.is_none(), "a second line `near_both`");
-        self.is_reached(time)?;
+    pub fn add_witness(&mut self, scenes: &[Scene], alone: Option<&[Alone]>, line: &WitnessLine) -> Checked {
+        let (whom, (heads, spans)) = (line.whom()?, line.spans()?);
+        let Some(time) = line.time.filter(|time| time.is_finite() && *time >= 0.0) else {
+            return Err(problem!("expected a time of the two, not before the start"));
+        };
+        whom.check(&[], &spans)?;
+        let evidence = line.evidence()?;
+        let alone = alone.filter(|_| matches!(evidence, Evidence::Point(_)));
+        if alone.is_none() {
+            self.is_reached(time)?;
+        }
         let scenes = self.scenes(scenes);
         let together = Together::new(scenes, [time; 2], heads, spans)?;
-        let steps = together.first_order(scenes, [time; 2], at)?;
-        if let Some(k) = (0..2).find(|k| benches[*k] >= spans[*k].len()) {
-            return Err(problem!("bench {} is not listed", benches[k]));
-        }
-        let [one, other] = [0, 1].map(|k| steps[k].board(benches[k], &scenes[k].team));
-        let most = Interval::new(most);
-        ensure!(one.at_most(&other).is_at_most(&most), "the two benches may be further apart than it says (Lemma 6)");
-        self.near = Some(Witness { benches: benches.map(Some), most, at: At::Time(time) });
-        Ok(())
+        let most = match evidence {
+            Evidence::Point(point) => {
+                for (k, dragon) in self.dragons.into_iter().enumerate() {
+                    // Otherwise the motion may have ended with a lock.
+                    let has_come = |Alone { end, ends_with_path, .. }: &Alone| {
+                        *ends_with_path || end.is_some_and(|end| scenes[k].path.in_order(heads[k].1, end))
+                    };
+                    ensure!(
+                        alone.is_none_or(|alone| has_come(&alone[dragon])),
+                        "no step of dragon {dragon} has come there"
+                    );
+                }
+                whom.check_touch(|k, bench| together.board(scenes[k], k, bench), &[], &point)?;
+                None
+            }
+            Evidence::Most(most, at) => {
+                let steps = together.first_order(scenes, [time; 2], at)?;
+                whom.check_near(|k, bench| steps[k].board(bench, &scenes[k].team), &[], &most)?;
+                Some(most)
+            }
+        };
+        self.witnesses.add(whom, most, At::Time(time))
     }
 
     /// Checks that the steps have come to a time: no link has locked until then.
     fn is_reached(&self, time: f64) -> Checked {
-        if time >= 0.0 && self.end.is_some_and(|end| time <= end) {
+        if self.end.is_some_and(|end| time <= end) {
             Ok(())
         } else {
             Err(problem!("the steps of the two have not come to the time"))
         }
-    }
-
-    /// Checks and adds a contact of two boards at a time. The sections of both dragons alone, if they are given, or
-    /// else the steps of the two, must prove that the motions continue until then.
-    ///
-    /// # Errors
-    /// The condition that does not follow.
-    pub fn add_meeting(
-        &mut self,
-        scenes: &[Scene],
-        alone: Option<&[Alone]>,
-        (benches, time): ([usize; 2], f64),
-        (heads, spans): ([Span; 2], [&[Span]; 2]),
-        [x, y]: [f64; 2],
-    ) -> Checked {
-        ensure!(self.meeting.is_none(), "a second contact of the two");
-        ensure!(time.is_finite() && time >= 0.0, "the time is before the start");
-        if alone.is_none() {
-            self.is_reached(time)?;
-        }
-        let (scenes, point) = (self.scenes(scenes), Vector::new(x, y));
-        let together = Together::new(scenes, [time; 2], heads, spans)?;
-        for (k, scene) in scenes.into_iter().enumerate() {
-            // Otherwise the motion may have ended with a lock.
-            let has_come = |Alone { end, ends_with_path, .. }: &Alone| {
-                *ends_with_path || end.is_some_and(|end| scene.path.in_order(heads[k].1, end))
-            };
-            ensure!(
-                alone.is_none_or(|alone| has_come(&alone[self.dragons[k]])),
-                "no step of dragon {} has come there",
-                self.dragons[k]
-            );
-            if benches[k] >= spans[k].len() {
-                return Err(problem!("bench {} is not listed", benches[k]));
-            }
-            ensure!(
-                covers(&together.board(scene, k, benches[k]), &point),
-                "the point may be outside bench {} (Lemma 5)",
-                benches[k]
-            );
-        }
-        self.meeting = Some(Witness::of_event(benches.map(Some), At::Time(time)));
-        Ok(())
     }
 
     /// Returns what the section has shown about the two. `alone` has the facts of all dragons.
@@ -276,8 +250,8 @@ impl Pair {
         Known {
             scene: &scenes[self.dragons[0]],
             shown: self.shown,
-            event: self.meeting,
-            near: self.near,
+            event: self.witnesses.touched(None),
+            near: self.witnesses.near(None),
             is_whole: self.shown.all && self.ends_with_paths(scenes),
             locks: locks.filter(|_| self.end.is_some()).collect(),
         }

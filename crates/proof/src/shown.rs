@@ -1,4 +1,4 @@
-//! The claims that the steps of a section make one after another, and the witnesses of its events.
+//! The claims that the steps of a section make one after another.
 
 use std::fmt::Display;
 
@@ -85,23 +85,5 @@ impl Shown {
     /// Returns true if steps that make the claim have come to a time of the show, in seconds.
     pub fn has_come_to(&self, scene: &Scene, seconds: f64) -> bool {
         self.end.is_some_and(|end| end.has_come_to(scene, seconds))
-    }
-}
-
-/// Benches with which an event has happened, or which are near each other or near an obstacle.
-#[derive(Clone, Copy)]
-pub(super) struct Witness {
-    /// The bench of a link or at an obstacle, or the two.
-    pub benches: [Option<usize>; 2],
-    /// The clearance is no more than these metres.
-    pub most: Interval,
-    /// A moment at which this holds, or one before it. A place before the start means the start.
-    pub at: At,
-}
-
-impl Witness {
-    /// Returns the witness of an event: boards that overlap or have come to an obstacle, or a link.
-    pub fn of_event(benches: [Option<usize>; 2], at: At) -> Self {
-        Self { benches, most: Interval::new(0.0), at }
     }
 }

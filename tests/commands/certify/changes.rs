@@ -22,9 +22,16 @@ fn moved(number: &Value, random: &mut Rng) -> Option<Value> {
 
 /// Returns the index of the first result: the lines before prove it.
 pub fn first_result(lines: &[Value]) -> usize {
-    const RESULTS: [&str; 4] = ["result", "least_clearance", "greatest_speed", "least_pitch"];
-    let is_result = |line: &Value| line["type"].as_str().is_some_and(|kind| RESULTS.contains(&kind));
-    lines.iter().position(is_result).unwrap_or(lines.len())
+    lines.iter().position(|line| line["type"] == "result").unwrap_or(lines.len())
+}
+
+/// Returns a list of spans or places of a line. A line about several dragons has one for each.
+pub fn list<'a>(line: &'a mut Value, name: &str, random: &mut Rng) -> Option<&'a mut Vec<Value>> {
+    let lists = line.get_mut(name)?.as_array_mut()?;
+    // A place begins with a number, a span with a place.
+    let depth = if name == "at" { 1 } else { 2 };
+    let within = (0..depth).try_fold(lists.first()?, |item, _| item.get(0));
+    if within.is_some_and(Value::is_array) { random.choice(lists)?.as_array_mut() } else { Some(lists) }
 }
 
 /// Changes a certificate in one place and returns a description of the change; `None` if nothing changed.
@@ -54,7 +61,7 @@ pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
         }
         2 => {
             // A span is moved.
-            let spans = lines[step].get_mut("spans")?.as_array_mut()?;
+            let spans = list(&mut lines[step], "spans", random)?;
             let span = random.choice(spans.iter_mut())?;
             let by = moved(&span[0][1], random)?.as_f64()? - span[0][1].as_f64()?;
             for end in 0..2 {
@@ -63,12 +70,12 @@ pub fn change(lines: &mut Vec<Value>, random: &mut Rng) -> Option<String> {
             format!("a span in line {}", step + 1)
         }
         3 => {
-            let list = *random.choice(&["spans", "spans", "at", "last"])?;
-            let places = lines[step].get_mut(list)?.as_array_mut()?;
+            let name = *random.choice(&["spans", "spans", "at", "last"])?;
+            let places = list(&mut lines[step], name, random)?;
             if !places.is_empty() {
                 places.remove(random.usize(..places.len()));
             }
-            format!("one of {list} out of line {}", step + 1)
+            format!("one of {name} out of line {}", step + 1)
         }
         4 => {
             drop(lines.remove(index));

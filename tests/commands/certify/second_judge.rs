@@ -168,10 +168,10 @@ fn with(lines: &[Value], edit: impl Fn(usize, &mut Value)) -> Vec<Value> {
     other
 }
 
-/// Returns a certificate with one number of its result, or of the lines of a kind, changed.
+/// Returns a certificate with one number of its result `of` a kind, or of the lines of a kind, changed.
 fn moved(lines: &[Value], kind: &str, field: &str, by: f64) -> Vec<Value> {
     with(lines, |_, line| {
-        if line["type"] == kind {
+        if line["type"] == kind || line["of"] == kind {
             line[field] = json!(line[field].as_f64().unwrap() + by);
         }
     })
@@ -204,7 +204,7 @@ fn false_results(lines: &[Value]) -> Vec<Changed> {
         }
         if event == "contact" {
             change("a contact that is none".to_owned(), &|line| {
-                *line = json!({ "type": "result", "event": "contact", "status": "none" });
+                *line = json!({ "type": "result", "of": "event", "event": "contact", "status": "none" });
             });
         }
     }

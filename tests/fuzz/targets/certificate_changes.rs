@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::bytes::{changed, renumbered};
 use super::certificate::lines_of;
-use super::changes::{change, first_result};
+use super::changes::{change, first_result, list};
 
 /// Changes a certificate.
 pub fn mutate(data: &[u8], random: &mut Rng) -> Vec<u8> {
@@ -84,8 +84,9 @@ fn rearrange(lines: &mut Vec<Value>, random: &mut Rng) {
             if let Some(number) = lines[at][field].as_u64() {
                 lines[at][field] = json!(number.wrapping_add_signed(random.i64(-2..3)) % 1000);
             }
-            if lines[at]["benches"].is_array() {
-                lines[at]["benches"][random.usize(..2)] = json!(random.u8(..5));
+            let benches = lines[at].get_mut("benches").and_then(Value::as_array_mut);
+            if let Some(bench) = benches.and_then(|benches| random.choice(benches)) {
+                *bench = json!(random.u8(..5));
             }
         }
         _ => {
@@ -132,7 +133,7 @@ fn split(lines: &mut Vec<Value>, at: usize, random: &mut Rng) {
 /// Moves the ends of the spans of a line outward, or inward, by a little.
 fn widen(line: &mut Value, random: &mut Rng) {
     let by = 10f64.powi(-random.i32(1..16)) * if random.u8(..4) == 0 { -1.0 } else { 1.0 };
-    for span in line.get_mut("spans").and_then(Value::as_array_mut).into_iter().flatten() {
+    for span in list(line, "spans", random).into_iter().flatten() {
         let (Some(lo), Some(hi)) = (span[0][1].as_f64(), span[1][1].as_f64()) else { continue };
         let sign = if hi < lo { -by } else { by };
         span[0][1] = json!(lo - sign);
@@ -149,14 +150,15 @@ fn conjured(line: &Value, random: &mut Rng) -> Value {
     let point = json!([to[1].as_f64().unwrap_or_default() - length, 0.1 * random.f64()]);
     match random.u8(..13) {
         0 => json!({"type": "path_end"}),
-        1 => json!({"type": "contact", "benches": benches, "from": from, "to": to, "spans": spans, "point": point}),
+        1 => json!({"type": "witness", "benches": benches, "heads": [[from, to]], "spans": [spans], "point": point}),
         2 => json!({"type": "stall", "link": number, "from": from, "to": to, "spans": spans}),
         3 => json!({"type": "lock", "link": 0, "to": to, "spans": [], "last": [], "window": [from, to]}),
         4 => json!({"type": "lock", "link": 0, "to": to, "spans": [], "last": [], "beyond": [from, to]}),
         5 => {
-            json!({"type": "near", "benches": benches, "from": from, "to": to, "spans": spans, "at": at, "most": length})
+            json!({"type": "witness", "benches": benches, "heads": [[from, to]], "spans": [spans], "at": [at],
+            "most": length})
         }
-        6 => json!({"type": "reached", "obstacle": number, "bench": 0, "from": from, "to": to, "spans": spans,
+        6 => json!({"type": "witness", "obstacle": number, "benches": [0], "heads": [[from, to]], "spans": [spans],
             "point": point}),
         7 => json!({"type": "speeds", "from": from, "to": to, "spans": spans, "at": at}),
         8 => json!({"type": "fast", "handle": number, "spans": spans, "at": at}),

@@ -4,10 +4,10 @@
 
 use super::side::{Extent, Side};
 use super::{Aim, PairSearch, Write};
+use crate::CertifyError;
 use crate::clearance::{ClearanceEnclosures, ClearanceHints, Part, certify_part, clearance_first_line};
 use crate::first_order::When;
-use crate::lines::{CertificateLine, CertifiedClearance, Until};
-use crate::{CertifyError, Span};
+use crate::lines::{CertificateLine, CertifiedClearance, CertifiedResult, Until, Witness};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
 use bench_dragon_motion::event::{Event, Progress};
@@ -95,7 +95,7 @@ pub fn certify_clearances(
             // The format has no line for this dragon.
             certify_part(motion, (Part::default(), show_end), hints, most_steps, write, &mut progress)?
         } else {
-            write(&CertificateLine::Dragon { dragon: number })?;
+            write(&CertificateLine::Section { dragons: vec![number] })?;
             let end = own_end(ensemble, number, show_end);
             let alone = Ensemble::alone(motion.clone());
             let mut silent = |_| progress(0.0);
@@ -108,7 +108,7 @@ pub fn certify_clearances(
         done += 1.0;
     }
     for pair in pairs(dragons.len()) {
-        write(&CertificateLine::Pair { dragons: pair })?;
+        write(&CertificateLine::Section { dragons: pair.to_vec() })?;
         let sides = pair.map(|k| {
             let alone = Ensemble::alone(dragons[k].motion.clone());
             let end = alone.timeline_without_contact(&mut |_| progress(done / parts)).end().event;
@@ -266,9 +266,11 @@ impl PairSearch<'_, '_> {
         let stretches = [0, 1].map(|k| self.sides[k].first_order(time, time, Extent::UpTo(benches[k])).ok());
         let [Some(one), Some(other)] = stretches else { return Ok(None) };
         let most = one.first_order[benches[0]].at_most(&other.first_order[benches[1]], When::Always) + SPARE;
-        let (heads, at): ([Span; 2], _) = ([one.head, other.head], [one.at, other.at]);
-        let spans = [one.spans, other.spans];
-        (self.write)(&CertificateLine::NearBoth { benches, time, heads, spans, at, most })?;
+        let (heads, spans) = (vec![one.head, other.head], vec![one.spans, other.spans]);
+        let (benches, time, at) = (benches.to_vec(), Some(time), vec![one.at, other.at]);
+        let (obstacle, point) = (None, None);
+        let witness = Witness { obstacle, benches, time, heads, spans, at, point, most: Some(most) };
+        (self.write)(&CertificateLine::Witness(witness))?;
         Ok(Some(most))
     }
 
@@ -283,6 +285,6 @@ impl PairSearch<'_, '_> {
         let time_until = (until == Until::Time).then_some(time);
         let dragons = dragons.to_vec();
         let result = CertifiedClearance { lo, hi, until, time_until, bench_a, bench_b, dragons };
-        Ok((self.write)(&CertificateLine::LeastClearance(result))?)
+        Ok((self.write)(&CertificateLine::Result(CertifiedResult::LeastClearance(result)))?)
     }
 }

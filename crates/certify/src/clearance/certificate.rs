@@ -4,13 +4,14 @@ use std::io;
 
 use super::beside::{Beside, UpperBeside};
 use super::{Descent, Finish, Part, Upper, Write};
-use crate::capsule::Spanned;
 use crate::first_order::When;
 use crate::first_order_step::{FirstOrderStep, step_points};
 use crate::grid::GridPoint;
 use crate::interval::Interval;
-use crate::lines::{About, CertificateLine, CertifiedClearance, CertifiedObstacleClearance, Links, Until};
-use crate::place::Place;
+use crate::lines::{
+    About, CertificateLine, CertifiedClearance, CertifiedObstacleClearance, CertifiedResult, Links, Until, Witness,
+};
+use crate::place::{Place, Span};
 
 /// An allowance for the rounding of the checker, in metres, which is added to an upper bound.
 const SPARE: f64 = 1e-12;
@@ -33,8 +34,35 @@ impl Descent<'_, '_> {
     pub(super) fn overlap(&self, point: &GridPoint, benches: [usize; 2]) -> Option<CertificateLine<'static>> {
         let handles = self.chain.spans(&mut point.clone(), &mut point.clone(), benches[1] + 1)?;
         let common = self.chain.common_point(&handles, benches)?;
-        let (from, to) = (point.head, point.head);
-        Some(CertificateLine::Contact { benches, from, to, spans: spans_of(&handles), point: common })
+        let head = Span(point.head, point.head);
+        let witness = Witness::of_one(None, benches.to_vec(), head, &handles);
+        Some(CertificateLine::Witness(Witness { point: Some(common), ..witness }))
+    }
+
+    /// Writes that two boards, or a board and an obstacle, are near at a place of the head. Returns the upper bound of
+    /// their clearance.
+    fn write_witness(
+        &mut self,
+        obstacle: Option<usize>,
+        benches: Vec<usize>,
+        head: [Place; 2],
+        travelled: f64,
+    ) -> Option<f64> {
+        let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
+        let mut middle = from.clone();
+        let mut step = FirstOrderStep::new(&self.chain, &step_points(&mut from, &mut middle, &mut to));
+        while step.listed.handles.len() <= benches.last()? + 1 {
+            step.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
+        }
+        let board = step.board(benches[0]);
+        let most = match obstacle {
+            Some(number) => self.chain.barriers[number].at_most(&board, When::Always),
+            None => board.at_most(&step.board(benches[1]), When::Always),
+        } + SPARE;
+        let witness = Witness::of_one(obstacle, benches, Span(head[0], head[1]), &step.listed.handles);
+        let line = CertificateLine::Witness(Witness { at: vec![step.places], most: Some(most), ..witness });
+        self.write(&line);
+        Some(most)
     }
 
     /// Writes that a board is near an obstacle, at a place that the steps have come to. Returns the upper bound.
@@ -45,16 +73,7 @@ impl Descent<'_, '_> {
         if !chain.exact.in_order(head[0], end) || !is_before {
             return None;
         }
-        let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
-        let mut middle = from.clone();
-        let mut step = FirstOrderStep::new(chain, &step_points(&mut from, &mut middle, &mut to));
-        while step.listed.handles.len() <= bench + 1 {
-            step.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
-        }
-        let most = chain.barriers[obstacle].at_most(&step.board(bench), When::Always) + SPARE;
-        let (spans, at, [from, to]) = (spans_of(&step.listed.handles), step.places, head);
-        self.write(&CertificateLine::NearObstacle { obstacle, bench, from, to, spans, at, most });
-        Some(most)
+        self.write_witness(Some(obstacle), vec![bench], head, travelled)
     }
 
     /// Returns the result for an obstacle.
@@ -98,17 +117,7 @@ impl Descent<'_, '_> {
         if !chain.exact.in_order(head[0], end) || !is_before {
             return None;
         }
-        let [mut from, mut to] = head.map(|place| GridPoint::at(place, travelled));
-        let mut middle = from.clone();
-        let mut step = FirstOrderStep::new(chain, &step_points(&mut from, &mut middle, &mut to));
-        while step.listed.handles.len() <= benches[1] + 1 {
-            step.extend(step_points(&mut from, &mut middle, &mut to), Links::All).ok()?;
-        }
-        let [one, other] = benches.map(|bench| step.board(bench));
-        let most = one.at_most(&other, When::Always) + SPARE;
-        let (spans, at) = (spans_of(&step.listed.handles), step.places);
-        self.write(&CertificateLine::Near { benches, from: head[0], to: head[1], spans, at, most });
-        Some(most)
+        self.write_witness(None, benches.to_vec(), head, travelled)
     }
 
     /// Writes the last lines.
@@ -147,15 +156,11 @@ impl Descent<'_, '_> {
                 result.time_until = Some(self.time_of(self.shown.map(|(_, end)| end), head_speed));
             }
         }
-        self.write(&CertificateLine::LeastClearance(result));
+        self.write(&CertificateLine::Result(CertifiedResult::LeastClearance(result)));
         for (obstacle, hi) in beside.into_iter().enumerate() {
             let result = self.result_beside(obstacle, hi, head_speed);
-            self.write(&CertificateLine::ObstacleClearance(result));
+            self.write(&CertificateLine::Result(CertifiedResult::ObstacleClearance(result)));
         }
         self.failed.map_or(Ok(()), Err)
     }
-}
-
-fn spans_of(handles: &[Spanned]) -> Vec<crate::Span> {
-    handles[1..].iter().map(|handle| handle.span).collect()
 }

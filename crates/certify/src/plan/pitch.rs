@@ -10,7 +10,7 @@ use std::io;
 use super::PlanError;
 use super::trial::{Nearest, Obstacle, Proposal, deepest, free_from, obstacle};
 use crate::clearance::Write;
-use crate::lines::{About, CertificateLine, CertifiedPitch};
+use crate::lines::{About, CertificateLine, CertifiedPitch, CertifiedResult};
 use crate::pitch::{Pitches, Reached, head_locks, reaches};
 use crate::place::Span;
 use crate::spaced::Spaced;
@@ -130,7 +130,8 @@ fn written(
         steps.into_iter().try_for_each(|step| write(&CertificateLine::Step(step)))?;
     }
     let value_lo = (intervals > 0).then_some(found.value_lo);
-    write(&CertificateLine::LeastPitch(CertifiedPitch { radius, from, clearance, value_lo, value_hi }))
+    let result = CertifiedPitch { radius, from, clearance, value_lo, value_hi };
+    write(&CertificateLine::Result(CertifiedResult::LeastPitch(result)))
 }
 
 /// A function that proposes the least pitch between two with which the radius might be reached.

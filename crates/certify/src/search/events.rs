@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use super::super::bracket::nearest_shown;
 use super::super::capsule::Spanned;
 use super::super::grid::GridPoint;
-use super::super::lines::{CertificateLine, Links, Status};
+use super::super::lines::{CertificateLine, Links, Status, Witness};
 use super::super::lock::LockWindow;
 use super::super::place::{Place, Span};
 use super::{CertificateSearch, Halt, LEAST, NEAR};
@@ -13,58 +13,87 @@ use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::Event;
 
 impl CertificateSearch<'_, '_> {
-    /// Handles boards that overlap at the start.
-    pub(super) fn overlap_at_start(&mut self, event: &Event) -> Result<(), Halt> {
+    /// Handles boards that overlap at the start, or a board that is at an obstacle from the start.
+    pub(super) fn touch_at_start(&mut self, event: &Event) -> Result<(), Halt> {
         let (mut from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
-        self.clear = false;
-        let status = if let Some((spans, point)) = self.touch(event, &mut from, &mut to) {
-            let benches = benches(event);
-            (self.write)(&CertificateLine::Contact { benches, from: from.head, to: to.head, spans, point })?;
-            let [bench_a, bench_b] = [event.bench_a, event.bench_b].map(|bench| bench.map(|bench| bench as usize));
+        self.claim_no_longer(event);
+        let status = if let Some(witness) = self.witness(event, &mut from, &mut to) {
+            let [bench_a, bench_b] = [0, 1].map(|k| witness.benches.get(k).copied());
+            (self.write)(&CertificateLine::Witness(witness))?;
             Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a, bench_b, because: None }
         } else {
-            let because = "the boards that overlap from the start overlap too little for doubles".to_owned();
-            Status::Undecided { time_lo: 0.0, because }
+            let because = match self.number(event) {
+                None => "the boards that overlap from the start overlap too little for doubles",
+                Some(_) => "the board is so little within the obstacle's keep-out that doubles cannot tell",
+            };
+            Status::Undecided { time_lo: 0.0, because: because.to_owned() }
         };
-        self.proofs[EventKind::Contact as usize] = Some(status);
+        *self.status(event) = Some(status);
         Ok(())
     }
 
-    /// Returns the spans of the handles from 1 on, and a point. Two boards are proved to have this point in common
-    /// while the head is between two grid points. Returns `None` without a proof.
-    fn touch(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
-        let benches = benches(event);
-        let handles = self.chain.spans(from, to, benches[1] + 1)?;
-        let point = self.chain.common_point(&handles, benches)?;
-        Some((handles[1..].iter().map(|handle| handle.span).collect(), point))
+    /// Returns the line that two boards have a point in common, or that a point of a board is within the keep-out of an
+    /// obstacle, while the head is between two grid points. Returns `None` without a proof.
+    fn witness(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<Witness> {
+        let head = Span(from.head, to.head);
+        let obstacle = self.number(event);
+        let bench = event.bench_a.unwrap_or(0) as usize;
+        let benches = if obstacle.is_some() { vec![bench] } else { vec![bench, event.bench_b.unwrap_or(0) as usize] };
+        let handles = self.chain.spans(from, to, benches.last()? + 1)?;
+        let point = match (obstacle, &benches[..]) {
+            (Some(number), _) => self.chain.barriers.get(number)?.reached_by(&self.chain.board(&handles, bench))?,
+            (None, &[a, b]) => self.chain.common_point(&handles, [a, b])?,
+            _ => return None,
+        };
+        Some(Witness { point: Some(point), ..Witness::of_one(obstacle, benches, head, &handles) })
     }
 
-    pub(super) fn contact(
+    /// Handles boards that touch, or a board that comes to an obstacle.
+    pub(super) fn touch(
         &mut self,
         event: &Event,
         progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
     ) -> Result<(), Halt> {
-        if !self.clear {
+        let number = self.number(event);
+        if !number.map_or(self.clear, |number| self.free.contains(&number)) {
             return Ok(());
         }
         let earliest = self.at.head;
-        self.clear = false;
-        let found = self.beyond(event, |search, point| search.touch(event, &mut point.clone(), point));
-        let status = if let Some((point, (spans, common))) = found {
+        self.claim_no_longer(event);
+        let found = self.beyond(event, |search, point| search.witness(event, &mut point.clone(), point));
+        let status = if let Some((point, witness)) = found {
             if let Err(halt) = self.go_to_point(&point, None, progress) {
-                self.proofs[EventKind::Contact as usize] = self.undecided(earliest, &halt);
+                *self.status(event) = self.undecided(earliest, &halt);
                 return Err(halt);
             }
-            let head = point.head;
-            let line = CertificateLine::Contact { benches: benches(event), from: head, to: head, spans, point: common };
-            (self.write)(&line)?;
-            self.proved(event.kind, earliest, head, [event.bench_a, event.bench_b])
+            (self.write)(&CertificateLine::Witness(witness))?;
+            let bench_b = event.bench_b.filter(|_| number.is_none());
+            self.proved(event.kind, earliest, point.head, [event.bench_a, bench_b])
         } else {
-            let because = "doubles cannot tell whether the boards touch that come so near".to_owned();
-            Status::Undecided { time_lo: self.time(earliest).lo, because }
+            let because = match number {
+                None => "doubles cannot tell whether the boards touch that come so near",
+                Some(_) => "doubles cannot tell whether the board meets the obstacle that it comes so near",
+            };
+            Status::Undecided { time_lo: self.time(earliest).lo, because: because.to_owned() }
         };
-        self.proofs[EventKind::Contact as usize] = Some(status);
+        *self.status(event) = Some(status);
         Ok(())
+    }
+
+    /// Lets the steps from here on claim nothing of a contact, or of an obstacle.
+    fn claim_no_longer(&mut self, event: &Event) {
+        match self.number(event) {
+            Some(number) => self.free.retain(|other| *other != number),
+            None => self.clear = false,
+        }
+    }
+
+    /// Returns the result for an event.
+    fn status(&mut self, event: &Event) -> &mut Option<Status> {
+        match self.number(event) {
+            Some(number) => &mut self.of_obstacles[number],
+            None => &mut self.proofs[event.kind as usize],
+        }
     }
 
     /// Returns the status of an event for which the search halts on its way from `earliest` to the event. The steps of
@@ -76,59 +105,8 @@ impl CertificateSearch<'_, '_> {
 
     /// Returns the number of an event's obstacle on the stage.
     fn number(&self, event: &Event) -> Option<usize> {
-        (event.bench_b? as usize).checked_sub(self.given.team.benches + 1)
-    }
-
-    /// Returns the spans of the handles from 1 on, and a point of the board. This point is proved to be within the
-    /// keep-out while the head is between two grid points. Returns `None` without a proof.
-    fn reach(&self, event: &Event, from: &mut GridPoint, to: &mut GridPoint) -> Option<(Vec<Span>, [f64; 2])> {
-        let (bench, number) = (event.bench_a? as usize, self.number(event)?);
-        let handles = self.chain.spans(from, to, bench + 1)?;
-        let point = self.chain.barriers.get(number)?.reached_by(&self.chain.board(&handles, bench))?;
-        Some((handles[1..].iter().map(|handle| handle.span).collect(), point))
-    }
-
-    /// Handles a board that is at an obstacle from the start.
-    pub(super) fn at_obstacle_at_start(&mut self, event: &Event) -> Result<(), Halt> {
-        let Some(obstacle) = self.number(event) else { return Ok(()) };
-        let (mut from, mut to) = (self.at.clone(), self.grid_point(LEAST * (1.0 + self.given.path.length())));
-        self.free.retain(|other| *other != obstacle);
-        let bench = event.bench_a.unwrap_or(0) as usize;
-        let status = if let Some((spans, point)) = self.reach(event, &mut from, &mut to) {
-            (self.write)(&CertificateLine::Reached { obstacle, bench, from: from.head, to: to.head, spans, point })?;
-            Status::Proved { time_lo: 0.0, time_hi: 0.0, bench_a: Some(bench), bench_b: None, because: None }
-        } else {
-            let because = "the board is so little within the obstacle's keep-out that doubles cannot tell".to_owned();
-            Status::Undecided { time_lo: 0.0, because }
-        };
-        self.of_obstacles[obstacle] = Some(status);
-        Ok(())
-    }
-
-    pub(super) fn obstacle(
-        &mut self,
-        event: &Event,
-        progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
-    ) -> Result<(), Halt> {
-        let Some(obstacle) = self.number(event).filter(|number| self.free.contains(number)) else { return Ok(()) };
-        let earliest = self.at.head;
-        self.free.retain(|other| *other != obstacle);
-        let bench = event.bench_a.unwrap_or(0) as usize;
-        let found = self.beyond(event, |search, point| search.reach(event, &mut point.clone(), point));
-        let status = if let Some((reached, (spans, point))) = found {
-            if let Err(halt) = self.go_to_point(&reached, None, progress) {
-                self.of_obstacles[obstacle] = self.undecided(earliest, &halt);
-                return Err(halt);
-            }
-            let head = reached.head;
-            (self.write)(&CertificateLine::Reached { obstacle, bench, from: head, to: head, spans, point })?;
-            self.proved(event.kind, earliest, head, [event.bench_a, None])
-        } else {
-            let because = "doubles cannot tell whether the board meets the obstacle that it comes so near".to_owned();
-            Status::Undecided { time_lo: self.time(earliest).lo, because }
-        };
-        self.of_obstacles[obstacle] = Some(status);
-        Ok(())
+        let number = (event.bench_b? as usize).checked_sub(self.given.team.benches + 1);
+        number.filter(|number| event.kind == EventKind::Obstacle && *number < self.of_obstacles.len())
     }
 
     pub(super) fn stall(
@@ -214,9 +192,4 @@ impl CertificateSearch<'_, '_> {
         });
         found.map(|(_, found)| found)
     }
-}
-
-/// Returns the two benches of a contact.
-fn benches(event: &Event) -> [usize; 2] {
-    [event.bench_a, event.bench_b].map(|bench| bench.unwrap_or(0) as usize)
 }

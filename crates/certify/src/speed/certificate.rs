@@ -7,7 +7,7 @@ use crate::capsule::Spanned;
 use crate::clearance::Write;
 use crate::grid::{GridPoint, fine_place};
 use crate::interval::Interval;
-use crate::lines::{About, CertificateLine, CertifiedSpeed};
+use crate::lines::{About, CertificateLine, CertifiedResult, CertifiedSpeed};
 use crate::place::Place;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::event::Progress;
@@ -64,7 +64,7 @@ pub fn certify_greatest_ratio(
     let time = Interval::point(travelled).over(Interval::point(motion.head_speed())).lo * (1.0 - 1e-15);
     let (handle, time_until) = (found.handle, time.max(0.0));
     let result = CertifiedSpeed { limit, value_lo, value_hi, ratio_lo, ratio_hi, handle, time_until };
-    write(&CertificateLine::GreatestSpeed(result))?;
+    write(&CertificateLine::Result(CertifiedResult::GreatestSpeed(result)))?;
     Ok(GreatestRatio { lo: ratio_lo, hi: ratio_hi, ..found })
 }
 

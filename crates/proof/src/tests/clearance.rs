@@ -18,8 +18,8 @@ fn near(metres: f64, most: f64) -> Value {
         .map(|(handle, (back, _))| (back, 1e-10 * (handle + 1) as f64))
         .map(|(back, more)| json!([place(metres - back - more), place(metres - back + more)]))
         .collect();
-    json!({"type": "near", "benches": [0, 2], "from": place(metres), "to": place(metres), "spans": spans,
-        "at": at(metres), "most": most})
+    json!({"type": "witness", "benches": [0, 2], "heads": [[place(metres), place(metres)]], "spans": [spans],
+        "at": [at(metres)], "most": most})
 }
 
 /// Returns the step from `from` to `to`, in which boards are further apart than `apart`.
@@ -47,7 +47,8 @@ fn clearance(apart: f64, most: f64) -> Vec<Value> {
     lines.push(near(3.1, most));
     lines.push(json!({"type": "path_end"}));
     lines.push(
-        json!({"type": "least_clearance", "lo": apart, "hi": most, "until": "path_end", "bench_a": 0, "bench_b": 2}),
+        json!({"type": "result", "of": "least_clearance", "lo": apart, "hi": most, "until": "path_end", "bench_a": 0,
+            "bench_b": 2}),
     );
     lines
 }
@@ -60,7 +61,8 @@ fn the_clearance_of_a_straight_team_is_accepted() {
     assert_eq!((proved.steps, proved.results.len()), (101, 0));
     // A time before the path's end, 5 s; and nothing about an upper bound.
     let mut lines = clearance(1.4, 1.6);
-    lines[RESULT - 1] = json!({"type": "least_clearance", "lo": 1.3, "until": "time", "time_until": 4.99});
+    lines[RESULT - 1] =
+        json!({"type": "result", "of": "least_clearance", "lo": 1.3, "until": "time", "time_until": 4.99});
     check(&lines).unwrap();
 }
 
@@ -69,8 +71,8 @@ fn the_clearance_of_a_straight_team_is_accepted() {
 fn a_near_place_after_the_stated_time_is_refused() {
     let until = |time: f64| {
         let mut lines = clearance(1.4, 1.6);
-        lines[RESULT - 1] = json!({"type": "least_clearance", "lo": 1.4, "hi": 1.6, "until": "time", "time_until": time,
-            "bench_a": 0, "bench_b": 2});
+        lines[RESULT - 1] = json!({"type": "result", "of": "least_clearance", "lo": 1.4, "hi": 1.6, "until": "time",
+            "time_until": time, "bench_a": 0, "bench_b": 2});
         lines
     };
     // The head goes 2 m/s: it comes to the near place at 1.55 s.

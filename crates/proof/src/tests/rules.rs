@@ -43,13 +43,18 @@ pub(super) fn step(from: f64, to: f64) -> Value {
 }
 
 pub(super) fn certificate() -> Vec<Value> {
-    let mut lines = vec![json!({"type": "certificate", "format": 3, "version": "0.1.0", "scene": SCENE})];
+    let mut lines = vec![json!({"type": "certificate", "format": 4, "version": "0.1.0", "scene": SCENE})];
     let ends = [-0.5, 0.3, 1.3, 2.3, 3.3, 4.3, 5.3, 6.3, 7.3, 8.3, 9.3, 10.0];
     lines.extend(ends.windows(2).map(|ends| step(ends[0], ends[1])));
     lines.push(json!({"type": "path_end"}));
-    lines.extend(["contact", "stall", "lock"].map(|event| json!({"type": "result", "event": event, "status": "none"})));
-    lines.push(json!({"type": "result", "event": "path_end", "status": "proved", "time_lo": 5.0, "time_hi": 5.0,
-        "bench_a": null, "bench_b": null}));
+    lines.extend(
+        ["contact", "stall", "lock"]
+            .map(|event| json!({"type": "result", "of": "event", "event": event, "status": "none"})),
+    );
+    lines.push(
+        json!({"type": "result", "of": "event", "event": "path_end", "status": "proved", "time_lo": 5.0, "time_hi": 5.0,
+        "bench_a": null, "bench_b": null}),
+    );
     lines
 }
 
@@ -84,7 +89,7 @@ fn what_follows_is_accepted() {
     check(&changed(|lines| {
         lines[16]["time_lo"] = json!(4.9);
         lines[13] =
-            json!({"type": "result", "event": "contact", "status": "undecided", "time_lo": 5.0, "because": "-"});
+            json!({"type": "result", "of": "event", "event": "contact", "status": "undecided", "time_lo": 5.0, "because": "-"});
     }))
     .unwrap();
     // Handles on the line behind the start need not be listed.
@@ -155,7 +160,7 @@ fn what_does_not_follow_is_refused() {
     refused(16, "a time is missing", &|lines| lines[16]["time_lo"] = json!(null));
     refused(16, "benches", &|lines| lines[16]["bench_a"] = json!(0));
     refused(13, "time_lo does not follow", &|lines| {
-        lines[13] = json!({"type": "result", "event": "contact", "status": "undecided", "time_lo": 5.000000000000001});
+        lines[13] = json!({"type": "result", "of": "event", "event": "contact", "status": "undecided", "time_lo": 5.000000000000001});
     });
     for line in 13..15 {
         refused(line, "status proved does not follow", &|lines| {
@@ -174,7 +179,7 @@ fn what_does_not_follow_is_refused() {
     refused(1, "missing field", &|lines| drop(lines[1].as_object_mut().unwrap().remove("clear")));
     refused(0, "first line", &|lines| lines.drain(..1).for_each(drop));
     refused(1, "second first line", &|lines| lines.insert(1, lines[0].clone()));
-    refused(0, "format 4", &|lines| lines[0]["format"] = json!(4));
+    refused(0, "format 3", &|lines| lines[0]["format"] = json!(3));
     refused(5, "", &|lines| lines[5]["to"] = json!([1, null]));
     refused(5, "", &|lines| lines[5]["to"] = json!([-1, 2.0]));
     refused(5, "", &|lines| lines[5]["to"] = json!([1, 2.0, 3.0]));
@@ -213,14 +218,9 @@ fn another_scene_is_refused() {
 #[test]
 fn events_outside_the_motion_are_refused() {
     let contact = |from: f64, to: f64| {
-        let mut line = step(from, to);
-        for field in ["links", "moving", "clear"] {
-            line.as_object_mut().unwrap().remove(field);
-        }
-        line["type"] = json!("contact");
-        line["benches"] = json!([0, 2]);
-        line["point"] = json!([0.0, 0.0]);
-        line
+        let spans = &step(from, to)["spans"];
+        json!({"type": "witness", "benches": [0, 2], "heads": [[place(from), place(to)]], "spans": [spans],
+            "point": [0.0, 0.0]})
     };
     assert_refused(&changed(|lines| lines.insert(1, contact(-0.5, -0.4))), 2, "has not come to the start");
     assert_refused(&changed(|lines| lines.insert(1, contact(0.1, 0.4))), 2, "begins beyond the start");
