@@ -10,10 +10,8 @@ use super::bracket::nearest_shown;
 use super::first_order::When;
 use super::interval::Interval;
 use super::lines::{CertificateLine, CertifiedEvent, CertifiedResult, Status, WIDE, Witness};
-use super::search::{
-    AROUND, CertificateSearch, GROWTH, LEAST, LEAST_STEP, MOST_SPANS, NEAR, SHRINK, STOPPED, Section, first_line,
-};
-use super::walk::Stride;
+use super::search::{AROUND, CertificateSearch, LEAST, LEAST_STEP, MOST_SPANS, NEAR, Section, first_line};
+use super::walk::{Next, Walk, Walker, Way};
 use super::{CertifyError, Given, certify_alone, ground};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::ensemble::{Dragon, Ensemble, pairs};
@@ -122,16 +120,15 @@ struct PairSearch<'a, 'w> {
     shown: Option<f64>,
     /// The time up to which stretches have come, in seconds.
     time: f64,
-    /// The next step to try, in seconds; any step at first.
-    stride: Option<Stride>,
-    steps: u64,
-    most_steps: u64,
+    /// The state of the walk; its lengths are seconds.
+    walk: Walk,
     write: Write<'w>,
 }
 
 impl<'a, 'w> PairSearch<'a, 'w> {
     fn new(sides: [Side<'a>; 2], aim: Aim, most_steps: u64, write: Write<'w>) -> Self {
-        Self { sides, aim, upper: None, shown: None, time: 0.0, stride: None, steps: 0, most_steps, write }
+        let walk = Walk::new(longest_step(&sides, 0.0), most_steps);
+        Self { sides, aim, upper: None, shown: None, time: 0.0, walk, write }
     }
 }
 
@@ -190,47 +187,7 @@ impl PairSearch<'_, '_> {
 
     /// Goes to a time in steps. Returns the reason if it stopped before.
     fn go_to(&mut self, to: f64, progress: Progress<'_>) -> Result<Option<String>, CertifyError> {
-        while self.time < to {
-            if progress((self.time / to).clamp(0.0, 1.0)).is_break() {
-                return Ok(Some(STOPPED.to_owned()));
-            }
-            let moving = || self.sides.iter().filter(|side| side.is_moving(self.time));
-            let of_link = |side: &Side| side.seconds(side.chain.team.shortest_link());
-            let longest = moving().map(of_link).fold(f64::INFINITY, f64::min);
-            let least = moving().map(|side| side.seconds(LEAST_STEP * (1.0 + side.chain.path.length())));
-            let least = least.fold(4.0 * f64::EPSILON * self.time, f64::max);
-            let mut stride = self.stride.unwrap_or(Stride::new(0.25 * longest, GROWTH));
-            // While no dragon moves, a step must not cross the next start, but any length up to there is valid.
-            let starts = self.sides.iter().map(|side| side.delay).filter(|start| *start > self.time);
-            let until = if longest.is_finite() { to } else { starts.fold(to, f64::min) };
-            // To the first order, a dragon that begins or ends to move would cost a factor of accuracy.
-            let is_close = matches!(self.aim, Aim::Apart(_));
-            let breaks = self.sides.iter().flat_map(Side::breaks).filter(|time| is_close && *time > self.time);
-            let until = breaks.fold(until, f64::min);
-            let remaining = until - self.time;
-            stride.limit(longest.min(remaining));
-            let length = stride.within(remaining);
-            let next = if stride.is_to_target(remaining) { until } else { self.time + length };
-            match self.show_until(next) {
-                Ok(line) => {
-                    (self.write)(&line)?;
-                    if let Aim::Apart(metres) = self.aim {
-                        self.shown = Some(self.shown.map_or(metres, |least| least.min(metres)));
-                    }
-                    self.time = next;
-                    stride.grow(f64::INFINITY);
-                }
-                Err(Refused::Pair(benches)) if self.lower(0.5 * (self.time + next), benches) => {}
-                Err(refused) if length <= least => return Ok(Some(sentence(&refused))),
-                Err(_) => stride.shrink(SHRINK, remaining),
-            }
-            self.stride = Some(stride);
-            self.steps += 1;
-            if self.steps > self.most_steps {
-                return Ok(Some(format!("the search was given up after {} steps", self.steps)));
-            }
-        }
-        Ok(None)
+        Ok(self.walk_to(to, |search| progress((search.time / to).clamp(0.0, 1.0)))?)
     }
 
     /// Returns the certificate line of both dragons from `self.time` to `to`.
@@ -293,5 +250,51 @@ impl PairSearch<'_, '_> {
             .then(|| "the boards meet so slowly that rounding hides the contact for so long".to_owned());
         let [bench_a, bench_b] = benches.map(Some);
         Ok(Status::Proved { time_lo, time_hi, bench_a, bench_b, because })
+    }
+}
+
+/// Returns the least seconds in which a head that moves travels its shortest link; infinity while none moves.
+fn longest_step(sides: &[Side; 2], time: f64) -> f64 {
+    let moving = sides.iter().filter(|side| side.is_moving(time));
+    moving.map(|side| side.seconds(side.chain.team.shortest_link())).fold(f64::INFINITY, f64::min)
+}
+
+impl Walker<f64> for PairSearch<'_, '_> {
+    fn walk(&mut self) -> &mut Walk {
+        &mut self.walk
+    }
+
+    fn way(&self, to: f64) -> Option<Way<f64>> {
+        let longest = longest_step(&self.sides, self.time);
+        let moving = self.sides.iter().filter(|side| side.is_moving(self.time));
+        let least = moving.map(|side| side.seconds(LEAST_STEP * (1.0 + side.chain.path.length())));
+        let least = least.fold(4.0 * f64::EPSILON * self.time, f64::max);
+        // While no dragon moves, a step must not cross the next start, but any length up to there is valid.
+        let starts = self.sides.iter().map(|side| side.delay).filter(|start| *start > self.time);
+        let until = if longest.is_finite() { to } else { starts.fold(to, f64::min) };
+        // To the first order, a dragon that begins or ends to move would cost a factor of accuracy.
+        let is_close = matches!(self.aim, Aim::Apart(_));
+        let breaks = self.sides.iter().flat_map(Side::breaks).filter(|time| is_close && *time > self.time);
+        let until = breaks.fold(until, f64::min);
+        let remaining = until - self.time;
+        (self.time < to).then_some(Way { to: until, remaining, longest: longest.min(remaining), least })
+    }
+
+    fn step(&mut self, until: f64, length: Option<f64>, is_least: bool) -> io::Result<Next> {
+        let to = length.map_or(until, |length| self.time + length);
+        self.walk.steps += 1;
+        Ok(match self.show_until(to) {
+            Ok(line) => {
+                (self.write)(&line)?;
+                if let Aim::Apart(metres) = self.aim {
+                    self.shown = Some(self.shown.map_or(metres, |least| least.min(metres)));
+                }
+                self.time = to;
+                Next::Longer
+            }
+            Err(Refused::Pair(benches)) if self.lower(0.5 * (self.time + to), benches) => Next::Same,
+            Err(refused) if is_least => Next::End(Some(sentence(&refused))),
+            Err(_) => Next::Shorter,
+        })
     }
 }

@@ -22,7 +22,7 @@ use super::path::ExactPath;
 use super::place::Place;
 use super::search::{LEAST, path_end};
 use super::step::{Chain, Obstacle};
-use super::walk::{Covered, Stride};
+use super::walk::{Covered, Walk};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::contact::LeastClearance;
@@ -142,9 +142,7 @@ pub(super) struct Descent<'a, 'w> {
     finish: Option<Finish>,
     at: GridPoint,
     covered: Covered,
-    stride: Stride,
-    steps: u64,
-    most_steps: u64,
+    walk: Walk,
     /// The travel at the end of the show, in metres.
     end: f64,
     /// The travel up to which a place may show an upper bound, in metres.
@@ -183,9 +181,9 @@ enum Finish {
 impl<'a, 'w> Descent<'a, 'w> {
     /// Creates a search from the start to `end`, metres of travel. `write` receives each step that is shown.
     pub fn new(chain: Chain<'a>, end: f64, most_steps: u64, write: Option<Write<'w>>) -> Self {
-        let stride = Stride::new(0.25 * chain.team.shortest_link(), steps::GROWTH);
         let at = GridPoint::at(Place(0, 0.0, 0.0), 0.0);
         let beside = vec![Beside::default(); chain.barriers.len()];
+        let walk = Walk::new(chain.team.shortest_link(), most_steps);
         let mut descent = Self {
             chain,
             write,
@@ -194,9 +192,7 @@ impl<'a, 'w> Descent<'a, 'w> {
             finish: None,
             at,
             covered: Covered::new(),
-            stride,
-            steps: 0,
-            most_steps,
+            walk: Walk { growth: steps::GROWTH, shrinks: steps::SHRINKS, ..walk },
             end,
             latest: end,
             upper: None,
@@ -401,7 +397,7 @@ impl<'a, 'w> Descent<'a, 'w> {
 
     fn enclosed(&self, upper: Upper, until: Option<f64>) -> ClearanceEnclosure {
         let Upper { value: hi, travelled, benches: [bench_a, bench_b], .. } = upper;
-        ClearanceEnclosure { lo: self.threshold(), hi, travelled, bench_a, bench_b, until, steps: self.steps }
+        ClearanceEnclosure { lo: self.threshold(), hi, travelled, bench_a, bench_b, until, steps: self.walk.steps }
     }
 
     /// Returns an upper bound of the clearance of two boards with the head anywhere between two places.

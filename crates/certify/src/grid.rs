@@ -4,6 +4,7 @@
 use super::interval::Interval;
 use super::path::ExactPath;
 use super::place::{Place, Span};
+use super::step::Chain;
 use bench_dragon_motion::linkage::{NoFollower, follower, link_pose};
 use bench_dragon_motion::model::curve::Coordinate;
 use bench_dragon_motion::model::path::{Param, Path};
@@ -54,9 +55,10 @@ impl GridPoint {
         points.find(|point| holds(exact.travelled(point.head)))
     }
 
-    /// Returns the grid point some metres further on. If they are less than the distance of two doubles, it is at the
-    /// next one: a step leads on.
-    pub fn further(&self, path: &Path, exact: &ExactPath, metres: f64) -> Self {
+    /// Returns the grid point some metres further on; without a length, the target. If the metres are less than the
+    /// distance of two doubles, it is at the next one: a step leads on.
+    pub fn towards(&self, target: &Self, metres: Option<f64>, Chain { path, exact, .. }: &Chain) -> Self {
+        let Some(metres) = metres else { return target.clone() };
         let to = Self::new(path, exact, self.travelled + metres);
         if exact.is_before(self.head, to.head) {
             return to;

@@ -14,7 +14,7 @@ use super::lines::{CertificateLine, CertifiedEvent, CertifiedResult, Links, Stat
 use super::path::ExactPath;
 use super::place::{Place, Span};
 use super::step::{Chain, Claim, Obstacle, Shown};
-use super::walk::{Covered, Stride};
+use super::walk::{Covered, Next, Walk, Walker, Way};
 use super::{CertifyError, Given};
 use bench_dragon_messages::state::EventKind;
 use bench_dragon_motion::event::{Event, Progress};
@@ -31,10 +31,6 @@ const OF_TIMES: f64 = 1e-14;
 
 /// The shortest step, as a share of the path length in metres.
 pub(super) const LEAST_STEP: f64 = 2e-15;
-
-/// The factors of the length of a step after one that is shown, and after one that is not.
-pub(super) const GROWTH: f64 = 1.3;
-pub(super) const SHRINK: f64 = 0.5;
 
 /// Limit of the spans in the steps about one dragon: some 400 MB.
 pub(super) const MOST_SPANS: usize = 10_000_000;
@@ -60,8 +56,7 @@ pub(super) struct CertificateSearch<'a, 'w> {
     /// The obstacles that steps still claim to avoid, and the result of each obstacle.
     free: Vec<usize>,
     of_obstacles: Vec<Option<Status>>,
-    stride: Stride,
-    steps: u64,
+    walk: Walk,
     /// Spans that were written.
     written: usize,
 }
@@ -74,9 +69,6 @@ pub(super) struct Section {
     pub ends_with_path: bool,
     pub locks: bool,
 }
-
-/// The reason for an undecided result where the receiver of the progress has stopped the search.
-pub(super) const STOPPED: &str = "the search was stopped there";
 
 /// Writes the first line of a certificate of events.
 pub(super) fn first_line(
@@ -114,7 +106,6 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         // The steps begin a little before the start: a motion that begins earlier includes this one.
         let before = -LEAST * (1.0 + given.path.length());
         let at = GridPoint::new(given.path, &chain.exact, before);
-        let stride = Stride::new(0.25 * given.team.shortest_link(), GROWTH);
         let proofs = [const { None }; 4];
         let (free, of_obstacles) = ((0..chain.barriers.len()).collect(), chain.barriers.iter().map(|_| None).collect());
         Self {
@@ -130,8 +121,7 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             ends_with_path: false,
             free,
             of_obstacles,
-            stride,
-            steps: 0,
+            walk: Walk::new(given.team.shortest_link(), given.most_steps),
             written: 0,
         }
     }
@@ -284,54 +274,18 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
         event: Option<&Event>,
         progress: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
     ) -> Result<(), Halt> {
-        let least = LEAST_STEP * (1.0 + self.given.path.length());
-        let longest = self.given.team.shortest_link();
-        while self.chain.exact.is_before(self.at.head, target.head) {
-            if progress(self.at.travelled, self.used()).is_break() {
-                return Err(Halt::Stuck(STOPPED.to_owned()));
-            }
-            let remaining = target.travelled - self.at.travelled;
-            if let Some(lock) = event.filter(|event| event.kind == EventKind::Lock) {
-                // The window of the lock must be around the spans of the last step.
-                self.stride.limit((0.5 * (lock.travelled - self.at.travelled)).max(least));
-            }
-            let mut to = if self.stride.is_to_target(remaining) {
-                target.clone()
-            } else {
-                self.at.further(self.chain.path, &self.chain.exact, self.stride.within(remaining))
-            };
-            let claim = Claim { links: self.covered.links, moving: self.moving, clear: self.clear };
-            match self.chain.show(&mut self.at, &mut to, claim, &self.free) {
-                Ok(shown) => {
-                    self.accept(to, shown)?;
-                    self.stride.grow(longest);
-                }
-                Err(obstacle) if self.stride.within(remaining) > least => {
-                    self.stride.shrink(SHRINK, remaining);
-                    // The links of boards 0 and 1 do not show turns of the handles behind.
-                    if obstacle == Obstacle::Stall(1) && !self.moving {
-                        self.covered.links = Links::All;
-                    }
-                }
-                Err(obstacle) => {
-                    let near = |event: &&Event| event.travelled - self.at.travelled < NEAR * longest;
-                    if event.filter(near).is_some_and(|event| obstacle.is_of(event.kind)) {
-                        return Ok(());
-                    }
-                    self.give_up(obstacle)?;
-                }
-            }
-        }
-        Ok(())
+        let walked = self.walk_to((target, event), |search| progress(search.at.travelled, search.used()))?;
+        walked.map_or(Ok(()), |because| Err(Halt::Stuck(because)))
     }
 
     /// Returns the share of its limits that the search has used.
     fn used(&self) -> f64 {
-        let of_steps = self.steps as f64 / self.given.most_steps as f64;
+        let of_steps = self.walk.steps as f64 / self.given.most_steps as f64;
         of_steps.max(self.written as f64 / self.given.most_spans as f64)
     }
 
-    fn accept(&mut self, to: GridPoint, shown: Shown) -> Result<(), Halt> {
+    /// Writes and counts a step that is shown, and takes its end as the place of the search.
+    fn accept(&mut self, to: GridPoint, shown: Shown) -> io::Result<Next> {
         let Shown { step, body_forward } = shown;
         self.covered.add(&mut self.chain, &step.spans, body_forward);
         let line = CertificateLine::Step(step);
@@ -341,23 +295,20 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             self.spans = step.spans;
         }
         self.at = to;
-        self.steps += 1;
-        if self.steps > self.given.most_steps {
-            return Err(Halt::Stuck(format!("the search was given up after {} steps", self.steps)));
+        self.walk.steps += 1;
+        // The limit of the steps goes first.
+        if self.written <= self.given.most_spans || self.walk.steps > self.given.most_steps {
+            return Ok(Next::Longer);
         }
-        if self.written > self.given.most_spans {
-            let because = format!(
-                "the search was given up after {} steps: its certificate has more than {:e} places of handles",
-                self.steps,
-                2 * self.given.most_spans
-            );
-            return Err(Halt::Stuck(because));
-        }
-        Ok(())
+        Ok(Next::End(Some(format!(
+            "the search was given up after {} steps: its certificate has more than {:e} places of handles",
+            self.walk.steps,
+            2 * self.given.most_spans
+        ))))
     }
 
     /// Gives up a claim that cannot be shown here, or the whole search.
-    fn give_up(&mut self, obstacle: Obstacle) -> Result<(), Halt> {
+    fn give_up(&mut self, obstacle: Obstacle) -> Next {
         let time_lo = self.time(self.at.head).lo;
         match obstacle {
             Obstacle::Pair(a, b) if self.clear => {
@@ -368,7 +319,6 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 );
                 self.proofs[EventKind::Contact as usize] = Some(Status::Undecided { time_lo, because });
                 self.clear = false;
-                Ok(())
             }
             Obstacle::Stall(link) if self.moving => {
                 let because = format!(
@@ -377,24 +327,23 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
                 );
                 self.proofs[EventKind::Stall as usize] = Some(Status::Undecided { time_lo, because });
                 self.moving = false;
-                Ok(())
             }
             Obstacle::Stage(number) => {
                 let because =
                     "a board comes so near the obstacle that doubles cannot tell whether it meets it".to_owned();
                 self.of_obstacles[number] = Some(Status::Undecided { time_lo, because });
                 self.free.retain(|other| *other != number);
-                Ok(())
             }
-            Obstacle::Stall(_) | Obstacle::Behind if self.covered.give_up() => Ok(()),
-            Obstacle::Link(link) => Err(Halt::Stuck(format!(
-                "the rear handle of bench {} (counting from 1) cannot be enclosed there",
-                link + 1
-            ))),
+            Obstacle::Stall(_) | Obstacle::Behind if self.covered.give_up() => {}
+            Obstacle::Link(link) => {
+                let why = format!("the rear handle of bench {} (counting from 1) cannot be enclosed there", link + 1);
+                return Next::End(Some(why));
+            }
             Obstacle::Stall(_) | Obstacle::Behind | Obstacle::Pair(..) => {
-                Err(Halt::Stuck(format!("a step cannot be shown there: {obstacle:?}")))
+                return Next::End(Some(format!("a step cannot be shown there: {obstacle:?}")));
             }
         }
+        Next::Same
     }
 
     fn proved(&self, event: EventKind, from: Place, to: Place, benches: [Option<u32>; 2]) -> Status {
@@ -416,6 +365,43 @@ impl<'a, 'w> CertificateSearch<'a, 'w> {
             }
         });
         Status::Proved { time_lo, time_hi, bench_a, bench_b, because }
+    }
+}
+
+/// The target of a walk, and the event there that may prevent the last steps.
+type Target<'t> = (&'t GridPoint, Option<&'t Event>);
+
+impl<'t> Walker<Target<'t>> for CertificateSearch<'_, '_> {
+    fn walk(&mut self) -> &mut Walk {
+        &mut self.walk
+    }
+
+    fn way(&self, to @ (target, event): Target<'t>) -> Option<Way<Target<'t>>> {
+        let least = LEAST_STEP * (1.0 + self.given.path.length());
+        // The window of a lock must be around the spans of the last step.
+        let lock = event.filter(|event| event.kind == EventKind::Lock);
+        let before_lock = lock.map(|lock| (0.5 * (lock.travelled - self.at.travelled)).max(least));
+        let longest = self.given.team.shortest_link().min(before_lock.unwrap_or(f64::INFINITY));
+        let remaining = target.travelled - self.at.travelled;
+        self.chain.exact.is_before(self.at.head, target.head).then_some(Way { to, remaining, longest, least })
+    }
+
+    fn step(&mut self, (target, event): Target<'t>, length: Option<f64>, is_least: bool) -> io::Result<Next> {
+        let mut to = self.at.towards(target, length, &self.chain);
+        let claim = Claim { links: self.covered.links, moving: self.moving, clear: self.clear };
+        let near = event.filter(|event| event.travelled - self.at.travelled < NEAR * self.given.team.shortest_link());
+        match self.chain.show(&mut self.at, &mut to, claim, &self.free) {
+            Ok(shown) => self.accept(to, shown),
+            Err(obstacle) if !is_least => {
+                // The links of boards 0 and 1 do not show turns of the handles behind.
+                if obstacle == Obstacle::Stall(1) && !self.moving {
+                    self.covered.links = Links::All;
+                }
+                Ok(Next::Shorter)
+            }
+            Err(obstacle) if near.is_some_and(|event| obstacle.is_of(event.kind)) => Ok(Next::End(None)),
+            Err(obstacle) => Ok(self.give_up(obstacle)),
+        }
     }
 }
 

@@ -1,48 +1,101 @@
-//! Parts that the searches by steps share: the length of the next step, and the links that it shows.
+//! The walk of a search to a goal in steps, and the links that steps show.
+
+use std::io;
+use std::ops::ControlFlow;
 
 use super::lines::Links;
 use super::place::Span;
 use super::step::Chain;
 
-/// The share of the way to a target from which on a step goes to the target: a short step is not left over.
+/// The share of the way from which on a step goes to its end: a short step is not left over.
 const NEARLY: f64 = 0.9;
 
-/// The length of the next step to try: metres of travel, or seconds.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stride {
-    length: f64,
+/// The share of the longest step with which a walk begins.
+const FIRST: f64 = 0.25;
+
+/// The factors of the length of a step after one that is shown, and after one that is refused.
+const GROWTH: f64 = 1.3;
+const SHRINK: f64 = 0.5;
+
+/// The state of a walk. Lengths are metres of travel, or seconds.
+pub(super) struct Walk {
+    /// The length of the next step to try.
+    pub length: f64,
     /// The factor of the length after a step that is shown.
-    growth: f64,
+    pub growth: f64,
+    /// The factors after a step that is refused: the first one after a step that is shown, and each further one.
+    pub shrinks: [f64; 2],
+    /// The steps that the search has counted: those that are shown, or all that were tried.
+    pub steps: u64,
+    /// The steps after which the search is given up.
+    pub most_steps: u64,
 }
 
-impl Stride {
-    pub fn new(length: f64, growth: f64) -> Self {
-        Self { length, growth }
+impl Walk {
+    /// Creates the state of a walk whose longest step, at first, is `longest`.
+    pub fn new(longest: f64, most_steps: u64) -> Self {
+        Self { length: FIRST * longest, growth: GROWTH, shrinks: [SHRINK; 2], steps: 0, most_steps }
     }
+}
 
-    /// Makes the next step no longer than a length.
-    pub fn limit(&mut self, longest: f64) {
-        self.length = self.length.min(longest);
-    }
+/// The way that lies before a search.
+pub(super) struct Way<To> {
+    /// The place up to which the next step may go: the goal, or a place before it.
+    pub to: To,
+    /// The length up to there.
+    pub remaining: f64,
+    /// The longest step from here.
+    pub longest: f64,
+    /// The length from which on a step is not shortened any more.
+    pub least: f64,
+}
 
-    /// Returns the length of the next step, which is not beyond a target that is `remaining` further on.
-    pub fn within(&self, remaining: f64) -> f64 {
-        self.length.min(remaining)
-    }
+/// What follows a step that was tried.
+pub(super) enum Next {
+    /// A longer step, because this one is shown.
+    Longer,
+    /// A step of the same length, because the search claims less now.
+    Same,
+    /// A shorter step, because this one is refused.
+    Shorter,
+    /// No step, with the reason if that is an end before the goal.
+    End(Option<String>),
+}
 
-    /// Returns true if the next step goes to a target that is `remaining` further on.
-    pub fn is_to_target(&self, remaining: f64) -> bool {
-        self.length >= NEARLY * remaining
-    }
+/// A search that walks to a goal in steps.
+pub(super) trait Walker<To: Copy> {
+    /// Returns the state of the walk.
+    fn walk(&mut self) -> &mut Walk;
 
-    /// Lengthens the step after one that is shown.
-    pub fn grow(&mut self, longest: f64) {
-        self.length = (self.length * self.growth).min(longest);
-    }
+    /// Returns the way to a goal; `None` if the search is there.
+    fn way(&self, goal: To) -> Option<Way<To>>;
 
-    /// Shortens the step by a factor after one that is not shown.
-    pub fn shrink(&mut self, factor: f64, remaining: f64) {
-        self.length = factor * self.within(remaining);
+    /// Tries and counts a step of a length, or without one up to `to`. Nothing shorter follows a step that `is_least`.
+    fn step(&mut self, to: To, length: Option<f64>, is_least: bool) -> io::Result<Next>;
+
+    /// Walks to a goal. Returns the reason if the walk ends before it. `progress` is asked before each step.
+    fn walk_to(&mut self, goal: To, mut progress: impl FnMut(&Self) -> ControlFlow<()>) -> io::Result<Option<String>> {
+        let mut refused = 0;
+        while let Some(Way { to, remaining, longest, least }) = self.way(goal) {
+            if progress(self).is_break() {
+                return Ok(Some("the search was stopped there".to_owned()));
+            }
+            let walk = self.walk();
+            walk.length = walk.length.min(longest);
+            let (length, is_short) = (walk.length.min(remaining), walk.length < NEARLY * remaining);
+            let next = self.step(to, is_short.then_some(length), length <= least)?;
+            let walk = self.walk();
+            match next {
+                Next::Longer => (walk.length, refused) = (walk.length * walk.growth, 0),
+                Next::Same => {}
+                Next::Shorter => (walk.length, refused) = (length * walk.shrinks[refused], 1),
+                Next::End(because) => return Ok(because),
+            }
+            if walk.steps > walk.most_steps {
+                return Ok(Some(format!("the search was given up after {} steps", walk.steps)));
+            }
+        }
+        Ok(None)
     }
 }
 

@@ -1,19 +1,21 @@
 //! The steps of the head: one at a time, each shown completely or refused. A refused step may show a lower upper bound.
 
+use std::io;
+
 use super::super::first_order::When;
 use super::super::first_order_step::{FirstOrderStep, StepPoints, step_points};
 use super::super::grid::GridPoint;
 use super::super::lines::{CertificateLine, Links, Step};
 use super::super::place::Span;
 use super::super::step::Obstacle;
+use super::super::walk::{Next, Walk, Walker, Way};
 use super::{Descent, LOWER, Nearer, Refused, Upper};
 use bench_dragon_motion::event::Progress;
 
 /// The factors of the step length: the growth after a step that is shown, the first shrink after one that is not, and
 /// later shrinks. Steps close to the longest need more attempts, but make the certificate shorter.
 pub(super) const GROWTH: f64 = 1.1;
-const SHRINK: f64 = 0.8;
-const SHRINK_FURTHER: f64 = 0.5;
+pub(super) const SHRINKS: [f64; 2] = [0.8, 0.5];
 
 /// The shortest step, as a share of the path length in metres.
 const LEAST_STEP: f64 = 1e-14;
@@ -21,63 +23,18 @@ const LEAST_STEP: f64 = 1e-14;
 impl Descent<'_, '_> {
     /// Goes to `target`. Returns the travel that it reached if a step before cannot be shown.
     pub(super) fn go_to(&mut self, target: &GridPoint, progress: Progress<'_>) -> Option<f64> {
-        let least = LEAST_STEP * (1.0 + self.chain.path.length());
-        let longest = self.chain.team.shortest_link();
-        let mut shrink = SHRINK;
-        while self.chain.exact.is_before(self.at.head, target.head) {
-            let steps = self.steps as f64 / self.most_steps as f64;
-            if progress((self.at.travelled / self.end).max(steps).clamp(0.0, 1.0)).is_break() {
-                return Some(self.travelled());
-            }
-            let remaining = target.travelled - self.at.travelled;
-            let length = self.stride.within(remaining);
-            let mut to = if self.stride.is_to_target(remaining) {
-                target.clone()
-            } else {
-                self.at.further(self.chain.path, &self.chain.exact, length)
-            };
-            self.steps += 1;
-            let given_up = match self.show(&mut to) {
-                Ok(()) => {
-                    self.at = to;
-                    self.stride.grow(longest);
-                    shrink = SHRINK;
-                    false
-                }
-                Err(Refused { nearer: Some(Nearer::Boards(nearer)), .. }) => {
-                    self.upper = Some(nearer);
-                    false
-                }
-                Err(Refused { nearer: Some(Nearer::Obstacle(number, nearer)), .. }) => {
-                    self.beside[number].upper = Some(nearer);
-                    false
-                }
-                Err(Refused { obstacle, .. }) if length > least => {
-                    self.stride.shrink(std::mem::replace(&mut shrink, SHRINK_FURTHER), remaining);
-                    if obstacle == Obstacle::Stall(1) {
-                        self.covered.links = Links::All;
-                    }
-                    false
-                }
-                Err(Refused { obstacle: Obstacle::Stall(_) | Obstacle::Behind, .. }) if self.covered.give_up() => false,
-                Err(Refused { obstacle: Obstacle::Stage(number), .. }) => {
-                    self.beside[number].is_lost = true;
-                    false
-                }
-                Err(_) => true,
-            };
-            if given_up || self.steps > self.most_steps || self.failed.is_some() {
-                return Some(self.travelled());
-            }
-        }
-        None
+        let walked = self.walk_to(target, |search| {
+            let steps = search.walk.steps as f64 / search.walk.most_steps as f64;
+            progress((search.at.travelled / search.end).max(steps).clamp(0.0, 1.0))
+        });
+        if let Ok(None) = walked { None } else { Some(self.travelled()) }
     }
 
     /// Shows a step from the current place, and prepares the next.
-    fn show(&mut self, to: &mut GridPoint) -> Result<(), Refused> {
+    fn show(&mut self, mut to: GridPoint) -> Result<(), Refused> {
         let mut middle = self.grid_point(0.5 * self.at.travelled + 0.5 * to.travelled);
         let mut from = std::mem::replace(&mut self.at, to.clone());
-        let shown = self.show_between(&mut StepPoints { from: &mut from, middle: &mut middle, to });
+        let shown = self.show_between(&mut StepPoints { from: &mut from, middle: &mut middle, to: &mut to });
         self.at = from;
         let ShownStep { step, body_forward } = shown?;
         self.covered.add(&mut self.chain, &step.spans, body_forward);
@@ -87,6 +44,7 @@ impl Descent<'_, '_> {
             self.shown = Some((least, step.to));
         }
         self.write(&CertificateLine::Step(step));
+        self.at = to;
         Ok(())
     }
 
@@ -128,6 +86,41 @@ impl Descent<'_, '_> {
         let (links, free) = (self.covered.links, Vec::new());
         let step = Step { links, from, to, moving: false, clear: false, spans, free, apart, beside, at };
         Ok(ShownStep { step, body_forward: listed.body_forward })
+    }
+}
+
+impl<'t> Walker<&'t GridPoint> for Descent<'_, '_> {
+    fn walk(&mut self) -> &mut Walk {
+        &mut self.walk
+    }
+
+    fn way(&self, to: &'t GridPoint) -> Option<Way<&'t GridPoint>> {
+        let (remaining, longest) = (to.travelled - self.at.travelled, self.chain.team.shortest_link());
+        let least = LEAST_STEP * (1.0 + self.chain.path.length());
+        self.chain.exact.is_before(self.at.head, to.head).then_some(Way { to, remaining, longest, least })
+    }
+
+    fn step(&mut self, target: &'t GridPoint, length: Option<f64>, is_least: bool) -> io::Result<Next> {
+        self.walk.steps += 1;
+        let tried = self.show(self.at.towards(target, length, &self.chain));
+        if self.failed.is_some() {
+            return Ok(Next::End(Some("its line cannot be written".to_owned())));
+        }
+        let Err(Refused { obstacle, nearer }) = tried else { return Ok(Next::Longer) };
+        match (nearer, obstacle) {
+            (Some(Nearer::Boards(nearer)), _) => self.upper = Some(nearer),
+            (Some(Nearer::Obstacle(number, nearer)), _) => self.beside[number].upper = Some(nearer),
+            _ if !is_least => {
+                if obstacle == Obstacle::Stall(1) {
+                    self.covered.links = Links::All;
+                }
+                return Ok(Next::Shorter);
+            }
+            (_, Obstacle::Stall(_) | Obstacle::Behind) if self.covered.give_up() => {}
+            (_, Obstacle::Stage(number)) => self.beside[number].is_lost = true,
+            _ => return Ok(Next::End(Some(format!("a step cannot be shown there: {obstacle:?}")))),
+        }
+        Ok(Next::Same)
     }
 }
 
