@@ -4,7 +4,7 @@ use super::boards::Board;
 use super::chain::{Chain, span_is_one};
 use super::first_order::FirstOrder;
 use super::interval::Interval;
-use super::lines::{EventKind, WitnessLine};
+use super::lines::EventKind;
 use super::link;
 use super::path::{Place, Span};
 use super::problem::{Checked, ensure, problem};
@@ -12,7 +12,7 @@ use super::results::{Claim, Known, Subject};
 use super::scene::Scene;
 use super::shown::{At, Shown};
 use super::steps::Steps;
-use super::witness::{Evidence, Whom, Witness, Witnesses};
+use super::witness::{Evidence, Witness, WitnessLine, Witnesses};
 
 /// The events that are shown so far.
 #[derive(Default)]
@@ -89,22 +89,21 @@ impl Events {
     /// # Errors
     /// The condition that does not follow.
     pub fn add_witness(&mut self, scene: &Scene, steps: &Steps, line: &WitnessLine) -> Checked {
-        let (whom, ([head], [spans])) = (line.whom()?, line.spans()?);
-        ensure!(!matches!(whom, Whom::Dragon(_)), "it has a time, in a section of one dragon");
+        let (whom, ([head], [spans])) = (line.whom, line.spans()?);
         whom.check(&scene.obstacles, &[spans])?;
-        let most = match line.evidence()? {
+        let most = match &line.evidence {
             Evidence::Point(point) => {
                 let chain = touching_chain(scene, steps, head, spans)?;
                 let capsules = &chain.capsules;
                 let board = |_, bench| Board::new(&capsules[bench], &capsules[bench + 1], scene.team.size(bench));
-                whom.check_touch(board, &scene.obstacles, &point)?;
+                whom.check_touch(board, &scene.obstacles, point)?;
                 None
             }
-            Evidence::Most(most, [at]) => {
+            Evidence::Most(most, at) => {
                 let shown = whom.obstacle().map_or(&steps.apart, |number| &steps.beside[number]);
-                let step = near_step(scene, shown, head, (spans, at))?;
-                whom.check_near(|_, bench| step.board(bench, &scene.team), &scene.obstacles, &most)?;
-                Some(most)
+                let step = near_step(scene, shown, head, (spans, &at[0]))?;
+                whom.check_near(|_, bench| step.board(bench, &scene.team), &scene.obstacles, most)?;
+                Some(*most)
             }
         };
         self.witnesses.add(whom, most, At::Head(head.0))

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::path::{Place, Span};
+use super::witness::WitnessLine;
 
 /// A line of a certificate.
 #[derive(Deserialize)]
@@ -104,25 +105,6 @@ pub(super) enum ParsedLine {
         pitch: f64,
         radius: f64,
     },
-}
-
-/// Boards that touch, or that are no further apart than some metres: two of one dragon or of two, or one and an obstacle.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct WitnessLine {
-    #[serde(default)]
-    pub obstacle: Option<usize>,
-    pub benches: Vec<usize>,
-    #[serde(default)]
-    pub time: Option<f64>,
-    pub heads: Vec<Span>,
-    pub spans: Vec<Vec<Span>>,
-    #[serde(default)]
-    pub at: Vec<Vec<Place>>,
-    #[serde(default)]
-    pub point: Option<[f64; 2]>,
-    #[serde(default)]
-    pub most: Option<f64>,
 }
 
 /// A result of a section, or of a question about one dragon.

@@ -9,7 +9,6 @@ use super::first_order::FirstOrder;
 use super::first_order_board::FirstOrderBoard;
 use super::handle::When;
 use super::interval::Interval;
-use super::lines::WitnessLine;
 use super::path::{Place, Span};
 use super::problem::{Checked, ensure, problem};
 use super::results::Known;
@@ -18,7 +17,7 @@ use super::shown::{At, Shown};
 use super::steps::Steps;
 use super::team::Size;
 use super::unlisted::straight_run;
-use super::witness::{Evidence, Witnesses};
+use super::witness::{Evidence, WitnessLine, Witnesses};
 
 /// Facts that the section of a dragon has shown.
 pub(super) struct Alone {
@@ -199,19 +198,18 @@ impl Pair {
     /// # Errors
     /// The condition that does not follow.
     pub fn add_witness(&mut self, scenes: &[Scene], alone: Option<&[Alone]>, line: &WitnessLine) -> Checked {
-        let (whom, (heads, spans)) = (line.whom()?, line.spans()?);
+        let (whom, (heads, spans)) = (line.whom, line.spans()?);
         let Some(time) = line.time.filter(|time| time.is_finite() && *time >= 0.0) else {
-            return Err(problem!("expected a time of the two, not before the start"));
+            return Err(problem!("the time is before the start"));
         };
         whom.check(&[], &spans)?;
-        let evidence = line.evidence()?;
-        let alone = alone.filter(|_| matches!(evidence, Evidence::Point(_)));
+        let alone = alone.filter(|_| matches!(line.evidence, Evidence::Point(_)));
         if alone.is_none() {
             self.is_reached(time)?;
         }
         let scenes = self.scenes(scenes);
         let together = Together::new(scenes, [time; 2], heads, spans)?;
-        let most = match evidence {
+        let most = match &line.evidence {
             Evidence::Point(point) => {
                 for (k, dragon) in self.dragons.into_iter().enumerate() {
                     // Otherwise the motion may have ended with a lock.
@@ -223,13 +221,13 @@ impl Pair {
                         "no step of dragon {dragon} has come there"
                     );
                 }
-                whom.check_touch(|k, bench| together.board(scenes[k], k, bench), &[], &point)?;
+                whom.check_touch(|k, bench| together.board(scenes[k], k, bench), &[], point)?;
                 None
             }
             Evidence::Most(most, at) => {
-                let steps = together.first_order(scenes, [time; 2], at)?;
-                whom.check_near(|k, bench| steps[k].board(bench, &scenes[k].team), &[], &most)?;
-                Some(most)
+                let steps = together.first_order(scenes, [time; 2], [&at[0], &at[1]])?;
+                whom.check_near(|k, bench| steps[k].board(bench, &scenes[k].team), &[], most)?;
+                Some(*most)
             }
         };
         self.witnesses.add(whom, most, At::Time(time))

@@ -1,13 +1,14 @@
 //! Boards that touch, or that are no further apart than some metres: two of one dragon, one of each of two, or one and
 //! an obstacle. Lemmas 5, 6, 9, 11 and 12 of docs/proofs.md.
 
+use serde::Deserialize;
+
 use super::boards::{Board, covers};
 use super::first_order_board::FirstOrderBoard;
 use super::ground::Obstacle;
 use super::interval::{Interval, Vector};
-use super::lines::WitnessLine;
 use super::path::{Place, Span};
-use super::problem::{Checked, ensure, problem};
+use super::problem::{Checked, Problem, ensure, problem};
 use super::shown::At;
 
 /// A board and another thing that it touches or is near.
@@ -22,48 +23,74 @@ pub(super) enum Whom {
 }
 
 /// What a witness shows of a board and another thing.
-pub(super) enum Evidence<'l, const DRAGONS: usize> {
+pub(super) enum Evidence {
     /// They have this point in common.
     Point(Vector),
-    /// They are no further apart than these metres, by a place of each handle.
-    Most(Interval, [&'l [Place]; DRAGONS]),
+    /// They are no further apart than these metres, by a place of each handle of each dragon.
+    Most(Interval, Vec<Vec<Place>>),
+}
+
+/// A line that boards touch, or are no further apart than some metres. Each list has an entry for the dragon of the
+/// section, or for the two.
+#[derive(Deserialize)]
+#[serde(try_from = "Written")]
+pub(super) struct WitnessLine {
+    pub whom: Whom,
+    /// The time of the show in seconds, in a section of two.
+    pub time: Option<f64>,
+    heads: Vec<Span>,
+    spans: Vec<Vec<Span>>,
+    pub evidence: Evidence,
+}
+
+/// The line as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    #[serde(default)]
+    obstacle: Option<usize>,
+    benches: Vec<usize>,
+    #[serde(default)]
+    time: Option<f64>,
+    heads: Vec<Span>,
+    spans: Vec<Vec<Span>>,
+    #[serde(default)]
+    at: Vec<Vec<Place>>,
+    #[serde(default)]
+    point: Option<[f64; 2]>,
+    #[serde(default)]
+    most: Option<f64>,
+}
+
+impl TryFrom<Written> for WitnessLine {
+    type Error = Problem;
+
+    fn try_from(Written { obstacle, benches, time, heads, spans, at, point, most }: Written) -> Checked<Self> {
+        let whom = match (obstacle, &benches[..], time) {
+            (None, &[a, b], None) => Whom::Own([a, b]),
+            (None, &[a, b], Some(_)) => Whom::Dragon([a, b]),
+            (Some(number), &[bench], None) => Whom::Obstacle { number, bench },
+            _ => return Err(problem!("expected two `benches`, or one and an `obstacle` of one dragon")),
+        };
+        let dragons = if time.is_some() { 2 } else { 1 };
+        ensure!(heads.len() == dragons && spans.len() == dragons, "expected `heads` and `spans` of {dragons}");
+        let evidence = match (point, most) {
+            (Some([x, y]), None) if at.is_empty() => Evidence::Point(Vector::new(x, y)),
+            (None, Some(most)) if at.len() == dragons => Evidence::Most(Interval::new(most), at),
+            _ => return Err(problem!("expected either `point`, or `most` and the places `at` of {dragons}")),
+        };
+        Ok(Self { whom, time, heads, spans, evidence })
+    }
 }
 
 impl WitnessLine {
-    /// Returns the spans of the heads of some dragons, and those of their handles.
+    /// Returns the spans of the heads of the dragons of a section, and those of their handles.
     ///
     /// # Errors
-    /// The line is about more or fewer dragons.
+    /// The line is about more or fewer.
     pub fn spans<const DRAGONS: usize>(&self) -> Checked<([Span; DRAGONS], [&[Span]; DRAGONS])> {
-        ensure!(self.heads.len() == DRAGONS && self.spans.len() == DRAGONS, "expected the spans of {DRAGONS} dragons");
+        ensure!(self.heads.len() == DRAGONS, "a witness with a time belongs to the section of two dragons, only");
         Ok((std::array::from_fn(|k| self.heads[k]), std::array::from_fn(|k| self.spans[k].as_slice())))
-    }
-
-    /// Returns what the line shows.
-    ///
-    /// # Errors
-    /// It does not have one of a point, and metres with places of all these dragons.
-    pub fn evidence<const DRAGONS: usize>(&self) -> Checked<Evidence<'_, DRAGONS>> {
-        match (self.point, self.most) {
-            (Some([x, y]), None) if self.at.is_empty() => Ok(Evidence::Point(Vector::new(x, y))),
-            (None, Some(most)) if self.at.len() == DRAGONS => {
-                Ok(Evidence::Most(Interval::new(most), std::array::from_fn(|k| self.at[k].as_slice())))
-            }
-            _ => Err(problem!("expected either `point`, or `most` and the places `at` of {DRAGONS} dragons")),
-        }
-    }
-
-    /// Returns the boards, or the board and the obstacle. In the section of two dragons there is a time.
-    ///
-    /// # Errors
-    /// The numbers are of neither.
-    pub fn whom(&self) -> Checked<Whom> {
-        match (self.obstacle, &self.benches[..], self.time) {
-            (None, &[a, b], None) => Ok(Whom::Own([a, b])),
-            (None, &[a, b], Some(_)) => Ok(Whom::Dragon([a, b])),
-            (Some(number), &[bench], None) => Ok(Whom::Obstacle { number, bench }),
-            _ => Err(problem!("expected two benches, or one and an obstacle of one dragon")),
-        }
     }
 }
 
