@@ -4,7 +4,6 @@
 use super::interval::Interval;
 use super::path::ExactPath;
 use super::place::{Place, Span};
-use super::step::Chain;
 use bench_dragon_motion::linkage::{NoFollower, follower, link_pose};
 use bench_dragon_motion::model::curve::Coordinate;
 use bench_dragon_motion::model::path::{Param, Path};
@@ -57,7 +56,7 @@ impl GridPoint {
 
     /// Returns the grid point some metres further on; without a length, the target. If the metres are less than the
     /// distance of two doubles, it is at the next one: a step leads on.
-    pub fn towards(&self, target: &Self, metres: Option<f64>, Chain { path, exact, .. }: &Chain) -> Self {
+    pub fn towards(&self, target: &Self, metres: Option<f64>, path: &Path, exact: &ExactPath) -> Self {
         let Some(metres) = metres else { return target.clone() };
         let to = Self::new(path, exact, self.travelled + metres);
         if exact.is_before(self.head, to.head) {

@@ -387,7 +387,7 @@ impl<'t> Walker<Target<'t>> for CertificateSearch<'_, '_> {
     }
 
     fn step(&mut self, (target, event): Target<'t>, length: Option<f64>, is_least: bool) -> io::Result<Next> {
-        let mut to = self.at.towards(target, length, &self.chain);
+        let mut to = self.at.towards(target, length, self.chain.path, &self.chain.exact);
         let claim = Claim { links: self.covered.links, moving: self.moving, clear: self.clear };
         let near = event.filter(|event| event.travelled - self.at.travelled < NEAR * self.given.team.shortest_link());
         match self.chain.show(&mut self.at, &mut to, claim, &self.free) {

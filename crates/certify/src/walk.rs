@@ -50,7 +50,7 @@ pub(super) struct Way<To> {
     pub least: f64,
 }
 
-/// What follows a step that was tried.
+/// The next step after one that was tried.
 pub(super) enum Next {
     /// A longer step, because this one is shown.
     Longer,

@@ -22,7 +22,7 @@ pub(super) enum Whom {
     Obstacle { number: usize, bench: usize },
 }
 
-/// What a witness shows of a board and another thing.
+/// The fact that a witness shows of a board and another thing.
 pub(super) enum Evidence {
     /// They have this point in common.
     Point(Vector),

@@ -102,7 +102,7 @@ impl<'t> Walker<&'t GridPoint> for Descent<'_, '_> {
 
     fn step(&mut self, target: &'t GridPoint, length: Option<f64>, is_least: bool) -> io::Result<Next> {
         self.walk.steps += 1;
-        let tried = self.show(self.at.towards(target, length, &self.chain));
+        let tried = self.show(self.at.towards(target, length, self.chain.path, &self.chain.exact));
         if self.failed.is_some() {
             return Ok(Next::End(Some("its line cannot be written".to_owned())));
         }
