@@ -307,7 +307,7 @@ fn measure_log() {
     let (mut publisher, mut connection) =
         publisher_and_subscriber(&format!("bench_{}_log", std::process::id()), &scene, &show, 1);
     let file = std::env::temp_dir().join(format!("bench_dragon_step_{}.jsonl", std::process::id()));
-    let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), show.solver_reason(), (1, 0));
+    let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), show.solver_reason(), 1, 0);
     let (mut log, outcome) = log::open(&file, line, scene.ensemble.handles()).expect("a file in the temporary folder");
     let mut logging = log.publisher().expect("no other caller has taken it");
     let (mut times, mut after): ([Vec<f64>; 2], Vec<f64>) = Default::default();

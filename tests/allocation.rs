@@ -114,7 +114,7 @@ fn the_loop_allocates_nothing_of_its_own_after_its_first_frame() {
     let config = TransportConfig::of(&name, &scene, &stage);
     let (mut transports, mut commands) = open_transports(&config).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", (1, 2));
+    let line = ShowLine::new(&SceneText::paper(), &playback, Arithmetic::of(&scene), "", 1, 2);
     transports.push(log::open(&folder.path().join("log"), line, scene.ensemble.handles()).unwrap().0);
     let mut publishers: Vec<_> = transports.iter_mut().map(|transport| transport.publisher().unwrap()).collect();
     let subscription = Subscription::new(&name, Wake::OnFrame).unwrap();

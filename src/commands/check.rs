@@ -85,8 +85,8 @@ pub fn check(common: &Common, arguments: &CheckArguments) -> Result<(), CommandE
     }
     let found = find_least_clearance(&scene, &timeline, common);
     let beside = obstacle_clearances(&scene, &timeline, common);
-    let least: Found<'_> = (found.of_show, &beside);
-    let prove = || Parts::enclosed((&scene, &text.text), timeline.end(), least, arguments.certify.as_deref(), common);
+    let least = Found { boards: found.of_show, obstacles: &beside };
+    let prove = || Parts::enclosed(&scene, &text.text, timeline.end(), least, arguments.certify.as_deref(), common);
     let parts = arguments.prove.then(prove).transpose()?;
     let searched = Searched { timeline: &timeline, boards: found.of_show, obstacles: &beside, gave_up: gave_up() };
     let bounds = parts.as_ref().map(|parts| |obstacle: Option<&str>| parts.bounds(obstacle));

@@ -125,7 +125,7 @@ pub fn draw(common: &Common, arguments: &DrawArguments) -> Result<(), CommandErr
     unstopped()?;
     // Boards are coloured by speed, even if the scene publishes no speeds.
     let solver = make_solver(&scene, Velocities::Computed, common)?;
-    let mut session = Session::new((&scene, &timeline), solver, arguments.output.as_deref(), common.json);
+    let mut session = Session::new(&scene, &timeline, solver, arguments.output.as_deref(), common.json);
     let many = &arguments.many;
     match (many.every, &many.until) {
         (Some(every), Some(until)) => {
@@ -193,7 +193,8 @@ struct Session<'a> {
 
 impl<'a> Session<'a> {
     fn new(
-        (scene, timeline): (&'a Scene, &'a Timeline),
+        scene: &'a Scene,
+        timeline: &'a Timeline,
         solver: Box<dyn Solver>,
         file: Option<&'a Path>,
         json: bool,

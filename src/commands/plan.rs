@@ -136,7 +136,7 @@ fn plan_pitch(common: &Common, radius: f64, spacing: &Spacing, file: Option<&Pat
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        output.json(&PitchLine::new(&found, clearance, (&stage, &motion), are_searches_stopped()))?;
+        output.json(&PitchLine::new(&found, clearance, &stage, &motion, are_searches_stopped()))?;
         return output.finish().and(unstopped());
     }
     let LeastPitch { value_lo, value_hi, from, overlap, proved, intervals } = found;

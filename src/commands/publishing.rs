@@ -24,6 +24,14 @@ pub fn new_run_id() -> u64 {
     RandomState::new().hash_one(realtime_ns())
 }
 
+/// The ends of the publisher: those of its frames and those of its commands.
+pub struct Ends {
+    /// The open transports.
+    pub transports: Vec<Box<dyn Transport>>,
+    /// The loop's end of the command queues.
+    pub queues: CommandQueues,
+}
+
 /// Publishes, and prints alerts and cues with the names of `stage` on standard error.
 ///
 /// # Errors
@@ -33,7 +41,7 @@ pub fn publish(
     stage: &Stage,
     publishing: &Publishing,
     source: &mut (dyn FrameSource + Send),
-    (transports, queues): (Vec<Box<dyn Transport>>, CommandQueues),
+    ends: Ends,
     stop: &AtomicBool,
     hooks: Hooks,
 ) -> Result<Published, CommandError> {
@@ -44,7 +52,7 @@ pub fn publish(
         print.iter().zip(announced(announcement, &stage)).for_each(|(print, line)| print(line));
     };
     let hooks = managed(Hooks { announce: Box::new(announce), ..hooks });
-    let published = publishing.run(&SystemClock, source, transports, queues, stop, hooks);
+    let published = publishing.run(&SystemClock, source, ends.transports, ends.queues, stop, hooks);
     lines.into_iter().for_each(Lines::finish);
     Ok(published?)
 }

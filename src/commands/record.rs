@@ -99,7 +99,7 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
         eprintln!("Recording \"{}\" to {}; Ctrl-C ends.", common.name(), file.display());
     }
     let over = || stop.load(Ordering::Relaxed);
-    let fed = follow(&mut feed, common.name(), (&queue, &thread), arguments.duration, over, &progress(common));
+    let fed = follow(&mut feed, common.name(), &queue, &thread, arguments.duration, over, &progress(common));
     let (recorded, failure) = thread.finish(queue);
     print(common, &recorded)?;
     fed?;
@@ -119,7 +119,8 @@ pub fn record(common: &Common, arguments: &RecordArguments) -> Result<(), Comman
 fn follow(
     feed: &mut Feed,
     name: &str,
-    (queue, thread): (&RecordQueue, &RecordThread),
+    queue: &RecordQueue,
+    thread: &RecordThread,
     duration: Option<f64>,
     over: impl Fn() -> bool,
     bar: &ProgressBar,

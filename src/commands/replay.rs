@@ -15,7 +15,7 @@ use bench_dragon::ros2_messages::settings::Topic;
 use bench_dragon::show::scene::{Accepted, Scene};
 use jiff::{Timestamp, Unit};
 
-use super::publishing::{new_run_id, print_summary, publish};
+use super::publishing::{Ends, new_run_id, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
@@ -125,7 +125,8 @@ pub fn replay(common: &Common, arguments: &ReplayArguments) -> Result<(), Comman
         alive: Box::new(|| ()),
         ended: Box::new(|_| ()),
     };
-    let mut published = publish(common, &stage.stage, &publishing, &mut frames, (transports, queues), &stop, hooks)?;
+    let ends = Ends { transports, queues };
+    let mut published = publish(common, &stage.stage, &publishing, &mut frames, ends, &stop, hooks)?;
     published.transport_counters.extend(process.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
     let (waited, failure) = reading.finish();
     if waited > 0 {

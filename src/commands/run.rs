@@ -22,7 +22,7 @@ use bench_dragon::show::scene::{Accepted, AtEnd, Scene, SceneText};
 use bench_dragon::show::{Playback, ReachedCue, Show};
 
 use super::parent::Parent;
-use super::publishing::{new_run_id, print_summary, publish};
+use super::publishing::{Ends, new_run_id, print_summary, publish};
 use super::realtime_scheduling::RealtimeScheduling;
 use super::ros_args::UseSimTime;
 use super::ros2_process::{Ros2Process, Ros2Request, Ros2Show};
@@ -176,7 +176,7 @@ impl RunSession<'_> {
             alive: Box::new(|| ()),
             ended: Box::new(|counts| log.iter().for_each(|log| log.ended(counts))),
         };
-        let ends = (transports, queues);
+        let ends = Ends { transports, queues };
         let mut published = publish(self.common, &stage.stage, &publishing, &mut source, ends, stop, hooks)?;
         published.transport_counters.extend(ros2.and_then(Ros2Process::finish).map(|of| ("ros2".to_owned(), of)));
         print_summary(&published, self.common)?;
@@ -189,8 +189,8 @@ impl RunSession<'_> {
     /// Opens the log, if requested.
     fn open_log(&self) -> Result<Option<OpenedLog>, CommandError> {
         let Some(file) = &self.arguments.log else { return Ok(None) };
-        let run = (self.run_id, realtime_ns());
-        let show = ShowLine::new(self.text, &self.playback, Arithmetic::of(self.scene), &self.solver, run);
+        let (arithmetic, stamp_ns) = (Arithmetic::of(self.scene), realtime_ns());
+        let show = ShowLine::new(self.text, &self.playback, arithmetic, &self.solver, self.run_id, stamp_ns);
         Ok(Some(recording_log::open(file, show, self.scene.ensemble.handles())?))
     }
 

@@ -62,7 +62,8 @@ pub const MOST_CLEARANCE_STEPS: u64 = 100_000;
 /// [`CertifyError::Write`]
 pub(super) fn certify_part(
     motion: &Motion,
-    (part, show_end): (Part, &TimedEvent),
+    part: Part,
+    show_end: &TimedEvent,
     hints: ClearanceHints<'_>,
     most_steps: u64,
     write: Write<'_>,

@@ -335,7 +335,7 @@ fn route(heading_turns: f64, steps: &[RouteStep]) -> ExactPath {
                 let turned = of_sum(by) + (atan(outer) - atan(inner)).over(pi() * 2.0);
                 turns = if side == Side::Left { turns + turned } else { turns - turned };
                 let [first, last] = [first, last].map(|end| nearly(end, outer.hi));
-                let curve = spiral_from(a, way, side, (origin, direction), first);
+                let curve = spiral_from(a, way, side, origin, direction, first.0, first.1);
                 (curve, ends, spiral_length(a, outer) - spiral_length(a, inner), last)
             }
         };
@@ -376,8 +376,10 @@ fn spiral_from(
     a: Interval,
     way: Direction,
     side: Side,
-    (origin, direction): (Vector, Vector),
-    (first, sin_cos): ([Interval; 2], (Interval, Interval)),
+    origin: Vector,
+    direction: Vector,
+    first: [Interval; 2],
+    sin_cos: (Interval, Interval),
 ) -> Curve {
     let of = |frame| match way {
         Direction::Inward => Curve::Inward { a, shift: Interval::ZERO, frame },

@@ -140,7 +140,8 @@ pub(crate) fn reaches(
     asked: Spaced<'_>,
     pitch: f64,
     radius: f64,
-    (most_steps, keeps): (u64, bool),
+    most_steps: u64,
+    keeps: bool,
     progress: Progress<'_>,
 ) -> Option<Reached> {
     let Spaced { team, clearance } = asked;

@@ -52,12 +52,12 @@ impl<'a> Turns<'a> {
     /// Creates the turnarounds of this pitch and arc ratio with turn radii between two. `path` is the turnaround with
     /// the middle radius. Places of an arc are places of `path`. A place of a spiral is the place of `path` at the same
     /// polar angle behind A or beyond -A.
-    pub fn new(asked: Spaced<'a>, (pitch, arc_ratio): (f64, f64), radii: [f64; 2], path: Path) -> Self {
+    pub fn new(asked: Spaced<'a>, pitch: f64, arc_ratio: f64, radii: [f64; 2], path: Path) -> Self {
         let Spaced { team, clearance } = asked;
         let radius = Interval { lo: radii[0], hi: radii[1] };
         let a = Interval::point(pitch).over(pi() * 2.0);
         let middle = Interval::point(radius.middle());
-        let turned = polar_angle((pitch, radius.middle()));
+        let turned = polar_angle(pitch, radius.middle());
         let turnarounds = |radius: Interval| ExactPath::turnaround(pitch, radius, arc_ratio, Some(turned), 0.0);
         Self { team, clearance, a, radius, exact: turnarounds(radius), middle: turnarounds(middle), path }
     }
@@ -95,7 +95,7 @@ impl<'a> Turns<'a> {
     /// Returns true if, with every radius, two boards are proved to overlap or to be too near while the head is at a
     /// place. The proof holds if the head comes there without a lock. The place is `head` with the middle radius, and
     /// its coordinate grows by `rate` per metre of the radius.
-    pub fn overlap(&self, (head, rate): (Place, f64), [a, b]: [usize; 2]) -> bool {
+    pub fn overlap(&self, head: Place, rate: f64, [a, b]: [usize; 2]) -> bool {
         if a + 2 > b || b >= self.team.benches {
             return false;
         }
@@ -232,7 +232,7 @@ impl Fold<'_> {
 }
 
 /// Returns the polar angle of A, the beginning of the S, rounded. The pitch and the turn radius are in metres.
-fn polar_angle((pitch, turn_radius): (f64, f64)) -> f64 {
+fn polar_angle(pitch: f64, turn_radius: f64) -> f64 {
     Interval::point(turn_radius).over(Interval::point(pitch).over(pi() * 2.0)).middle()
 }
 
@@ -259,14 +259,14 @@ const MOST_STEPS: u64 = 100_000;
 
 impl Passage {
     /// Creates the passage. Returns `None` if Lemma 8 holds at no sensible distance.
-    pub fn new(asked: Spaced<'_>, (pitch, arc_ratio): (f64, f64), turn_radius: f64) -> Option<Self> {
+    pub fn new(asked: Spaced<'_>, pitch: f64, arc_ratio: f64, turn_radius: f64) -> Option<Self> {
         let team = asked.team;
         // Further out than a = pitch / 2 pi a link that is shorter than its distance from the centre does not stall.
         let far = clear_beyond(asked, pitch, turn_radius.max(pitch))?;
         let length = |radius: f64| Path::spiral(pitch, radius / pitch).length();
         let lead_in = 1.0 + length(far) - length(turn_radius);
         let mut lead_out = team.length();
-        let (radius, turned) = (Interval::point(turn_radius), polar_angle((pitch, turn_radius)));
+        let (radius, turned) = (Interval::point(turn_radius), polar_angle(pitch, turn_radius));
         let exact = ExactPath::turnaround(pitch, radius, arc_ratio, Some(turned), lead_in);
         loop {
             let description = PathDescription::Turnaround { pitch, turn_radius, arc_ratio, lead_in, lead_out };

@@ -243,14 +243,14 @@ pub fn ltc(file: &Path, channel: Option<usize>) -> Result<Receiver<Input>, Sourc
         .ok_or(SourceError::Channel { channel: channel.unwrap_or_default(), channels })?;
     let (sender, inputs) = mpsc::channel();
     std::thread::spawn(move || {
-        sound(&mut stream, (format, decoder), is_live, &sender);
+        sound(&mut stream, format, decoder, is_live, &sender);
         let _ = sender.send(Input::End);
     });
     Ok(inputs)
 }
 
 /// Decodes sound to its end. The last sample of a piece that is read was recorded now; a file is read at its own speed.
-fn sound(stream: &mut impl Read, (format, mut decoder): (Format, Channels), is_live: bool, inputs: &Sender<Input>) {
+fn sound(stream: &mut impl Read, format: Format, mut decoder: Channels, is_live: bool, inputs: &Sender<Input>) {
     let sample_ns = 1e9 / f64::from(format.sample_rate);
     // A file is read in pieces of 10 ms.
     let piece =

@@ -157,7 +157,8 @@ impl Controller {
     /// # Errors
     /// [`ControlError::Open`] if the service fails.
     pub fn request(&mut self, command: Command) -> Result<PendingCommand, ControlError> {
-        self.request_with_value(command.number_and_value())
+        let (number, value) = command.number_and_value();
+        self.request_with_value(number, value)
     }
 
     /// Requests the state of the show. The response's `time_scale` is the rate of the show when it plays.
@@ -166,10 +167,10 @@ impl Controller {
     /// As [`Self::request`].
     pub fn request_playing_rate(&mut self) -> Result<PendingCommand, ControlError> {
         let (number, _) = Command::State.number_and_value();
-        self.request_with_value((number, PLAYING_RATE))
+        self.request_with_value(number, PLAYING_RATE)
     }
 
-    fn request_with_value(&mut self, (number, value): (u32, f64)) -> Result<PendingCommand, ControlError> {
+    fn request_with_value(&mut self, number: u32, value: f64) -> Result<PendingCommand, ControlError> {
         self.sent += 1;
         let request = ControlRequest { id: self.sent, value, command: number, reserved: 0 };
         let sent = self.client.send_copy(request);

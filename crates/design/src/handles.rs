@@ -53,12 +53,22 @@ struct Pull {
     alt: bool,
 }
 
-/// A straight track of a handle.
+/// A half-line on the stage.
 #[derive(Debug, Clone, Copy)]
 struct Ray {
     origin: Point,
     /// Of length 1.
     direction: Vector,
+}
+
+/// The straight track of a handle.
+#[derive(Debug, Clone, Copy)]
+struct Track {
+    ray: Ray,
+    /// The distance of the handle along the ray, in metres.
+    at: f64,
+    /// The change of the handle's number for a metre of the handle.
+    step: f64,
 }
 
 impl Pull {
@@ -100,7 +110,8 @@ impl Found<'_> {
     /// Adds a handle; `fields` are the numbers that it changes.
     fn add(
         &mut self,
-        (name, kind): (String, &'static str),
+        name: String,
+        kind: &'static str,
         place: Point,
         fields: Vec<String>,
         changes: impl Fn(&Pull) -> Vec<Change> + 'static,
@@ -111,27 +122,27 @@ impl Found<'_> {
         self.handles.push(Handle { name, kind, x, y, line, fields, changes: Box::new(changes) });
     }
 
-    /// Adds a handle on a straight track, whose distance along it gives the number of the field `field`. `step` is the
-    /// change of the number for a metre of the handle.
-    fn add_on_ray(
+    /// Adds a handle on a straight track, whose distance along it gives the number of the field `field`.
+    fn add_on_track(
         &mut self,
-        (name, kind): (String, &'static str),
+        name: String,
+        kind: &'static str,
         field: String,
-        (ray, at): (Ray, f64),
-        step: f64,
+        track: Track,
         number: impl Fn(f64) -> f64 + 'static,
     ) {
         let of = field.clone();
-        self.add((name, kind), ray.at(at), vec![field], move |pull| {
+        let Track { ray, at, step } = track;
+        self.add(name, kind, ray.at(at), vec![field], move |pull| {
             vec![Change::number(&of, number(pull.along(&ray)), ROUNDING * step)]
         });
     }
 
     /// Adds a handle that is a place of the text.
-    fn add_place(&mut self, (name, kind): (String, &'static str), place: Point) {
+    fn add_place(&mut self, name: String, kind: &'static str, place: Point) {
         let fields = vec![format!("{name}[0]"), format!("{name}[1]")];
         let of = name.clone();
-        self.add((name, kind), place, fields, move |pull| vec![Change::place(&of, pull.place())]);
+        self.add(name, kind, place, fields, move |pull| vec![Change::place(&of, pull.place())]);
     }
 }
 

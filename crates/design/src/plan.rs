@@ -69,12 +69,15 @@ impl Drop for RunningPlan {
 }
 
 impl RunningPlan {
-    /// Starts a plan of a kind for the request of a number. `answers` receives its progress and its result.
+    /// Starts a plan of a kind for the request with the number `id`. It may vary the fields `vary`. `answers` receives
+    /// its progress and its result.
     ///
     /// # Errors
     /// The system has no thread left.
     pub fn start(
-        (id, kind, vary): (u64, String, Vec<String>),
+        id: u64,
+        kind: String,
+        vary: Vec<String>,
         scene: Arc<DesignedScene>,
         answers: impl Fn(&Value) + Send + 'static,
     ) -> std::io::Result<Self> {
@@ -92,7 +95,7 @@ impl RunningPlan {
                 }
                 ControlFlow::Continue(())
             };
-            let planned = plan((&kind, &vary), &scene, &mut progress);
+            let planned = plan(&kind, &vary, &scene, &mut progress);
             answers(&match planned {
                 _ if of_thread.load(Ordering::Relaxed) => json!({"id": id, "cancelled": true}),
                 Ok(Planned { answer, text, file }) => json!({"id": id, "plan": answer, "text": text, "file": file}),
@@ -134,7 +137,7 @@ enum Unplanned {
 ///
 /// # Errors
 /// The scene cannot have the plan.
-fn plan((kind, vary): (&str, &[String]), scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Unplanned> {
+fn plan(kind: &str, vary: &[String], scene: &DesignedScene, progress: Progress<'_>) -> Result<Planned, Unplanned> {
     match kind {
         "prove" => return prove(scene, progress),
         "fit" => return fitted(vary, scene, progress),
@@ -216,7 +219,7 @@ fn pitch(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resu
         None => "No pitch was found.".to_owned(),
     };
     let value = stage.value(found.value_hi);
-    let line = PitchLine::new(&found, clearance, (&stage, motion), false);
+    let line = PitchLine::new(&found, clearance, &stage, motion, false);
     Ok(Planned::numbers(json!(Told { line, sentence }), with(scene, "path.pitch", value)))
 }
 
@@ -276,7 +279,7 @@ fn turn(scene: &DesignedScene, motion: &Motion, progress: Progress<'_>) -> Resul
         ),
         _ => "No radius was found.".to_owned(),
     };
-    let line = TurnLine::new(&found, (pitch, clearance), (&stage, motion), false);
+    let line = TurnLine::new(&found, pitch, clearance, &stage, motion, false);
     let planned = line.value.map(number);
     let text = planned.and_then(|(field, value)| with(scene, &field, Some(value)));
     Ok(Planned::numbers(json!(Told { line, sentence }), text))
@@ -393,7 +396,7 @@ mod tests {
                  pieces = [{spiral}, {{ kind = \"turn\" }}, {back}]\n[motion]\nhead_speed = 1.0\n"
             );
             let scene = DesignedScene::read(&text, "scene").unwrap();
-            let planned = plan(("turn", &[]), &scene, &mut unreported).unwrap();
+            let planned = plan("turn", &[], &scene, &mut unreported).unwrap();
             let radius = planned.answer["value"].as_f64().unwrap();
             let text = planned.text.unwrap();
             let field = extent.split(' ').next().unwrap();
@@ -414,7 +417,7 @@ mod tests {
             let path = "[path]\nkind = \"turnaround\"\npitch = 1.7\nturn_radius = 4.5\narc_ratio = 2.0";
             let text = format!("[team]\nbenches = 40\n{path}\nlead_in = 40\n[motion]\nhead_speed = 1.0\n{rest}");
             let scene = DesignedScene::read(&text, "scene").unwrap();
-            plan(("pitch", &[]), &scene, &mut unreported).unwrap().answer
+            plan("pitch", &[], &scene, &mut unreported).unwrap().answer
         };
         // The pitches are those of `tests/commands/margin.rs`.
         for (rest, pitch) in [("", 0.450_337_393), ("[require]\nclearance = 0.2\n", 0.650_013_396_5)] {

@@ -171,7 +171,7 @@ impl Desk {
                 return;
             }
             Wish::Plan(kind, vary) => match self.good() {
-                Ok(scene) => return self.plan((id, kind, vary), scene),
+                Ok(scene) => return self.plan(id, kind, vary, scene),
                 Err(fault) => Err(fault),
             },
             wish => self.good().and_then(|scene| {
@@ -251,9 +251,10 @@ impl Desk {
     }
 
     /// Starts a plan, and ends another one.
-    fn plan(&mut self, request: (u64, String, Vec<String>), scene: Arc<DesignedScene>) {
-        let (id, answers) = (request.0, Arc::clone(&self.answers));
-        let started = RunningPlan::start(request, scene, move |answer| answers(Answer::Json(answer.to_string())));
+    fn plan(&mut self, id: u64, kind: String, vary: Vec<String>, scene: Arc<DesignedScene>) {
+        let answers = Arc::clone(&self.answers);
+        let answer = move |answer: &Value| answers(Answer::Json(answer.to_string()));
+        let started = RunningPlan::start(id, kind, vary, scene, answer);
         match started {
             Ok(plan) => self.plan = Some(plan),
             Err(error) => self.refuse(id, &format!("there is no thread for a plan: {error}").into()),

@@ -90,7 +90,8 @@ pub struct CommandEntry {
 }
 
 const fn entry(
-    (number, name): (u32, &'static str),
+    number: u32,
+    name: &'static str,
     command: Command,
     value: CommandValue,
     refusal: Refusal,
@@ -104,25 +105,25 @@ impl Command {
     /// Every command, in the order of its number.
     #[rustfmt::skip]
     pub const TABLE: [CommandEntry; 10] = [
-        entry((0, "state"), Self::State, CommandValue::None, Refusal::Never, true,
+        entry(0, "state", Self::State, CommandValue::None, Refusal::Never, true,
             "Print the playback state"),
-        entry((1, "pause"), Self::Pause, CommandValue::None, Refusal::Never, false,
+        entry(1, "pause", Self::Pause, CommandValue::None, Refusal::Never, false,
             "Stop simulated time; frames are sent at full rate"),
-        entry((2, "resume"), Self::Resume, CommandValue::None, Refusal::Never, false,
+        entry(2, "resume", Self::Resume, CommandValue::None, Refusal::Never, false,
             "Let simulated time advance again"),
-        entry((3, "rate"), Self::Rate(1.0), CommandValue::Rate, Refusal::RateOutOfRange, false,
+        entry(3, "rate", Self::Rate(1.0), CommandValue::Rate, Refusal::RateOutOfRange, false,
             "Set the simulated seconds per second of wall time"),
-        entry((4, "seek"), Self::Seek(1.0), CommandValue::Seconds, Refusal::TimeOutOfRange, false,
+        entry(4, "seek", Self::Seek(1.0), CommandValue::Seconds, Refusal::TimeOutOfRange, false,
             "Go to a simulated time"),
-        entry((5, "step"), Self::Step(1), CommandValue::Periods, Refusal::NotPaused, false,
+        entry(5, "step", Self::Step(1), CommandValue::Periods, Refusal::NotPaused, false,
             "Play PERIODS periods, then pause again"),
-        entry((6, "restart"), Self::Restart, CommandValue::None, Refusal::Never, false,
+        entry(6, "restart", Self::Restart, CommandValue::None, Refusal::Never, false,
             "Go to the start of the show"),
-        entry((7, "hold"), Self::Hold, CommandValue::None, Refusal::Never, true,
+        entry(7, "hold", Self::Hold, CommandValue::None, Refusal::Never, true,
             "Stop until released, whatever else is commanded"),
-        entry((8, "release"), Self::Release, CommandValue::None, Refusal::NotHeld, true,
+        entry(8, "release", Self::Release, CommandValue::None, Refusal::NotHeld, true,
             "Go from hold to paused"),
-        entry((9, "go"), Self::Go, CommandValue::None, Refusal::NotWaiting, false,
+        entry(9, "go", Self::Go, CommandValue::None, Refusal::NotWaiting, false,
             "Continue from a cue that pauses, or from --paused"),
     ];
 

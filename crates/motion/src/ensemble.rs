@@ -317,8 +317,8 @@ impl Ensemble {
     ) -> Result<Vec<MovingDragon<'a>>, NoFollower> {
         let moving = |(Dragon { delay, motion, .. }, found): (&'a Dragon, &'a Singularities)| {
             let end = found.end.map_or(motion.bare_path().length(), |end| end.travelled);
-            let of_show = (*delay, motion.head_speed(), end);
-            MovingDragon::new(motion.advancement(found), *motion.placement(), of_show, budget)
+            let (chain, placement) = (motion.advancement(found), *motion.placement());
+            MovingDragon::new(chain, placement, *delay, motion.head_speed(), end, budget)
         };
         self.dragons.iter().zip(found).map(moving).collect()
     }

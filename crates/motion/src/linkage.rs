@@ -54,7 +54,7 @@ pub fn link_pose(path: &Path, front: Param, rear: Param, link: f64) -> LinkPose 
     if front.segment == rear.segment {
         return path.segment(front).link_pose(front.at, rear.at, link);
     }
-    LinkPose::between((path.point(front), path.tangent(front)), (path.point(rear), path.tangent(rear)))
+    LinkPose::between(path.point(front), path.tangent(front), path.point(rear), path.tangent(rear))
 }
 
 /// Returns the first place from `from` backward that is `link` metres from `front`; all places between are nearer.

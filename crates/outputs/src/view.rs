@@ -188,7 +188,7 @@ pub fn serve<Refused: From<ViewError>>(
         let (name, stop) = (name.clone(), Arc::clone(stop));
         let (proofs, facts) = (Arc::clone(&proofs), Arc::clone(&facts));
         readers.push(std::thread::spawn(move || {
-            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, (&proofs, &facts), &sender, &stop));
+            let read = Feed::new(&name, FEED).map(|feed| reader::read(feed, &name, &proofs, &facts, &sender, &stop));
             stop.store(true, Ordering::Relaxed);
             read
         }));

@@ -324,7 +324,8 @@ impl Rough {
 /// handles of the boards further out are at least `ring` metres from it.
 pub(super) fn is_inside_ring(
     team: &Team,
-    (reach, width): (&Interval, &Interval),
+    reach: &Interval,
+    width: &Interval,
     ring: &Interval,
     metres: &Interval,
 ) -> bool {

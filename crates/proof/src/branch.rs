@@ -23,7 +23,7 @@ impl Branches {
     ///
     /// # Errors
     /// The condition that is violated.
-    pub fn add(&mut self, (path, team): (&Path, &Team), link: usize, front: Span, behind: Place) -> Checked {
+    pub fn add(&mut self, path: &Path, team: &Team, link: usize, front: Span, behind: Place) -> Checked {
         if link > 1 && (link > 2 || team.own_tail().is_none()) {
             return Err(problem!("a branch of link {link}, expected 0, 1, or 2 for a tail with a size of its own"));
         }

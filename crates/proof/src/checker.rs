@@ -269,7 +269,7 @@ impl Checker {
                 return Err(problem!("a branch has to precede all steps"));
             }
             let Scene { path, team, branches, .. } = &mut self.scenes[section.unwrap_or(0)];
-            return branches.add((path, team), *link, Span(*from, *to), *behind);
+            return branches.add(path, team, *link, Span(*from, *to), *behind);
         }
         let so_far = self.results() - self.before;
         let Self { about, scenes, steps, events, greatest, pitch, .. } = self;
@@ -295,7 +295,7 @@ impl Checker {
                     (None, Some(beyond)) => LockShown::Further(beyond),
                     _ => return Err(problem!("expected one of `window` and `beyond`")),
                 };
-                events.add_lock(scene, steps, (link, to), (&spans, &last), shown)
+                events.add_lock(scene, steps, link, to, (&spans, &last), shown)
             }
             ParsedLine::PathEnd {} => events.add_path_end(scene, steps),
             ParsedLine::Speeds { from, to, spans, at } => greatest.add_step(scene, Span(from, to), &spans, &at),

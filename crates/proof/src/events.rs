@@ -68,7 +68,7 @@ fn touching_chain(scene: &Scene, steps: &Steps, head: Span, spans: &[Span]) -> C
 ///
 /// # Errors
 /// The condition that does not follow.
-fn near_step(scene: &Scene, shown: &Shown, head: Span, (spans, at): (&[Span], &[Place])) -> Checked<FirstOrder> {
+fn near_step(scene: &Scene, shown: &Shown, head: Span, spans: &[Span], at: &[Place]) -> Checked<FirstOrder> {
     let (path, Span(from, to)) = (&scene.path, head);
     let chain = Chain::check(scene, head, spans)?;
     if !Interval::new(0.0).is_at_most(&path.travelled(to)) || !path.is_within(from) {
@@ -101,7 +101,7 @@ impl Events {
             }
             Evidence::Most(most, at) => {
                 let shown = whom.obstacle().map_or(&steps.apart, |number| &steps.beside[number]);
-                let step = near_step(scene, shown, head, (spans, &at[0]))?;
+                let step = near_step(scene, shown, head, spans, &at[0])?;
                 whom.check_near(|_, bench| step.board(bench, &scene.team), &scene.obstacles, most)?;
                 Some(*most)
             }
@@ -134,7 +134,8 @@ impl Events {
         &mut self,
         scene: &Scene,
         steps: &Steps,
-        (link, to): (usize, Place),
+        link: usize,
+        to: Place,
         (spans, last): (&[Span], &[Span]),
         shown: LockShown,
     ) -> Checked {

@@ -28,7 +28,7 @@ impl FirstOrder {
         check_places(scene, chain, at)?;
         let Span(from, to) = chain.capsules[0].span;
         let half_step = scene.path.metres_bound(from, at[0]).max(&scene.path.metres_bound(at[0], to));
-        Ok(Self::behind(scene, chain, at, (Interval::new(1.0), Interval::new(0.0), half_step)))
+        Ok(Self::behind(scene, chain, at, Interval::new(1.0), Interval::new(0.0), half_step))
     }
 
     /// Encloses the listed handles of a chain from one time of the show to another (Lemma 12, *Further apart*). Here
@@ -41,7 +41,7 @@ impl FirstOrder {
         let middle = (from + to) * Interval::new(0.5);
         let half_step = (middle - from).max(&(to - middle)).upper();
         let offset = (scene.path.travelled(at[0]) - scene.travelled_at(&middle)).abs().upper();
-        Ok(Self::behind(scene, chain, at, (scene.speed_between(from, to), offset, half_step)))
+        Ok(Self::behind(scene, chain, at, scene.speed_between(from, to), offset, half_step))
     }
 
     /// Encloses the handles behind a head that has the rate P_0 and is at most d_0 from its place at tau = 0.
@@ -49,7 +49,9 @@ impl FirstOrder {
         scene: &Scene,
         chain: &Chain,
         at: &[Place],
-        (rate, offset, half_step): (Interval, Interval, Interval),
+        rate: Interval,
+        offset: Interval,
+        half_step: Interval,
     ) -> Self {
         let path = &scene.path;
         let mut handles = vec![Handle::new(path.at(at[0]), &chain.capsules[0], rate, offset, &half_step)];

@@ -83,9 +83,9 @@ impl Steps {
     /// # Errors
     /// The condition that does not follow.
     pub fn add(&mut self, scene: &Scene, step: Step) -> Checked {
-        let Step { links, head, moving, clear, spans, free, apart, beside, at } = step;
-        let Span(from, to) = head;
-        span_is_one(scene, head).map_err(|problem| problem!("the head: {problem}"))?;
+        let Step { links, head, moving, spans, .. } = &step;
+        let Span(from, to) = *head;
+        span_is_one(scene, *head).map_err(|problem| problem!("the head: {problem}"))?;
         match self.end {
             Some(end) if end != from => return Err(problem!("it does not begin where the step before it ended")),
             Some(_) if from == to => return Err(problem!("it is empty")),
@@ -94,7 +94,7 @@ impl Steps {
             }
             _ => {}
         }
-        let chain = Chain::check(scene, head, &spans)?;
+        let chain = Chain::check(scene, *head, spans)?;
         let Some(first) = spans.first() else { return Err(problem!("no span is listed")) };
         let start_of_second = *self.start_of_second.get_or_insert(first.1);
         match links {
@@ -102,15 +102,15 @@ impl Steps {
             Links::Front => self.check_front(scene, &chain, start_of_second)?,
         }
         self.moving.add(At::Head(to), moving.then_some(0.0), "claims to be moving")?;
-        if let Some(link) = chain.products.iter().position(|product| moving && !product.is_positive()) {
+        if let Some(link) = chain.products.iter().position(|product| *moving && !product.is_positive()) {
             return Err(problem!("it claims to be moving, but link {link} may stall"));
         }
-        self.add_clear(scene, links, &chain, (clear, &free), to)?;
-        self.add_apart(scene, links, &chain, (apart, &beside, &at), to)?;
+        self.add_clear(scene, &chain, &step)?;
+        self.add_apart(scene, &chain, &step)?;
         self.steps += 1;
         self.links += chain.products.len() as u64;
         self.end = Some(to);
-        self.spans = spans;
+        self.spans = step.spans;
         Ok(())
     }
 
@@ -151,17 +151,11 @@ impl Steps {
     }
 
     /// Adds the claims that boards do not touch and stay clear of some obstacles.
-    fn add_clear(
-        &mut self,
-        scene: &Scene,
-        links: Links,
-        chain: &Chain,
-        (clear, free): (bool, &[usize]),
-        to: Place,
-    ) -> Checked {
-        self.clear.add(At::Head(to), clear.then_some(0.0), "claims to be clear")?;
-        if clear {
-            self.pairs += apart::check(scene, links, chain, 0.0, None)?;
+    fn add_clear(&mut self, scene: &Scene, chain: &Chain, step: &Step) -> Checked {
+        let Step { links, head: Span(_, to), clear, free, .. } = step;
+        self.clear.add(At::Head(*to), clear.then_some(0.0), "claims to be clear")?;
+        if *clear {
+            self.pairs += apart::check(scene, *links, chain, 0.0, None)?;
         }
         let mut claims = vec![None; scene.obstacles.len()];
         for obstacle in free {
@@ -169,31 +163,25 @@ impl Steps {
             let claim = claim.ok_or_else(|| problem!("it names the obstacle {obstacle}, which the scene has not"))?;
             *claim = Some(0.0);
         }
-        add_all(&mut self.free, &claims, to)?;
-        beside::check(scene, links, chain, &claims, None)
+        add_all(&mut self.free, &claims, *to)?;
+        beside::check(scene, *links, chain, &claims, None)
     }
 
     /// Adds the claims that boards are further apart than some metres, and further from obstacles.
-    fn add_apart(
-        &mut self,
-        scene: &Scene,
-        links: Links,
-        chain: &Chain,
-        (apart, claims, at): (Option<f64>, &[Option<f64>], &[Place]),
-        to: Place,
-    ) -> Checked {
+    fn add_apart(&mut self, scene: &Scene, chain: &Chain, step: &Step) -> Checked {
+        let Step { links, head: Span(_, to), apart, beside: claims, at, .. } = step;
         let (named, obstacles) = (claims.len(), scene.obstacles.len());
         ensure!(named <= obstacles, "it names {named} obstacles, expected at most {obstacles}");
-        self.apart.add(At::Head(to), apart, "says how far boards are apart")?;
-        add_all(&mut self.beside, claims, to)?;
+        self.apart.add(At::Head(*to), *apart, "says how far boards are apart")?;
+        add_all(&mut self.beside, claims, *to)?;
         if apart.is_none() && claims.iter().all(Option::is_none) {
             return Ok(());
         }
         let step = FirstOrder::new(scene, chain, at)?;
-        if let Some(metres) = apart {
-            self.pairs += apart::check(scene, links, chain, metres, Some(&step))?;
+        if let Some(metres) = *apart {
+            self.pairs += apart::check(scene, *links, chain, metres, Some(&step))?;
         }
-        beside::check(scene, links, chain, claims, Some(&step))
+        beside::check(scene, *links, chain, claims, Some(&step))
     }
 }
 

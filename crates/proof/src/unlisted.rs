@@ -55,7 +55,7 @@ pub(super) fn check_ring(
     let reach = (chain.capsules[boards.start..=boards.end].iter())
         .map(|capsule| capsule.point.norm() + capsule.half)
         .fold(Interval::new(0.0), |most, metres| most.max(&metres));
-    if is_inside_ring(&scene.team, (&reach, &width), &ring, metres) {
+    if is_inside_ring(&scene.team, &reach, &width, &ring, metres) {
         Ok(())
     } else {
         Err(problem!("benches 0 and 1 may touch one that is not listed, or be nearer than it says (Lemma 3)"))

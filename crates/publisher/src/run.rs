@@ -98,9 +98,12 @@ pub struct Published {
     pub error: Option<PublishError>,
 }
 
-/// The hooks of the statistics thread: announce, sample, alive.
-type StatisticsHooks<'a> =
-    (Box<dyn FnMut(&Announcement) + Send + 'a>, Box<dyn FnMut(&Sample) + Send + 'a>, Box<dyn FnMut() + Send + 'a>);
+/// The hooks of the statistics thread, those of [`Hooks`].
+struct StatisticsHooks<'a> {
+    announce: Box<dyn FnMut(&Announcement) + Send + 'a>,
+    sample: Box<dyn FnMut(&Sample) + Send + 'a>,
+    alive: Box<dyn FnMut() + Send + 'a>,
+}
 
 /// The loop's publishers, the transports for the other threads, and the open handle of /dev/cpu_dma_latency.
 type LoopEnds = (Vec<Box<dyn Publisher>>, Vec<Box<dyn Transport>>, Option<File>);
@@ -120,6 +123,7 @@ impl Publishing<'_> {
         hooks: Hooks,
     ) -> Result<Published, RunError> {
         let Hooks { opened: when_open, announce, sample, alive, ended: when_ended } = hooks;
+        let hooks = StatisticsHooks { announce, sample, alive };
         let (reports, inbox) = statistics::queues();
         let done = AtomicBool::new(false);
         let (opened, opening) = mpsc::channel();
@@ -148,7 +152,7 @@ impl Publishing<'_> {
                 when_open(&transports);
                 let collecting = threads.spawn(|| {
                     // A loop without statistics could not be watched.
-                    self.collect(clock, inbox, transports, (announce, sample, alive), &done)
+                    self.collect(clock, inbox, transports, hooks, &done)
                         .inspect_err(|_| stop.store(true, Ordering::Relaxed))
                 });
                 let outcome = looping.join();
@@ -207,12 +211,13 @@ impl Publishing<'_> {
         clock: &impl Clock,
         inbox: Inbox,
         mut transports: Vec<Box<dyn Transport>>,
-        (announce, record, alive): StatisticsHooks<'_>,
+        hooks: StatisticsHooks<'_>,
         done: &AtomicBool,
     ) -> Result<(Summary, Vec<Box<dyn Transport>>), RunError> {
         let sinks: Vec<Box<dyn StatusPublisher>> =
             transports.iter_mut().filter_map(|transport| transport.status().transpose()).collect::<Result<_, _>>()?;
         let Self { run_id, rate, scene, .. } = *self;
+        let StatisticsHooks { announce, sample: record, alive } = hooks;
         let run = statistics::Run { run_id, rate, scene, sinks, announce, record, alive };
         Ok((statistics::collect(clock, inbox, run, done), transports))
     }

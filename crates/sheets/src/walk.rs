@@ -148,7 +148,7 @@ impl<'a> Walk<'a> {
             nearest.include(&chain, time);
             for k in 0..self.dragons.len() {
                 let first = ensemble.handles_of(k).start;
-                self.dragons[k].step(ensemble, k, (time, step), &chain);
+                self.dragons[k].step(ensemble, k, time, step, &chain);
                 for (bench, walk) in self.dragons[k].benches.iter_mut().enumerate().filter(|(i, _)| is_drawn(first + i))
                 {
                     walk.trail.push((time, middle(&chain, first + bench)));
@@ -156,7 +156,7 @@ impl<'a> Walk<'a> {
             }
         }
         let found =
-            nearest.refined((step, self.end), solver.as_mut(), searched, &mut |share| progress(0.7 + 0.3 * share));
+            nearest.refined(step, self.end, solver.as_mut(), searched, &mut |share| progress(0.7 + 0.3 * share));
         for (k, dragon) in self.dragons.iter_mut().enumerate() {
             let first = ensemble.handles_of(k).start;
             for (bench, walk) in dragon.benches.iter_mut().enumerate() {
@@ -177,8 +177,9 @@ impl<'a> Walk<'a> {
 }
 
 impl DragonWalk {
-    /// Adds a sample: the pieces to which benches have come since the sample before, and the speeds.
-    fn step(&mut self, ensemble: &Ensemble, dragon: usize, (time, step): (f64, f64), chain: &Chain) {
+    /// Adds a sample: the pieces to which benches have come since the sample before, `step` seconds earlier, and the
+    /// speeds.
+    fn step(&mut self, ensemble: &Ensemble, dragon: usize, time: f64, step: f64, chain: &Chain) {
         let (first, dragon) = (ensemble.handles_of(dragon).start, &ensemble.dragons()[dragon]);
         let motion = &dragon.motion;
         let (path, team) = (motion.path(), motion.team());

@@ -29,20 +29,23 @@ pub fn clearance_curve(
     scene.cues.clear();
     let [least_time, _] = least;
     let (step, fine) = (end / f64::from(POINTS), end / f64::from(POINTS * POINTS_AT_LEAST));
-    let mut points = frames(&scene, timeline, (0.0, step, POINTS), &mut |share| progress(0.9 * share))?;
-    let around = ((least_time - step).max(0.0), fine, 2 * POINTS_AT_LEAST);
-    points.extend(frames(&scene, timeline, around, &mut |share| progress(0.9 + 0.1 * share))?);
+    let mut points = frames(&scene, timeline, 0.0, step, POINTS, &mut |share| progress(0.9 * share))?;
+    let from = (least_time - step).max(0.0);
+    points.extend(frames(&scene, timeline, from, fine, 2 * POINTS_AT_LEAST, &mut |share| progress(0.9 + 0.1 * share))?);
     points.push(least);
     points.retain(|[time, _]| *time <= end);
     points.sort_by(|one, other| one[0].total_cmp(&other[0]));
     Some(points)
 }
 
-/// Returns the times and the clearances of `count` + 1 frames of the show, `step` simulated seconds apart.
+/// Returns the times and the clearances of `count` + 1 frames of the show from `start` on, `step` simulated seconds
+/// apart.
 fn frames(
     scene: &Scene,
     timeline: &Timeline,
-    (start, step, count): (f64, f64, u32),
+    start: f64,
+    step: f64,
+    count: u32,
     progress: Progress<'_>,
 ) -> Option<Vec<[f64; 2]>> {
     let rate = 1.0 / step;

@@ -57,11 +57,11 @@ pub fn plot(unit: &str, scale: Scale, lines: &[PlotLine]) -> Option<String> {
             Scale::Logarithmic => {
                 let floor = if least.is_nan() { 0.1 } else { least * 0.7 };
                 let down = (floor..(most * 1.4).max(floor * 10.0)).log_scale();
-                draw(&mut chart.build_cartesian_2d(across, down).ok()?, unit, time, lines, (seconds, floor))?;
+                draw(&mut chart.build_cartesian_2d(across, down).ok()?, unit, time, seconds, lines, floor)?;
             }
             Scale::Linear => {
                 let down = 0.0..if most > 0.0 { most * 1.1 } else { 1.0 };
-                draw(&mut chart.build_cartesian_2d(across, down).ok()?, unit, time, lines, (seconds, 0.0))?;
+                draw(&mut chart.build_cartesian_2d(across, down).ok()?, unit, time, seconds, lines, 0.0)?;
             }
         }
         area.present().ok()?;
@@ -90,12 +90,15 @@ fn unit_of_time(span: f64) -> (f64, &'static str) {
     }
 }
 
+/// Draws axes and lines. `time` is the name of the unit of time, which has `seconds`. Values below `floor` are drawn
+/// on it.
 fn draw<'a, Y>(
     chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<plotters::coord::types::RangedCoordf64, Y>>,
     unit: &str,
     time: &str,
+    seconds: f64,
     lines: &[PlotLine],
-    (seconds, floor): (f64, f64),
+    floor: f64,
 ) -> Option<()>
 where
     Y: plotters::coord::ranged1d::Ranged<ValueType = f64> + plotters::coord::ranged1d::ValueFormatter<f64>,

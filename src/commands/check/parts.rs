@@ -90,20 +90,25 @@ enum Benches {
 /// The proved least clearances of a show, in the order of the certificate.
 pub(super) struct Parts(Vec<Part>);
 
-/// The least clearances that the ordinary search has found: of boards, and of obstacles.
-pub(super) type Found<'f> = (Option<TimedClearance>, &'f [TimedObstacleClearance]);
+/// The least clearances that the ordinary search has found.
+#[derive(Clone, Copy)]
+pub(super) struct Found<'f> {
+    pub boards: Option<TimedClearance>,
+    pub obstacles: &'f [TimedObstacleClearance],
+}
 
 impl Parts {
     /// Encloses the least clearances of a show, given the text of its scene. Writes the certificate to `file`.
     pub(super) fn enclosed(
-        (scene, text): (&Scene, &str),
+        scene: &Scene,
+        text: &str,
         show_end: &TimedEvent,
         found: Found<'_>,
         file: Option<&Path>,
         common: &Common,
     ) -> Result<Self, CommandError> {
         let mut certificate = file.map(CertificateFile::create).transpose()?;
-        if certificate.is_some() && found.0.is_none() && found.1.is_empty() {
+        if certificate.is_some() && found.boards.is_none() && found.obstacles.is_empty() {
             let sentence = "no certificate is written: the search found no least clearance";
             return Err(CommandError::Failed(sentence.to_owned()));
         }
@@ -111,8 +116,8 @@ impl Parts {
         let mut write =
             |line: &CertificateLine| certificate.as_mut().map_or(Ok(()), |certificate| certificate.write(line));
         let mut progress = |share| report(&bar, share);
-        let least = found.0.map(|found| found.least);
-        let hints = ClearanceHints { boards: least.as_ref(), obstacles: found.1 };
+        let least = found.boards.map(|found| found.least);
+        let hints = ClearanceHints { boards: least.as_ref(), obstacles: found.obstacles };
         let (ensemble, most_steps) = (&scene.ensemble, MOST_CLEARANCE_STEPS);
         let proved = certify_clearances(ensemble, show_end, hints, text, most_steps, &mut write, &mut progress);
         bar.finish_and_clear();
@@ -163,7 +168,7 @@ impl Parts {
 }
 
 /// Returns the parts of one dragon: of its boards, and of each obstacle.
-fn own_parts(ensemble: &Ensemble, k: usize, own: &ClearanceEnclosures, (least, beside): Found<'_>) -> Vec<Part> {
+fn own_parts(ensemble: &Ensemble, k: usize, own: &ClearanceEnclosures, found: Found<'_>) -> Vec<Part> {
     let Dragon { name, delay, motion } = &ensemble.dragons()[k];
     let (is_unnamed, first) = (name.is_empty(), ensemble.handles_of(k).start);
     let names = || if is_unnamed { Vec::new() } else { vec![name.clone()] };
@@ -173,7 +178,7 @@ fn own_parts(ensemble: &Ensemble, k: usize, own: &ClearanceEnclosures, (least, b
     let of_boards = Part {
         dragons: names(),
         obstacle: None,
-        least_clearance: is_unnamed.then(|| least.map(|found| found.least.value)),
+        least_clearance: is_unnamed.then(|| found.boards.map(|found| found.least.value)),
         proved: ProvedBounds::of(boards.map(|found| ([found.lo, found.hi], found.until, found.travelled)), time_at),
         benches: Benches::Two {
             bench_a: boards.map(|found| first + found.bench_a),
@@ -183,7 +188,7 @@ fn own_parts(ensemble: &Ensemble, k: usize, own: &ClearanceEnclosures, (least, b
     };
     let of_obstacle = |(number, obstacle): (usize, &Obstacle)| {
         let enclosure = own.obstacles.get(number).copied().flatten();
-        let found = beside.iter().find(|found| found.obstacle == number);
+        let found = found.obstacles.iter().find(|found| found.obstacle == number);
         let bench = enclosure.map(|found| first + found.bench);
         let proved = enclosure.map(|found| ([found.lo, found.hi], found.until, found.travelled));
         (found.is_some() || !is_unnamed).then(|| Part {

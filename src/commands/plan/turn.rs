@@ -33,10 +33,10 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
     bar.finish_and_clear();
     let mut output = Output::standard();
     if common.json {
-        let line = TurnLine::new(&found, (pitch, clearance), (&stage, &motion), are_searches_stopped());
+        let line = TurnLine::new(&found, pitch, clearance, &stage, &motion, are_searches_stopped());
         output.json(&line)?;
     } else {
-        for sentence in sentences(&scene, (pitch, clearance), arc_ratio.is_none(), &found) {
+        for sentence in sentences(&scene, pitch, clearance, arc_ratio.is_none(), &found) {
             output.line(&sentence)?;
         }
         if let Some(sentence) = stage_sentence(&stage, &motion, "turn radius", found.value_hi) {
@@ -46,7 +46,7 @@ pub fn plan_turn(common: &Common, arc_ratio: Option<f64>, spacing: &Spacing) -> 
     output.finish().and(unstopped())
 }
 
-fn sentences(scene: &Scene, (pitch, clearance): (f64, f64), is_best: bool, found: &LeastTurn) -> Vec<String> {
+fn sentences(scene: &Scene, pitch: f64, clearance: f64, is_best: bool, found: &LeastTurn) -> Vec<String> {
     let LeastTurn { value_lo, value_hi, value, length, from, arc_ratio, limit, proved, intervals, leads, .. } = *found;
     let mut sentences = Vec::new();
     if let (Some(radius), Some(length)) = (value, length) {
@@ -57,7 +57,7 @@ fn sentences(scene: &Scene, (pitch, clearance): (f64, f64), is_best: bool, found
         ));
     }
     if let Some(limit) = limit {
-        sentences.push(limit_sentence(scene, (value_lo, clearance), &limit));
+        sentences.push(limit_sentence(scene, value_lo, clearance, &limit));
     }
     let too_near = are_too_near(clearance);
     sentences.push(match (value_hi, leads) {
@@ -88,7 +88,7 @@ fn sentences(scene: &Scene, (pitch, clearance): (f64, f64), is_best: bool, found
     sentences
 }
 
-fn limit_sentence(scene: &Scene, (value_lo, clearance): (f64, f64), limit: &TurnLimit) -> String {
+fn limit_sentence(scene: &Scene, value_lo: f64, clearance: f64, limit: &TurnLimit) -> String {
     let TurnLimit { kind, bench_a, bench_b, past } = *limit;
     let bench = bench_name(scene, bench_a);
     let place = format!("{past:.6} m past the beginning of the S");

@@ -307,7 +307,7 @@ fn seeds() -> Vec<Vec<u8>> {
             let scene = SceneText { text: text.clone(), file: "seed.toml".to_owned(), stem: "seed".to_owned() };
             let parsed: Scene = scene.parse().expect("a scene");
             let playback = Playback { rate: 5.0, ..Playback::of(&parsed) };
-            let show = ShowLine::new(&scene, &playback, Arithmetic::of(&parsed), "newton", (1, 2));
+            let show = ShowLine::new(&scene, &playback, Arithmetic::of(&parsed), "newton", 1, 2);
             let log = log_of(&show, playback, &commands[..given], given == 4);
             let verdict = verify(log.as_slice(), "seed.jsonl", &mut |_| ()).expect("a log");
             assert!(verdict.verdict == "same" && verdict.complete, "{verdict:?}");

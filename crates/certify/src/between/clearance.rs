@@ -93,7 +93,7 @@ pub fn certify_clearances(
         let (write, motion) = (&mut *write, &dragon.motion);
         own.push(if dragon.name.is_empty() {
             // The format has no line for this dragon.
-            certify_part(motion, (Part::default(), show_end), hints, most_steps, write, &mut progress)?
+            certify_part(motion, Part::default(), show_end, hints, most_steps, write, &mut progress)?
         } else {
             write(&CertificateLine::Section { dragons: vec![number] })?;
             let end = own_end(ensemble, number, show_end);
@@ -103,7 +103,7 @@ pub fn certify_clearances(
             let (least, obstacles) = (least.map(|found| found.least), alone.obstacle_clearances(&end, &mut silent));
             let hints = ClearanceHints { boards: least.as_ref(), obstacles: &obstacles };
             let part = Part { dragons: vec![number], delay: dragon.delay, show_end: Some(show_end.time) };
-            certify_part(motion, (part, &end), hints, most_steps, write, &mut progress)?
+            certify_part(motion, part, &end, hints, most_steps, write, &mut progress)?
         });
         done += 1.0;
     }

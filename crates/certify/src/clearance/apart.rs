@@ -100,7 +100,7 @@ impl Descent<'_, '_> {
                 }
             }
             let next = count.max(first);
-            if next < benches && !beyond && !self.is_apart_from_rest((a, board), listed, first_order, next) {
+            if next < benches && !beyond && !self.is_apart_from_rest(a, board, listed, first_order, next) {
                 return Err([a, next]);
             }
         }
@@ -114,7 +114,8 @@ impl Descent<'_, '_> {
     /// Returns true if a board is apart from the boards from `next` on, which are not listed.
     fn is_apart_from_rest(
         &self,
-        (a, board): (usize, &MovingBoard),
+        a: usize,
+        board: &MovingBoard,
         listed: &Listed,
         first_order: Option<&FirstOrderStep>,
         next: usize,

@@ -201,10 +201,10 @@ impl OnStage<'_> {
     /// Returns true if boards are proved to keep their clearance from any distance, and no link to stall or lock.
     fn are_boards_free(&self, value: f64, progress: Progress<'_>) -> bool {
         match self.planned {
-            Planned::Pitch { radius } => reaches(self.asked, value, radius, (MOST_STEPS, false), progress).is_some(),
+            Planned::Pitch { radius } => reaches(self.asked, value, radius, MOST_STEPS, false, progress).is_some(),
             Planned::Turn { arc_ratio } => {
                 let pitch = self.motion.description().pitch();
-                let passage = pitch.and_then(|pitch| Passage::new(self.asked, (pitch, arc_ratio), value));
+                let passage = pitch.and_then(|pitch| Passage::new(self.asked, pitch, arc_ratio, value));
                 passage.is_some_and(|passage| passage.is_free(self.asked, true, progress))
             }
         }

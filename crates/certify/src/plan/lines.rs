@@ -25,7 +25,7 @@ pub struct PitchLine {
 impl PitchLine {
     /// Returns the line of an answer for boards that keep a clearance, in metres, and of the answer on a motion's
     /// stage. `is_stopped` is true if a signal or the user has ended the search.
-    pub fn new(found: &LeastPitch, clearance: f64, (stage, motion): (&Stage, &Motion), is_stopped: bool) -> Self {
+    pub fn new(found: &LeastPitch, clearance: f64, stage: &Stage, motion: &Motion, is_stopped: bool) -> Self {
         let value = stage.value(found.value_hi);
         Self {
             plan: "pitch",
@@ -66,8 +66,10 @@ impl TurnLine {
     /// a motion's stage. `is_stopped` is true if a signal or the user has ended the search.
     pub fn new(
         found: &LeastTurn,
-        (pitch, clearance): (f64, f64),
-        (stage, motion): (&Stage, &Motion),
+        pitch: f64,
+        clearance: f64,
+        stage: &Stage,
+        motion: &Motion,
         is_stopped: bool,
     ) -> Self {
         let value = stage.value(found.value_hi);

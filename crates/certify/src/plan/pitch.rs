@@ -101,7 +101,7 @@ pub fn certify_least_pitch<'a>(
     let asked = asked.into();
     let mut propose = |from: f64, to: f64, progress: Progress<'_>| free_from(asked, (from, to), radius, progress);
     let (found, proof) = decided(asked, radius, &mut propose, true, progress)?;
-    Ok(written(&found, proof, (radius, asked.clearance), scene, write).map(|()| found))
+    Ok(written(&found, proof, radius, asked.clearance, scene, write).map(|()| found))
 }
 
 /// The lines that prove an enclosure.
@@ -116,7 +116,8 @@ struct Proof {
 fn written(
     found: &LeastPitch,
     proof: Proof,
-    (radius, clearance): (f64, f64),
+    radius: f64,
+    clearance: f64,
     scene: &str,
     write: Write<'_>,
 ) -> io::Result<()> {
@@ -164,7 +165,7 @@ fn decided(
         intervals: 0,
         lines: keeps.then(Vec::new),
     };
-    let reaches = |pitch: f64, progress: Progress<'_>| reaches(asked, pitch, radius, (MOST_STEPS, keeps), progress);
+    let reaches = |pitch: f64, progress: Progress<'_>| reaches(asked, pitch, radius, MOST_STEPS, keeps, progress);
     let (mut value_hi, mut reached) = (None, None);
     let mut next = from;
     for _ in 0..MOST_PROPOSALS {
@@ -334,7 +335,7 @@ impl Blocked<'_> {
             let (a, b) = pair;
             let behind = [(a, b + 1), (a, b + 2), (a, b.saturating_sub(1).max(a + 2))];
             for (pairs, shallow) in [(&[pair][..], kept), (&behind, self.shallow)] {
-                let nearest = deepest(self.asked, self.pitch, self.radius, (pairs, head_radius), progress);
+                let nearest = deepest(self.asked, self.pitch, self.radius, pairs, head_radius, progress);
                 if nearest.clearance < -shallow * depth {
                     let depth = if nearest.pair == pair { depth } else { -nearest.clearance };
                     self.deepest = Some(Deepest { pair: nearest.pair, depth, head_radius: nearest.head_radius });
@@ -347,7 +348,7 @@ impl Blocked<'_> {
         self.locks = matches!(found, Some(Obstacle::Lock));
         let Some(Obstacle::Touch { pair, head_radius }) = found else { return self.locks };
         let Nearest { clearance, head_radius, .. } =
-            deepest(self.asked, self.pitch, self.radius, (&[pair], head_radius), progress);
+            deepest(self.asked, self.pitch, self.radius, &[pair], head_radius, progress);
         let is_same = self.deepest.is_some_and(|deepest| deepest.pair == pair);
         self.shallow = if is_same { self.shallow * self.shallow } else { SHALLOW };
         self.deepest = (clearance < 0.0).then_some(Deepest { pair, depth: -clearance, head_radius });

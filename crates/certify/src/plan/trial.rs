@@ -44,7 +44,7 @@ pub(super) fn obstacle(asked: Spaced<'_>, pitch: f64, radius: f64, progress: Pro
         }
         // Boards with almost no room between them and the next but one touch in a bend that may be anywhere.
         let outer = clear_beyond(asked, pitch, radius)?;
-        let far = Trial::new(asked, (pitch, radius), outer, progress);
+        let far = Trial::new(asked, pitch, radius, outer, progress);
         (far.limit > near.limit).then(|| far.obstacle(progress))?
     })
 }
@@ -86,7 +86,7 @@ pub(super) fn free_from(asked: Spaced<'_>, (from, to): (f64, f64), radius: f64, 
             }
             Obstacle::Touch { pair, head_radius } => {
                 let clearance = |pitch: f64| {
-                    deepest(asked, pitch, radius, (&[pair], head_radius), &mut |_| progress(pitch)).clearance
+                    deepest(asked, pitch, radius, &[pair], head_radius, &mut |_| progress(pitch)).clearance
                 };
                 sign_change(clearance, pitch, pitch * GROWTH)
             }
@@ -134,7 +134,7 @@ impl Obstacle {
             Self::Lock => Trial::near(asked, pitch, radius, progress).locks().then_some(self),
             Self::Touch { pair, head_radius } => {
                 let Nearest { clearance, head_radius, .. } =
-                    deepest(asked, pitch, radius, (&[pair], head_radius), progress);
+                    deepest(asked, pitch, radius, &[pair], head_radius, progress);
                 (clearance <= 0.0).then_some(Self::Touch { pair, head_radius })
             }
         }
@@ -157,10 +157,11 @@ pub(super) fn deepest(
     asked: Spaced<'_>,
     pitch: f64,
     radius: f64,
-    (pairs, head_radius): (&[(u32, u32)], f64),
+    pairs: &[(u32, u32)],
+    head_radius: f64,
     progress: Progress<'_>,
 ) -> Nearest {
-    let trial = Trial::new(asked, (pitch, radius), head_radius.max(radius) + TURNS_ABOUT * pitch, progress);
+    let trial = Trial::new(asked, pitch, radius, head_radius.max(radius) + TURNS_ABOUT * pitch, progress);
     let mut budget = Budget::new(u64::MAX, progress);
     let around = WINDOW * trial.team.shortest_link();
     let at = trial.path.length() - Path::spiral(pitch, head_radius / pitch).length();
@@ -195,11 +196,11 @@ struct Trial {
 impl Trial {
     fn near(asked: Spaced<'_>, pitch: f64, radius: f64, progress: Progress<'_>) -> Self {
         let outer = radius.max(asked.team.longest_link()) + TURNS_BEFORE * pitch;
-        Self::new(asked, (pitch, radius), outer, progress)
+        Self::new(asked, pitch, radius, outer, progress)
     }
 
     /// Creates the trial of a head that comes in from `outer` metres to `radius` metres.
-    fn new(asked: Spaced<'_>, (pitch, radius): (f64, f64), outer: f64, progress: Progress<'_>) -> Self {
+    fn new(asked: Spaced<'_>, pitch: f64, radius: f64, outer: f64, progress: Progress<'_>) -> Self {
         let Spaced { team, clearance } = asked;
         let start = outer / pitch;
         let path = Path::spiral(pitch, start);

@@ -167,7 +167,7 @@ pub fn least_turn<'a>(
     };
     for further in FURTHER {
         let upper = value_lo + further * WIDTH;
-        let passage = |asked: Spaced<'_>| Passage::new(asked, (pitch, family.arc_ratio), upper);
+        let passage = |asked: Spaced<'_>| Passage::new(asked, pitch, family.arc_ratio, upper);
         // The first benches fail as soon as the whole team does, at less cost.
         let few = team.foremost(FEW);
         let few = Spaced { team: &few, clearance };
@@ -316,7 +316,7 @@ impl Blocked<'_> {
         let radii = [self.radius, self.radius + width];
         let middle = 0.5 * radii[0] + 0.5 * radii[1];
         let path = self.family.path(middle)?;
-        Some((Turns::new(Spaced { team, clearance }, (pitch, arc_ratio), radii, path), middle))
+        Some((Turns::new(Spaced { team, clearance }, pitch, arc_ratio, radii, path), middle))
     }
 
     /// Returns true if the event is proved for all radii up to `width` further on.
@@ -327,7 +327,7 @@ impl Blocked<'_> {
             Witness::Fold { link, pivot, end, .. } => turns.fold(*link, at(*pivot), at(*end)),
             Witness::Overlap { pair, head: Place(segment, place, _), radius, rate } => {
                 let head = Place(*segment, place + rate * (middle - radius), 0.0);
-                turns.overlap((at(head), *rate), [pair.0 as usize, pair.1 as usize])
+                turns.overlap(at(head), *rate, [pair.0 as usize, pair.1 as usize])
             }
         }
     }

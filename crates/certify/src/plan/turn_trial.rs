@@ -203,8 +203,8 @@ impl Family<'_> {
                 Some(handle)
             })?;
             let near = path.travelled(pivot) - lead_in;
-            let of_family = (event.kind, first + link);
-            Some(REACHES.map(|reach| self.pivoted(radius, of_family, near, reach * team.link(link))))
+            let of_family = first + link;
+            Some(REACHES.map(|reach| self.pivoted(radius, event.kind, of_family, near, reach * team.link(link))))
         };
         let witnesses = found.stall.into_iter().chain(lock).filter_map(witness);
         witnesses.flatten().flatten().collect()
@@ -212,7 +212,7 @@ impl Family<'_> {
 
     /// Returns the fold with the deepest pivot within the distance `reach` of the place `near`. Both are metres along
     /// the path, and the place is counted from the beginning of the S.
-    fn pivoted(&self, radius: f64, (kind, link): (EventKind, usize), near: f64, reach: f64) -> Option<Witness> {
+    fn pivoted(&self, radius: f64, kind: EventKind, link: usize, near: f64, reach: f64) -> Option<Witness> {
         if (self.ask)(PIVOT_WORK).is_break() {
             return None;
         }
@@ -276,7 +276,7 @@ impl Family<'_> {
         let past = self.past(radius, witness.place());
         match *witness {
             Witness::Fold { kind, link, .. } => {
-                let pivoted = move |reach| self.pivoted(radius, (kind, link), past, reach * self.team.link(link));
+                let pivoted = move |reach| self.pivoted(radius, kind, link, past, reach * self.team.link(link));
                 Box::new(REACHES.into_iter().filter_map(pivoted))
             }
             Witness::Overlap { pair, .. } => Box::new(self.overlaps(radius, pair, past).into_iter()),

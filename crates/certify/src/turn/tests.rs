@@ -40,7 +40,7 @@ fn velocities_hold_differences_of_the_ordinary_solver() {
     const STEP: f64 = 1e-6;
     let path = Path::turnaround(PITCH, RADIUS, RATIO, 0.0, 100.0).unwrap();
     let radii = [RADIUS - 1e-12, RADIUS + 1e-12];
-    let turns = Turns::new((&TEAM).into(), (PITCH, RATIO), radii, path);
+    let turns = Turns::new((&TEAM).into(), PITCH, RATIO, radii, path);
     let mut on_segment = [0; 4];
     for (head, rate) in
         [(Place(0, 20.0, 0.0), 0.0), (Place(1, 1.5, 0.0), -2.0), (Place(2, 2.0, 0.0), 1.0), (Place(3, 20.5, 0.0), 0.7)]

@@ -1,6 +1,6 @@
 //! The handles of obstacles and of the boundary.
 
-use super::{Found, Ray};
+use super::{Found, Ray, Track};
 use crate::edit::Change;
 use bench_dragon_motion::ground::{Ground, Obstacle};
 use bench_dragon_motion::model::shape::ShapeKind;
@@ -21,10 +21,10 @@ pub(super) fn add(found: &mut Found<'_>, ground: &Ground) {
 
 fn add_circle(found: &mut Found<'_>, name: &str, obstacle: &Obstacle) {
     let (centre, radius) = (obstacle.shape.points()[0], obstacle.shape.radius());
-    found.add_place((format!("{name}.circle.center"), "centre"), centre);
+    found.add_place(format!("{name}.circle.center"), "centre", centre);
     let field = format!("{name}.circle.radius");
-    let rim = Ray { origin: centre, direction: Vector::x() };
-    found.add_on_ray((field.clone(), "rim"), field, (rim, radius), 1.0, |metres| metres);
+    let rim = Track { ray: Ray { origin: centre, direction: Vector::x() }, at: radius, step: 1.0 };
+    found.add_on_track(field.clone(), "rim", field, rim, |metres| metres);
     let outward = Ray { origin: centre, direction: Vector::y() };
     add_keep_out(found, name, outward, radius, obstacle.keep_out);
 }
@@ -33,8 +33,8 @@ fn add_circle(found: &mut Found<'_>, name: &str, obstacle: &Obstacle) {
 fn add_keep_out(found: &mut Found<'_>, name: &str, ray: Ray, begin: f64, keep_out: f64) {
     let field = format!("{name}.keep_out");
     if found.scene.values.number(&field).is_some() {
-        let at = (ray, begin + keep_out);
-        found.add_on_ray((field.clone(), "keep_out"), field, at, 1.0, move |metres| metres - begin);
+        let track = Track { ray, at: begin + keep_out, step: 1.0 };
+        found.add_on_track(field.clone(), "keep_out", field, track, move |metres| metres - begin);
     }
 }
 
@@ -47,13 +47,13 @@ fn add_corners(found: &mut Found<'_>, name: &str, list: &str, obstacle: &Obstacl
     if !is_boundary {
         let middle = Point::from(corners.iter().map(|corner| corner.coords).sum::<Vector>() / corners.len() as f64);
         let whole: Vec<(String, Point)> = names.iter().cloned().zip(corners.iter().copied()).collect();
-        found.add((format!("{name}.{list}"), "centre"), middle, Vec::new(), move |pull| {
+        found.add(format!("{name}.{list}"), "centre", middle, Vec::new(), move |pull| {
             let by = pull.place() - middle;
             whole.iter().map(|(name, corner)| Change::place(name, corner + by)).collect()
         });
     }
     for (name, corner) in names.into_iter().zip(corners) {
-        found.add_place((name, kind), *corner);
+        found.add_place(name, kind, *corner);
     }
     let by = corners[1] - corners[0];
     // A polygon has its inside to the left if it turns counter-clockwise; a line has no inside.

@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Found, Pull, ROUNDING, Ray};
+use super::{Found, Pull, ROUNDING, Ray, Track};
 use crate::edit::Change;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::curve::Curve;
@@ -42,14 +42,14 @@ fn add_grip(found: &mut Found<'_>, prefix: &str, motion: &Motion) {
     let grip = motion.placement().origin();
     let is_route = matches!(motion.description(), PathDescription::Route { .. });
     if is_route && values.get(&format!("{prefix}placement")).is_none() {
-        return found.add_place((format!("{prefix}path.start"), "placement"), grip);
+        return found.add_place(format!("{prefix}path.start"), "placement", grip);
     }
     let name = format!("{prefix}placement.origin");
     let given = [0, 1].map(|k| values.number(&format!("{name}[{k}]")).unwrap_or(0.0));
     let fields = vec![format!("{name}[0]"), format!("{name}[1]")];
     let by = Point::from(given) - grip;
     let of = name.clone();
-    found.add((name, "placement"), grip, fields, move |pull| vec![Change::place(&of, pull.place() + by)]);
+    found.add(name, "placement", grip, fields, move |pull| vec![Change::place(&of, pull.place() + by)]);
 }
 
 fn add_heading(found: &mut Found<'_>, prefix: &str, placement: &Placement, turns: f64) {
@@ -57,7 +57,7 @@ fn add_heading(found: &mut Found<'_>, prefix: &str, placement: &Placement, turns
     let (sine, cosine) = (TAU * turns).sin_cos();
     let place = placement.point(Point::new(HEADING_ARM * cosine, HEADING_ARM * sine));
     let (of, placement) = (field.clone(), *placement);
-    found.add((field.clone(), "heading"), place, vec![field], move |pull| {
+    found.add(field.clone(), "heading", place, vec![field], move |pull| {
         let own = placement.own_point(pull.to);
         let turns = own.y.atan2(own.x) / TAU;
         let turns = if pull.free { turns } else { (turns / HEADING_SNAP).round() * HEADING_SNAP };
@@ -82,7 +82,7 @@ fn add_spiral(found: &mut Found<'_>, prefix: &str, placement: &Placement, pitch:
     let at = |turns: f64| placement.point(spiral.point(DoubleDouble::from_turns(turns)));
     let field = format!("{prefix}path.start_turn");
     let (of, of_placement) = (field.clone(), *placement);
-    found.add((field.clone(), "turns"), at(start_turn), vec![field], move |pull| {
+    found.add(field.clone(), "turns", at(start_turn), vec![field], move |pull| {
         let (polar_turns, distance) = polar(of_placement.own_point(pull.place()));
         let turns = turns_at(polar_turns, distance, pitch, 0.0);
         vec![Change::number(&of, turns, ROUNDING / (TAU * pitch * turns.max(1.0)))]
@@ -90,8 +90,8 @@ fn add_spiral(found: &mut Found<'_>, prefix: &str, placement: &Placement, pitch:
     let turns = if start_turn > 2.0 * INSIDE { start_turn - INSIDE } else { 0.5 * start_turn };
     let ray = Ray::towards(placement.origin(), at(turns));
     let field = format!("{prefix}path.pitch");
-    let pitch_at = move |metres: f64| metres / turns;
-    found.add_on_ray((field.clone(), "pitch"), field, (ray, pitch * turns), 1.0 / turns, pitch_at);
+    let track = Track { ray, at: pitch * turns, step: 1.0 / turns };
+    found.add_on_track(field.clone(), "pitch", field, track, move |metres| metres / turns);
 }
 
 /// A turnaround.
@@ -111,10 +111,11 @@ impl Turnaround {
         // The two rings have handles in one direction, since a place of the path would turn with the numbers.
         let ring = Ray { origin: centre, direction: placement.vector(Vector::x()) };
         let field = format!("{path}.turn_radius");
-        found.add_on_ray((field.clone(), "radius"), field, (ring, turn_radius), 1.0, |metres| metres);
+        let track = Track { ray: ring, at: turn_radius, step: 1.0 };
+        found.add_on_track(field.clone(), "radius", field, track, |metres| metres);
         let field = format!("{path}.pitch");
-        let pitch_at = move |metres: f64| metres - turn_radius;
-        found.add_on_ray((field.clone(), "pitch"), field, (ring, turn_radius + pitch), 1.0, pitch_at);
+        let track = Track { ray: ring, at: turn_radius + pitch, step: 1.0 };
+        found.add_on_track(field.clone(), "pitch", field, track, move |metres| metres - turn_radius);
         let spiral = Spiral::new(pitch, Direction::Inward);
         let begin = DoubleDouble::from_turns(turn_radius / pitch);
         let across = Ray::towards(placement.point(spiral.point(begin)), centre);
@@ -129,7 +130,7 @@ impl Turnaround {
         if is_turns || is_metres {
             let field = if is_turns { start_turn } else { lead };
             let of = field.clone();
-            found.add((field.clone(), "turns"), place, vec![field], move |pull| {
+            found.add(field.clone(), "turns", place, vec![field], move |pull| {
                 let (polar_turns, distance) = polar(placement.own_point(pull.place()));
                 let turns = turns_at(polar_turns, distance, pitch, turn);
                 let (value, step) = match is_turns {
@@ -144,7 +145,7 @@ impl Turnaround {
             let outward = Spiral::new(pitch, Direction::Outward);
             let place = placement.point(outward.point(outward.advance(begin, lead_out)));
             let of = field.clone();
-            found.add((field.clone(), "end"), place, vec![field], move |pull| {
+            found.add(field.clone(), "end", place, vec![field], move |pull| {
                 let (polar_turns, distance) = polar(placement.own_point(pull.place()));
                 // The outward spiral is the inward one turned by half a turn.
                 let turns = turns_at(polar_turns + PI / TAU, distance, pitch, turn);
@@ -165,7 +166,7 @@ pub(super) fn add_arc_ratio(found: &mut Found<'_>, field: String, across: Ray, l
         share / (1.0 - share)
     };
     let of = field.clone();
-    found.add((field.clone(), "middle"), across.at(share * length), vec![field], move |pull: &Pull| {
+    found.add(field.clone(), "middle", across.at(share * length), vec![field], move |pull: &Pull| {
         let ratio = ratio_at(pull.along(&across));
         vec![Change::number(&of, ratio, ROUNDING * (1.0 + ratio) * (1.0 + ratio) / length)]
     });

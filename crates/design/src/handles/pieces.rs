@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use super::paths::{add_arc_ratio, turns_at};
-use super::{Found, Pull, ROUNDING, Ray};
+use super::{Found, Pull, ROUNDING, Ray, Track};
 use crate::edit::Change;
 use bench_dragon_motion::Motion;
 use bench_dragon_motion::model::curve::{Curve, Side};
@@ -63,7 +63,7 @@ pub(super) fn add(found: &mut Found<'_>, prefix: &str, motion: &Motion) {
                 add_arc_ratio(found, format!("{name}.arc_ratio"), across, (end - begin.start).norm(), ratio(own));
             }
             OutlineKind::Line => add_line(found, &name, &begin),
-            OutlineKind::Arc { curvature } => add_arc(found, (&route, k), &begin, curvature),
+            OutlineKind::Arc { curvature } => add_arc(found, &route, k, &begin, curvature),
             OutlineKind::Spiral { direction, pitch, first, last, curvature } => {
                 let side = if curvature > 0.0 { Side::Left } else { Side::Right };
                 let bend = Bend { begin, side, direction, pitch, first, last };
@@ -81,10 +81,10 @@ fn ratio(arcs: &[SegmentOutline]) -> f64 {
 
 fn add_line(found: &mut Found<'_>, name: &str, begin: &Begin) {
     let (ray, field) = (begin.ray(), format!("{name}.length"));
-    found.add_on_ray((format!("{name}.end"), "end"), field.clone(), (ray, begin.length), 1.0, positive);
-    found.add_on_ray((format!("{name}.middle"), "middle"), field, (ray, 0.5 * begin.length), 2.0, |metres| {
-        positive(2.0 * metres)
-    });
+    let end = Track { ray, at: begin.length, step: 1.0 };
+    found.add_on_track(format!("{name}.end"), "end", field.clone(), end, positive);
+    let middle = Track { ray, at: 0.5 * begin.length, step: 2.0 };
+    found.add_on_track(format!("{name}.middle"), "middle", field, middle, |metres| positive(2.0 * metres));
 }
 
 fn positive(metres: f64) -> f64 {
@@ -101,7 +101,7 @@ pub(crate) fn arc_through(start: Point, along: Vector, towards: Vector, to: Poin
     (radius.clamp(LEAST_LENGTH, MOST_RADIUS), 2.0 * aside.atan2(ahead))
 }
 
-fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), begin: &Begin, curvature: f64) {
+fn add_arc(found: &mut Found<'_>, route: &str, k: usize, begin: &Begin, curvature: f64) {
     let name = format!("{route}[{k}]");
     let radius = 1.0 / curvature.abs();
     let angle = begin.length / radius;
@@ -118,7 +118,7 @@ fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), begin: &Begin, curv
     let fields = vec![format!("{name}.radius"), extent.clone()];
     let (begin_of, of, extent_of) = (*begin, name.clone(), extent.clone());
     let end = on_arc(begin, towards, radius, angle);
-    found.add((format!("{name}.end"), "end"), end, fields, move |pull| {
+    found.add(format!("{name}.end"), "end", end, fields, move |pull| {
         let to = pull.place();
         let is_other = pull.alt && (to - begin_of.start).dot(&towards) < 0.0;
         let towards = if is_other { -towards } else { towards };
@@ -142,7 +142,7 @@ fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), begin: &Begin, curv
         let per_metre = 1.0 / (0.5 * angle).cos() - 1.0;
         let most = (radius + (before.1.min(after.1) - LEAST_LENGTH) / half).max(LEAST_LENGTH);
         fields.extend([before.0.clone(), after.0.clone()]);
-        found.add((format!("{name}.middle"), "middle"), middle, fields, move |pull| {
+        found.add(format!("{name}.middle"), "middle", middle, fields, move |pull| {
             let new = (pull.along(&ray) / per_metre).clamp(LEAST_LENGTH, most);
             let Change::Number { value: new, .. } = Change::number("", new, ROUNDING) else { return Vec::new() };
             let by = (radius - new) * half;
@@ -156,7 +156,7 @@ fn add_arc(found: &mut Found<'_>, (route, k): (&str, usize), begin: &Begin, curv
     let ray = Ray::towards(begin.start, middle);
     let chord = 2.0 * (0.25 * angle).sin();
     if chord.abs() > 1e-6 {
-        found.add((format!("{name}.middle"), "middle"), middle, fields, move |pull| {
+        found.add(format!("{name}.middle"), "middle", middle, fields, move |pull| {
             let radius = (pull.along(&ray) / chord.abs()).clamp(LEAST_LENGTH, MOST_RADIUS);
             let extent = (!is_turns).then(|| number(&extent, radius, angle));
             let radius = Change::number(&format!("{name}.radius"), radius, ROUNDING);
@@ -208,7 +208,7 @@ impl Bend {
         let (Some((extent, field)), Some(placement)) = (given, Placement::of_spiral(outline)) else { return };
         let (is_own, field) = (values.number(&format!("{name}.pitch")).is_some(), format!("{name}.{field}"));
         let of = field.clone();
-        found.add((format!("{name}.end"), "end"), end, vec![field], move |pull| {
+        found.add(format!("{name}.end"), "end", end, vec![field], move |pull| {
             let last = self.last_at(placement.own_point(pull.place()));
             let radius = self.pitch * last / TAU;
             let (value, step) = match extent {
@@ -237,13 +237,13 @@ impl Bend {
             (Extent::Turns, Direction::Inward) => (radius - LEAST_LENGTH) / turns,
             _ => MOST_RADIUS,
         };
-        found.add((field.clone(), "pitch"), middle(self.pitch), vec![field], move |pull| {
+        found.add(field.clone(), "pitch", middle(self.pitch), vec![field], move |pull| {
             let pitch = nearest(middle, self.pitch, most, pull);
             vec![Change::number(&of, pitch, 0.01 * ROUNDING)]
         });
         let (field, of) = (format!("{name}.radius"), format!("{name}.radius"));
         let centre = move |radius: f64| self.placed(self.pitch, radius).centre();
-        found.add((field.clone(), "radius"), centre(radius), vec![field], move |pull| {
+        found.add(field.clone(), "radius", centre(radius), vec![field], move |pull| {
             vec![Change::number(&of, nearest(centre, radius, MOST_RADIUS, pull), ROUNDING)]
         });
     }

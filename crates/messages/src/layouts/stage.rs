@@ -82,8 +82,8 @@ impl StageSegment {
                 (right, y - (here.cos() - heading.cos()) / curvature, here)
             }
             SEGMENT_INWARD_SPIRAL | SEGMENT_OUTWARD_SPIRAL => {
-                let own = self.about_origin(theta_first + share * (theta_last - theta_first));
-                if curvature.is_nan() { own } else { self.placed(own) }
+                let theta = theta_first + share * (theta_last - theta_first);
+                if curvature.is_nan() { self.about_origin(theta) } else { self.placed(theta) }
             }
             _ => {
                 let (sine, cosine) = heading.sin_cos();
@@ -103,10 +103,11 @@ impl StageSegment {
         (side * radius * cosine, side * radius * sine, along_y.atan2(along_x))
     }
 
-    /// Returns a pose of a spiral that is placed elsewhere, from its pose on the spiral about the origin. Beginning and
-    /// heading give the place of the spiral. Without a mirror an inward spiral bends to the right, an outward one to
-    /// the left.
-    fn placed(&self, (x, y, heading): (f64, f64, f64)) -> (f64, f64, f64) {
+    /// Returns the pose at a polar angle of a spiral that is placed elsewhere, from the pose on the spiral about the
+    /// origin. Beginning and heading give the place of the spiral. Without a mirror an inward spiral bends to the
+    /// right, an outward one to the left.
+    fn placed(&self, theta: f64) -> (f64, f64, f64) {
+        let (x, y, heading) = self.about_origin(theta);
         let (first_x, first_y, first_heading) = self.about_origin(self.theta_first);
         // This rounding keeps the bits of the poses that earlier versions published.
         let (half_sine, half_cosine) = (0.5 * first_heading).sin_cos();

@@ -259,16 +259,16 @@ impl Window {
             let bench = self.listed;
             self.listed += 1;
             if let Some((board, at)) = &work.boards[bench] {
-                self.list_partners(bench, (board, at), stage, work);
+                self.list_partners(bench, board, at, stage, work);
                 if !stage.ground.is_empty() {
-                    self.list_obstacles(bench, (board, at), stage);
+                    self.list_obstacles(bench, board, at, stage);
                 }
             }
         }
     }
 
     /// Lists the partners of a bench that can be the nearest.
-    fn list_partners(&mut self, a: usize, (board, at): (&MovingBoard, &Board), stage: &Stage, work: &Workspace) {
+    fn list_partners(&mut self, a: usize, board: &MovingBoard, at: &Board, stage: &Stage, work: &Workspace) {
         let radii = board.radius() + work.most_radius;
         let reach = radii + self.limit.max(0.0) + board.travel + work.most_travel;
         // Each bench behind, and this one, has room for one entry.
@@ -311,7 +311,7 @@ impl Window {
     }
 
     /// Lists a bench if an obstacle can be nearer than any two boards, and than other obstacles.
-    fn list_obstacles(&mut self, bench: usize, (board, at): (&MovingBoard, &Board), stage: &Stage) {
+    fn list_obstacles(&mut self, bench: usize, board: &MovingBoard, at: &Board, stage: &Stage) {
         let travel = board.travel;
         let margin = margin(stage, at, 0.0);
         let mut bound = f64::INFINITY;

@@ -41,7 +41,9 @@ impl<'a> MovingDragon<'a> {
     pub fn new(
         chain: ConservativeAdvancement<'a>,
         placement: Placement,
-        (delay, head_speed, end): (f64, f64, f64),
+        delay: f64,
+        head_speed: f64,
+        end: f64,
         budget: &mut Budget,
     ) -> Result<Self, NoFollower> {
         let solvable = last_solvable(&chain, budget, 0.0, end);

@@ -159,10 +159,10 @@ fn two_dragons_that_are_nearest_at_the_start_take_few_steps() {
     for (delay, origin, turns) in [(50.0, Vector::new(0.3, 1.8), 0.0), (0.0, Vector::new(-behind, 0.0), 0.5)] {
         let moving = [(Vector::zeros(), 0.0), (origin, turns)].map(|(origin, turns)| {
             let chain = ConservativeAdvancement::new(&path, &team, &[], &[]);
-            let (placement, of_show) = (Placement::new(origin, turns, false), (delay, 1.0, 1e4));
+            let placement = Placement::new(origin, turns, false);
             let mut unreported = unreported;
             let mut budget = Budget::new(u64::MAX, &mut unreported);
-            between::MovingDragon::new(chain, placement, of_show, &mut budget).unwrap()
+            between::MovingDragon::new(chain, placement, delay, 1.0, 1e4, &mut budget).unwrap()
         });
         let (moving, mut unreported) = ([&moving[0], &moving[1]], unreported);
         let mut budget = Budget::new(1_000_000, &mut unreported);

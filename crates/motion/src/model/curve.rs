@@ -52,7 +52,7 @@ pub struct LinkPose {
 
 impl LinkPose {
     /// Returns the pose of the link between two handles, each given by its point and the path's unit tangent there.
-    pub fn between((front, front_tangent): (Point, Vector), (rear, rear_tangent): (Point, Vector)) -> Self {
+    pub fn between(front: Point, front_tangent: Vector, rear: Point, rear_tangent: Vector) -> Self {
         let direction = (front - rear).normalize();
         Self { direction, front_cosine: direction.dot(&front_tangent), rear_cosine: direction.dot(&rear_tangent) }
     }
@@ -140,7 +140,7 @@ pub trait Curve {
 
     /// Returns the pose of the link of `link` metres between two places.
     fn link_pose(&self, front: Coordinate, rear: Coordinate, _link: f64) -> LinkPose {
-        LinkPose::between((self.point(front), self.tangent(front)), (self.point(rear), self.tangent(rear)))
+        LinkPose::between(self.point(front), self.tangent(front), self.point(rear), self.tangent(rear))
     }
 
     /// Finds the first place behind `front` at the distance `link` metres, on a curve that extends `behind` units back.

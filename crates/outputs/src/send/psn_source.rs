@@ -123,7 +123,7 @@ impl Source {
             };
             let own = selection.of(dragon.handles);
             let trackers = numbers.as_ref().map_or(Vec::new(), |numbers| numbers.trackers(&own, dragon.handles));
-            sentences.extend(self.left_out(dragon, numbers.as_ref(), selection, (trackers.len(), own.len())));
+            sentences.extend(self.left_out(dragon, numbers.as_ref(), selection, trackers.len(), own.len()));
             chosen.extend(own[..trackers.len()].iter().map(|handle| dragon.first_handle + handle));
             names.extend(trackers);
         }
@@ -133,13 +133,15 @@ impl Source {
     }
 
     /// Returns a sentence for each kind of a dragon's handles that is left out. One kind is handles that the dragon
-    /// does not have. The other is handles without a number, known from the counts of trackers and of chosen handles.
+    /// does not have. The other is handles without a number, known from the counts of trackers that are `sent`, and of
+    /// `chosen` handles.
     fn left_out(
         &self,
         dragon: &Dragon,
         numbers: Option<&Numbers>,
         selection: &Selection,
-        (sent, chosen): (usize, usize),
+        sent: usize,
+        chosen: usize,
     ) -> Vec<String> {
         let name =
             numbers.unwrap_or(&self.numbers).of.as_deref().or(Some(&dragon.name[..]).filter(|of| !of.is_empty()));

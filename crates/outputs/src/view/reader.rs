@@ -26,7 +26,8 @@ const KEPT_CUES: usize = 16;
 pub(super) fn read(
     mut feed: Feed,
     name: &str,
-    (proofs, facts): (&Proofs, &Arc<Facts>),
+    proofs: &Proofs,
+    facts: &Arc<Facts>,
     sender: &watch::Sender<Picture>,
     stop: &AtomicBool,
 ) {

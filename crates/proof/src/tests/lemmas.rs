@@ -262,10 +262,10 @@ fn boards_inside_a_ring() {
     for rho in [0.9, 2.0, 10.0] {
         let inner = f64::min(f64::sqrt(rho * rho - 0.825 * 0.825), rho - 0.275) - 0.15;
         let inside =
-            |reach: f64| is_inside_ring(team, (&Interval::new(reach), width), &Interval::new(rho), &Interval::new(0.0));
+            |reach: f64| is_inside_ring(team, &Interval::new(reach), width, &Interval::new(rho), &Interval::new(0.0));
         assert!(inside(inner - corner - 1e-12) && !inside(inner - corner + 1e-12), "{rho}");
     }
-    assert!(!is_inside_ring(team, (&Interval::new(-10.0), width), &Interval::new(0.8), &Interval::new(0.0)));
+    assert!(!is_inside_ring(team, &Interval::new(-10.0), width, &Interval::new(0.8), &Interval::new(0.0)));
 }
 
 /// *Nearer* is given up where it is true by too little: the stretches would have to be too short.

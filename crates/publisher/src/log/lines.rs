@@ -157,7 +157,14 @@ pub struct SecondLine {
 
 impl ShowLine {
     /// Creates the line of a scene's show.
-    pub fn new(scene: &SceneText, playback: &Playback, arithmetic: Arithmetic, solver: &str, run: (u64, u64)) -> Self {
+    pub fn new(
+        scene: &SceneText,
+        playback: &Playback,
+        arithmetic: Arithmetic,
+        solver: &str,
+        run_id: u64,
+        stamp_ns: u64,
+    ) -> Self {
         let Playback { start, time_scale, rate, on_contact, at_end, end_hold, paused } = *playback;
         let on_contact = if on_contact == OnContact::Stop { "stop" } else { "continue" };
         let at_end = if at_end == AtEnd::Hold { "hold" } else { "loop" };
@@ -166,8 +173,8 @@ impl ShowLine {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             arithmetic,
             solver: solver.to_owned(),
-            run_id: run.0.to_string(),
-            stamp_ns: run.1.to_string(),
+            run_id: run_id.to_string(),
+            stamp_ns: stamp_ns.to_string(),
             rate,
             start,
             time_scale,

@@ -171,7 +171,7 @@ fn a_log_that_is_too_far_behind_says_where_it_ends() {
         publisher.publish(Outgoing::new(&header, show.frame(tick))).unwrap();
     }
     let file = File::default();
-    let line = ShowLine::new(&scene_text(NEWTON, false), &playback, Arithmetic::of(&scene), "", (1, 2));
+    let line = ShowLine::new(&scene_text(NEWTON, false), &playback, Arithmetic::of(&scene), "", 1, 2);
     let mut writer = LogWriter::new(SharedFile(file.clone()), line);
     reader.empty(&mut writer);
     let counts = writer.counts();
@@ -192,7 +192,7 @@ fn a_frame_is_read_when_all_of_it_has_come() {
     let scene = text.parse().unwrap();
     let playback = Playback { rate: RATE, ..Playback::of(&scene) };
     let mut show = Show::new(&scene, scene.ensemble.timeline_without_contact(&mut unreported), playback).unwrap();
-    let line = ShowLine::new(&text, &playback, Arithmetic::of(&scene), "", (1, 2));
+    let line = ShowLine::new(&text, &playback, Arithmetic::of(&scene), "", 1, 2);
     let mut writer = LogWriter::new(SharedFile(File::default()), line);
     publisher.publish(Outgoing::new(&FrameHeader::default(), show.frame(0))).unwrap();
     let mut whole = vec![0.0; reader.queue.slots()];
@@ -240,7 +240,7 @@ impl std::io::Write for Full {
 #[test]
 fn a_full_disk_is_reported_once_and_nothing_more_is_written() {
     let scene = scene_text(NEWTON, false).parse().unwrap();
-    let line = ShowLine::new(&scene_text(NEWTON, false), &Playback::of(&scene), Arithmetic::of(&scene), "", (1, 2));
+    let line = ShowLine::new(&scene_text(NEWTON, false), &Playback::of(&scene), Arithmetic::of(&scene), "", 1, 2);
     let mut writer = LogWriter::new(Full(5000), line);
     assert!(writer.take_failure().is_none());
     let record = CommandRecord::Given { command: Command::State, code: Some(Code::Done) };

@@ -119,7 +119,8 @@ impl Messages {
         &mut self,
         sequence: u32,
         status: &LoopStatus,
-        (stage, alert): (Option<&Stage>, Option<&CollisionAlert>),
+        stage: Option<&Stage>,
+        alert: Option<&CollisionAlert>,
         before: &LoopStatus,
     ) {
         self.batch.clear();

@@ -345,7 +345,7 @@ impl Recorder {
                 run.status = Some(status);
                 let before = run.diagnosed.replace(status).unwrap_or(status);
                 let stage = run.stage.as_deref().map(|message| &message.stage);
-                self.messages.status(sequence, &status, (stage, run.alert.as_ref()), &before);
+                self.messages.status(sequence, &status, stage, run.alert.as_ref(), &before);
             }
             Event::Scene { .. } => return Ok(()),
         }

@@ -77,16 +77,22 @@ impl<'a> Nearest<'a> {
         Self { ensemble, benches, boards: none.clone(), obstacles: none, square }
     }
 
-    fn board(&self, chain: &Chain, (bench, dragon): (usize, usize)) -> Board {
+    /// Returns the board of a bench by its number in the show, given its dragon.
+    fn board(&self, chain: &Chain, bench: usize, dragon: usize) -> Board {
         let first = self.ensemble.handles_of(dragon).start;
         let team = self.ensemble.dragons()[dragon].motion.team();
         // The team counts its benches from its own head.
         board(Positions { x: &chain.x[first..], y: &chain.y[first..] }, team, bench - first)
     }
 
+    /// Returns the boards of all benches.
+    fn boards_of(&self, chain: &Chain) -> Vec<Board> {
+        self.benches.iter().map(|(bench, dragon)| self.board(chain, *bench, *dragon)).collect()
+    }
+
     /// Adds the chain at a time.
     pub fn include(&mut self, chain: &Chain, time: f64) {
-        let boards: Vec<Board> = self.benches.iter().map(|bench| self.board(chain, *bench)).collect();
+        let boards = self.boards_of(chain);
         let square = self.square;
         let cell = |board: &Board| [board.centre.x, board.centre.y].map(|metres| (metres / square).floor() as i64);
         let mut squares: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
@@ -139,11 +145,12 @@ impl<'a> Nearest<'a> {
         }
     }
 
-    /// Searches for the least distances between the samples, which are `step` seconds apart. Returns the nearest board
-    /// and the nearest obstacle of each bench by its number in the show.
+    /// Searches for the least distances between the samples, which are `step` seconds apart until `end`. Returns the
+    /// nearest board and the nearest obstacle of each bench by its number in the show.
     pub fn refined(
         mut self,
-        (step, end): (f64, f64),
+        step: f64,
+        end: f64,
         solver: &mut dyn Solver,
         searched: &Searched<'_>,
         progress: Progress<'_>,
@@ -161,7 +168,7 @@ impl<'a> Nearest<'a> {
                 let (distance, time) = *known.entry(key).or_insert_with(|| {
                     least_within(around, (near.distance, near.time), |time| {
                         solver.solve(time, &mut chain).ok()?;
-                        let [one, two] = [(bench, dragon), (near.other, other)].map(|of| self.board(&chain, of));
+                        let (one, two) = (self.board(&chain, bench, dragon), self.board(&chain, near.other, other));
                         Some(signed_distance_board_board(&one, &two))
                     })
                 });
@@ -172,13 +179,13 @@ impl<'a> Nearest<'a> {
                 let obstacle = &self.ensemble.ground().obstacles()[near.other];
                 let (distance, time) = least_within(around, (near.distance, near.time), |time| {
                     solver.solve(time, &mut chain).ok()?;
-                    Some(obstacle.shape.signed_distance(&self.board(&chain, (bench, dragon))))
+                    Some(obstacle.shape.signed_distance(&self.board(&chain, bench, dragon)))
                 });
                 self.obstacles[bench] = Some(Near { distance, time, ..near });
             }
         }
         self.take(searched, end, solver, &mut chain);
-        self.find_spans((step, end), solver, &mut chain, &mut |share| progress(0.5 + 0.5 * share));
+        self.find_spans(step, end, solver, &mut chain, &mut |share| progress(0.5 + 0.5 * share));
         self.boards.into_iter().zip(self.obstacles).collect()
     }
 
@@ -188,7 +195,7 @@ impl<'a> Nearest<'a> {
             let benches = [found.least.bench_a as usize, found.least.bench_b as usize];
             if solver.solve(found.time, chain).is_ok() {
                 let dragons = benches.map(|bench| self.ensemble.owner(bench).map_or(0, |(dragon, _)| dragon));
-                let boards = [0, 1].map(|k| self.board(chain, (benches[k], dragons[k])));
+                let boards = [0, 1].map(|k| self.board(chain, benches[k], dragons[k]));
                 for k in 0..2 {
                     let is_less = self.boards[benches[k]].is_none_or(|near| found.least.value <= near.distance);
                     if is_less {
@@ -211,13 +218,7 @@ impl<'a> Nearest<'a> {
     }
 
     /// Finds of each bench the span about its least distance in which the other bench is near, true to a sample.
-    fn find_spans(
-        &mut self,
-        (step, end): (f64, f64),
-        solver: &mut dyn Solver,
-        chain: &mut Chain,
-        progress: Progress<'_>,
-    ) {
+    fn find_spans(&mut self, step: f64, end: f64, solver: &mut dyn Solver, chain: &mut Chain, progress: Progress<'_>) {
         let mut began: Vec<Option<f64>> = vec![None; self.benches.len()];
         let samples = (end / step).ceil() as usize;
         for sample in 0..=samples {
@@ -226,7 +227,7 @@ impl<'a> Nearest<'a> {
             if progress(share).is_break() || solve_at_or_just_before(solver, time, chain).is_err() {
                 return;
             }
-            let boards: Vec<Board> = self.benches.iter().map(|bench| self.board(chain, *bench)).collect();
+            let boards = self.boards_of(chain);
             for (index, (bench, _)) in self.benches.iter().enumerate() {
                 let Some(near) = &mut self.boards[*bench] else { continue };
                 // A dragon has one handle more than benches.

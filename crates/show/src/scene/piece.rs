@@ -279,14 +279,14 @@ impl Extent<'_> {
         let turns = match self {
             Self::Turns(given) => {
                 let turns = checked(source, "turns", given, Accepted::ARC_TURNS)?;
-                ends_before_centre(begin, turns, ("turns", given), source)?;
+                ends_before_centre(begin, turns, "turns", given, source)?;
                 turns.into()
             }
             Self::Length(given) => {
                 let metres = checked(source, "length", given, Accepted::LEG)?;
                 let (spiral, first) = (Spiral::new(pitch, direction), DoubleDouble::from_turns(radius.high / pitch));
                 let rough = spiral.advance(first, metres).minus(first).abs() / TAU;
-                ends_before_centre(begin, rough, ("length", given), source)?;
+                ends_before_centre(begin, rough, "length", given, source)?;
                 let turns = begin.turns_of_metres(metres, as_turns(source, "length", given, rough)?);
                 turns.map_err(|error| source.field_error(given, &error.to_string()))?
             }
@@ -318,7 +318,8 @@ impl Extent<'_> {
 fn ends_before_centre(
     Piece { direction, pitch, radius }: Piece,
     turns: f64,
-    (field, given): (&str, &Spanned<f64>),
+    field: &str,
+    given: &Spanned<f64>,
     source: &Source,
 ) -> Result<(), SceneError> {
     if direction == Direction::Outward || radius.high - pitch * turns >= Accepted::LENGTH.least {

@@ -230,21 +230,22 @@ impl RealPiece {
             }
             RouteStep::Arc { side, radius, turns } => {
                 let angle = functions.turn() * Real::of_sum(turns);
-                Self::arc((origin, heading), side, Real::of_sum(radius), &angle, functions)
+                Self::arc(origin, heading, side, Real::of_sum(radius), &angle, functions)
             }
             RouteStep::Spiral { side, direction, pitch, radius, turns } => {
                 let turn = functions.turn();
                 let first = &turn * Real::of_sum(radius) / Real::from(pitch);
                 let around = &turn * Real::of_sum(turns);
                 let last = if direction == Direction::Inward { &first - around } else { &first + around };
-                Self::spiral((origin, heading), (side, direction), Real::from(pitch) / turn, (first, &last), functions)
+                Self::spiral(origin, heading, side, direction, Real::from(pitch) / turn, (first, &last), functions)
             }
         }
     }
 
     /// Creates an arc of `angle` radians.
     pub fn arc(
-        (origin, heading): (RealVector, &Real),
+        origin: RealVector,
+        heading: &Real,
         side: Side,
         radius: Real,
         angle: &Real,
@@ -260,8 +261,10 @@ impl RealPiece {
 
     /// Creates the spiral between two polar angles. Its tangent has the angle phase + sense (theta + atan(theta) + pi).
     fn spiral(
-        (origin, heading): (RealVector, &Real),
-        (side, direction): (Side, Direction),
+        origin: RealVector,
+        heading: &Real,
+        side: Side,
+        direction: Direction,
         radius_per_radian: Real,
         (first, last): (Real, &Real),
         functions: &mut Functions,

@@ -98,7 +98,7 @@ impl RealPath {
     }
 
     fn arc(&mut self, side: Side, radius: Real, angle: &Real) {
-        let piece = RealPiece::arc((self.end_point(), &self.heading), side, radius, angle, &mut self.functions);
+        let piece = RealPiece::arc(self.end_point(), &self.heading, side, radius, angle, &mut self.functions);
         self.add(piece);
     }
 

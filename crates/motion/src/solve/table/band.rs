@@ -126,7 +126,8 @@ impl BandBuilder<'_> {
         made: &mut Made,
         piece: Piece,
         chains: Quintet,
-        (halvings, parent): (usize, f64),
+        halvings: usize,
+        parent: f64,
         budget: &mut Budget,
     ) -> Option<()> {
         let errors = self.errors(piece, &chains, halvings, budget)?;
@@ -142,7 +143,7 @@ impl BandBuilder<'_> {
             let quarter = 0.25 * (part.end - part.begin);
             let first = self.node_chain(part.begin + quarter, budget)?;
             let second = self.node_chain(part.end - quarter, budget)?;
-            self.refine(made, part, [front, first, centre, second, rear], (halvings - 1, errors.worst), budget)
+            self.refine(made, part, [front, first, centre, second, rear], halvings - 1, errors.worst, budget)
         };
         let (first, second) = (Piece { end: middle, ..piece }, Piece { begin: middle, ..piece });
         let (first_chains, second_chains) = ([a, b, c.clone()], [c, d, e]);
@@ -344,7 +345,7 @@ pub(super) fn rows(
     all_centres: bool,
     budget: &mut Budget,
 ) -> Option<Rows> {
-    let mut rows_up_to = |reach: f64| rows_up_to(track, team, (tolerance, all_centres), reach, budget);
+    let mut rows_up_to = |reach: f64| rows_up_to(track, team, tolerance, all_centres, reach, budget);
     let junctions = |reach: f64| track.path.junctions().take_while(|at| *at <= reach).count();
     // Each junction cuts all rows.
     let bytes = |reach: f64| {
@@ -367,7 +368,8 @@ pub(super) fn rows(
 fn rows_up_to(
     track: &Track,
     team: &Team,
-    (tolerance, all_centres): (Tolerance, bool),
+    tolerance: Tolerance,
+    all_centres: bool,
     reach: f64,
     budget: &mut Budget,
 ) -> Option<Rows> {
@@ -421,7 +423,7 @@ fn rows_up_to(
         let mut made = builder.nothing(table.valid_from);
         for piece in between_kinks(&kinks, first_row) {
             let quintet = builder.quintet(piece, budget)?;
-            builder.refine(&mut made, piece, quintet, (MOST_HALVINGS, f64::INFINITY), budget)?;
+            builder.refine(&mut made, piece, quintet, MOST_HALVINGS, f64::INFINITY, budget)?;
         }
         let Made { mut band, front_row, valid_from } = made;
         band.index();

@@ -180,7 +180,7 @@ impl Setup {
         };
         let show = Show::new(&scene, timeline, playback).unwrap();
         let solver = show.solver_reason().to_owned();
-        let line = ShowLine::new(&self.text, &playback, Arithmetic::of(&scene), &solver, (7, 8));
+        let line = ShowLine::new(&self.text, &playback, Arithmetic::of(&scene), &solver, 7, 8);
         let file = File::default();
         let (publisher, reader) = queue_of(self.words, 200);
         let ended = Rc::new(Cell::new(None));
