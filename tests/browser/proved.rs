@@ -93,8 +93,8 @@ fn what_is_no_certificate_is_refused_with_a_sentence() {
         (scene, "expected a certificate as events --certify writes it"),
         (log, "unknown variant `show`"),
         (written("empty", ""), "expected a certificate"),
-        (written("later", &first(4, text_of_scene)), "a certificate of format 4, expected 3"),
-        (written("scene", &first(3, "benches = 3")), "the scene: "),
+        (written("later", &first(5, text_of_scene)), "a certificate of format 5, expected 4"),
+        (written("scene", &first(4, "benches = 3")), "the scene: "),
         (written("step", "{\"type\":\"path_end\"}\n"), "the first line is not that of a certificate"),
     ];
     for (file, expected) in refused {
@@ -106,7 +106,7 @@ fn what_is_no_certificate_is_refused_with_a_sentence() {
         assert!(sentence.lines().count() == 1 && output.stdout.is_empty(), "{sentence}");
     }
     // A certificate with a later error: the error is found while pages are served, and the server continues.
-    let cut = written("cut", &first(3, text_of_scene));
+    let cut = written("cut", &first(4, text_of_scene));
     let arguments = ["view", "--port", "0", "--json", "--certificate", cut.to_str().unwrap()];
     let mut view = Process::start(program("cut").args(arguments));
     let lines = view.lines();

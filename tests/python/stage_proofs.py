@@ -178,7 +178,7 @@ def nothing_of_another_scene():
             # An open page reports each failed connection to a server that has ended.
             page.goto("about:blank")
         lines = given.certificate.read_text(encoding="utf-8").splitlines(keepends=True)
-        at = next(at for at, line in enumerate(lines) if json.loads(line)["type"] == "contact")
+        at = next(at for at, line in enumerate(lines) if json.loads(line)["type"] == "witness")
         contact = json.loads(lines[at])
         contact["point"][0] += 3
         lines[at] = json.dumps(contact) + "\n"

@@ -11,7 +11,8 @@
 //! - A datagram for a subnet has up to 14,720 bytes, as with Cyclone DDS by default (Fast DDS: 65,500). The network
 //!   divides it.
 //!
-//! In: the system's list of addresses. Out: [`Interface`], with what RustDDS reads of the original.
+//! In: the system's list of addresses. Out: [`Interface`], with what RustDDS reads of the original. Its test is in
+//! `crates/ros2/src/interfaces.rs`.
 
 use std::net::{Ipv4Addr, Ipv6Addr};
 
@@ -120,38 +121,4 @@ fn reach_own_addresses_over_loopback(interfaces: &mut [Interface]) {
     };
     let own = others.iter().flat_map(|interface| &interface.ipv4);
     loopback.ipv4.extend(own.map(|net| Ipv4Net { netmask: Ipv4Addr::BROADCAST, ..*net }));
-}
-
-#[cfg(test)]
-mod tests {
-    use std::process::Command;
-
-    use super::*;
-
-    /// `ip -4 -o address` prints a line for each address: number, name, "inet", address/prefix.
-    #[test]
-    fn the_addresses_are_those_that_the_system_prints() {
-        let Ok(output) = Command::new("/usr/sbin/ip").args(["-4", "-o", "address"]).output() else {
-            println!("NOT RUN: no ip (iproute2)");
-            return;
-        };
-        let printed = String::from_utf8(output.stdout).unwrap();
-        let expected: Vec<(u32, Ipv4Addr, u32)> = printed
-            .lines()
-            .map(|line| {
-                let words: Vec<&str> = line.split_whitespace().collect();
-                let (address, prefix) = words[3].split_once('/').unwrap();
-                (words[0].trim_end_matches(':').parse().unwrap(), address.parse().unwrap(), prefix.parse().unwrap())
-            })
-            .collect();
-        let interfaces = get_interfaces();
-        let found = interfaces.iter().flat_map(|interface| interface.ipv4.iter().map(|net| (interface.index, *net)));
-        let found: Vec<(u32, Ipv4Addr, u32)> =
-            found.map(|(index, net)| (index, net.addr(), u32::from(net.netmask()).count_ones())).collect();
-        assert!(!expected.is_empty() && expected.iter().all(|one| found.contains(one)), "{printed}{found:?}");
-        // The loopback interface, the first, has every address.
-        let loopback: Vec<Ipv4Addr> = interfaces[0].ipv4.iter().map(Ipv4Net::addr).collect();
-        assert!(interfaces[0].is_loopback() && !interfaces[0].is_multicast());
-        assert!(expected.iter().all(|(_, address, _)| loopback.contains(address)), "{printed}{loopback:?}");
-    }
 }

@@ -9,6 +9,8 @@ mod control;
 mod copies;
 mod departures;
 pub mod environment;
+#[cfg(test)]
+mod interfaces;
 mod matching;
 mod node;
 mod rate;
