@@ -38,13 +38,13 @@ impl CertificateSearch<'_, '_> {
         let head = Span(from.head, to.head);
         let obstacle = self.number(event);
         let bench = event.bench_a.unwrap_or(0) as usize;
-        let benches = if obstacle.is_some() { vec![bench] } else { vec![bench, event.bench_b.unwrap_or(0) as usize] };
-        let handles = self.chain.spans(from, to, benches.last()? + 1)?;
-        let point = match (obstacle, &benches[..]) {
-            (Some(number), _) => self.chain.barriers.get(number)?.reached_by(&self.chain.board(&handles, bench))?,
-            (None, &[a, b]) => self.chain.common_point(&handles, [a, b])?,
-            _ => return None,
+        let other = event.bench_b.filter(|_| obstacle.is_none()).map(|bench| bench as usize);
+        let handles = self.chain.spans(from, to, other.unwrap_or(bench) + 1)?;
+        let point = match obstacle {
+            Some(number) => self.chain.barriers.get(number)?.reached_by(&self.chain.board(&handles, bench))?,
+            None => self.chain.common_point(&handles, [bench, other?])?,
         };
+        let benches = std::iter::once(bench).chain(other).collect();
         Some(Witness { point: Some(point), ..Witness::of_one(obstacle, benches, head, &handles) })
     }
 
