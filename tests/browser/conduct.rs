@@ -246,7 +246,7 @@ fn a_page_from_elsewhere_is_let_in_by_its_name_only() {
     let (_server, ready) = server(name, &["--allow-origin", "null"]);
     assert!(connect(&self::address(&ready), Some("null")).is_ok());
     for wrong in ["*", "show.example", "https://show.example/page"] {
-        let refused = program(name).args(["view", "--port", "0", "--allow-origin", wrong]).output().unwrap();
+        let refused = Process::start(program(name).args(["view", "--port", "0", "--allow-origin", wrong])).output();
         assert_eq!(refused.status.code(), Some(2), "{wrong}");
         assert!(text(&refused.stderr).contains("expected an origin such as https://show.example"), "{wrong}");
     }
@@ -302,7 +302,7 @@ fn pages_of_ones_own_are_served_and_nothing_beside_them() {
     assert!(get(&address, "/frames?rate=abc", &address).ends_with("rate: expected 1 to 1000000 frames a second"));
     let (_plain, ready) = server(name, &[]);
     assert!(get(&self::address(&ready), "/pages/", &self::address(&ready)).starts_with("HTTP/1.1 404"));
-    let refused = program(name).args(["view", "--port", "0", "--pages", "/nowhere"]).output().unwrap();
+    let refused = Process::start(program(name).args(["view", "--port", "0", "--pages", "/nowhere"])).output();
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("--pages /nowhere"), "{}", text(&refused.stderr));
 }

@@ -3,6 +3,7 @@
 #![cfg(feature = "ros2")]
 
 mod harmless;
+mod silent;
 mod streams;
 
 use crate::harness;

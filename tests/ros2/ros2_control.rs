@@ -11,7 +11,8 @@ use std::process::Command;
 
 use enhanced::{Empty, Features, Outcome, State, Time, Trigger, enhanced, first_call};
 use harness::{
-    Process, answering, can_run, json_lines, long, program, python, python_modules, summary, text, unique, wait_until,
+    Lines, Process, all, answering, can_run, json_lines, long, program, python, python_modules, summary, text, unique,
+    wait_until,
 };
 use serde_json::{Value, json};
 

@@ -23,6 +23,7 @@ use rustdds::{GUID, SampleIdentity, SequenceNumber};
 
 use super::Ros2Error;
 use super::matching::Matches;
+use super::readers::Owed;
 use crate::commands::{Answer, ShowCommands};
 use bench_dragon_client::control::command_client::MOST_WAITING;
 use bench_dragon_messages::control::{Code, Command};
@@ -39,9 +40,12 @@ const MOST_PENDING: usize = 512;
 /// The longest wait of an answer for its client's reply reader: while the client is there, and otherwise. RMW
 /// implementations stop after 0.1 s. On a loaded machine discovery takes longer, and a lost datagram of discovery is
 /// repeated after seconds. An answer that is sent before is lost. Other answers do not wait. The same limits hold for
-/// an answer that RustDDS refuses. The refusal for a killed client ends after its lease, 20 s with Fast DDS.
+/// an answer that RustDDS refuses.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(30);
 const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
+/// The answers of a service that its clients may request again while RustDDS refuses one. Earlier ones are acknowledged
+/// in their names: a client that is slow or dead holds up no other.
+const KEPT_ANSWERS: u64 = 2048;
 /// The intervals at which requests are polled, and answers while some are pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 const ANSWER_INTERVAL: Duration = Duration::from_micros(500);
@@ -257,6 +261,10 @@ impl Server {
                 readers.iter().for_each(|reader| matches.announce(endpoint.responses_guid, *reader, endpoint.answers));
             }
             let is_sent = endpoint.answer(client, &readers, response);
+            if !is_sent {
+                let readers = matches.subscribers(endpoint.responses_guid).into_keys();
+                matches.settle(endpoint.responses_guid, Owed::all_but(KEPT_ANSWERS, endpoint.answers.into(), readers));
+            }
             let is_late = since.elapsed() >= patience;
             if !is_sent && is_late {
                 endpoint.report_discarded();

@@ -1,12 +1,11 @@
 //! Participants that have died without a farewell.
 //!
-//! RustDDS 0.15.1 sends to a killed participant until its lease ends (Fast DDS: 20 s). Meanwhile another participant may
-//! have taken its UDP port, and gets messages that are not meant for it: pushes (`Writer::send_message_to_readers`), and
-//! repairs that name no participant (`Writer::handle_repair_frags_send_worker`). Parts of a message that a GAP then
-//! withdraws make a reader of Fast DDS 2.14 hang ([`gap`](super::wire::gap)). The readers of the dead participant also
-//! hold up the others until the lease ends, and RustDDS never forgets the endpoints of a participant whose lease has
-//! ended (`DiscoveryDB::remove_participant`). So this file finds out who has died, and the matches say farewell in its
-//! name.
+//! RustDDS 0.15.1 sends to a killed participant until its lease ends, and here no lease ends
+//! ([`matching`](super::matching)). Meanwhile another participant may have taken its UDP port, and gets messages that are
+//! not meant for it: pushes (`Writer::send_message_to_readers`), and repairs that name no participant
+//! (`Writer::handle_repair_frags_send_worker`). Parts of a message that a GAP then withdraws make a reader of Fast DDS
+//! 2.14 hang ([`gap`](super::wire::gap)). The readers of the dead participant also hold up the others. So this file finds
+//! out who has died, and the matches say farewell in its name.
 //!
 //! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants that have
 //! died: on this machine those whose sockets are gone, elsewhere those whose addresses belong to a newer participant.
@@ -28,7 +27,7 @@ const INTERVAL: Duration = Duration::from_millis(20);
 /// The UDP sockets of this network namespace. A system without this file only has the rule of the newer participant.
 const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
 
-/// The most participants that are remembered as dead. Datagrams of a dead participant can come for some seconds.
+/// The most participants that are remembered as dead or as having left. Their datagrams can come for some seconds.
 const REMEMBERED: usize = 1000;
 
 /// The sockets of each port, by their inodes. No two sockets that exist at one time share an inode.
@@ -41,6 +40,7 @@ pub(super) struct Departures {
     /// The participants by the order of their discovery, from 1.
     order: BTreeMap<Prefix, u64>,
     discovered: u64,
+    /// Those that have died or left.
     died: VecDeque<Prefix>,
     checked: Option<Instant>,
 }
@@ -101,7 +101,7 @@ impl Departures {
     }
 
     fn remember(&mut self, dead: &[Prefix]) {
-        self.forget(dead);
+        dead.iter().for_each(|prefix| self.forget(*prefix));
         for prefix in dead.iter().filter(|prefix| !self.died.contains(prefix)).copied().collect::<BTreeSet<_>>() {
             self.died.push_back(prefix);
         }
@@ -136,12 +136,21 @@ impl Departures {
         self.participants.get(&participant).is_some_and(|participant| participant.sockets.is_some())
     }
 
-    /// Forgets participants that have left.
-    pub(super) fn forget(&mut self, participants: &[Prefix]) {
-        for prefix in participants {
-            self.participants.remove(prefix);
-            self.order.remove(prefix);
-        }
+    /// Returns the participants that are not known to have left.
+    pub(super) fn present(&self) -> impl Iterator<Item = Prefix> {
+        self.participants.keys().copied()
+    }
+
+    /// Notes that a participant has said farewell: it never comes back. Its announcements can come after its farewell,
+    /// over another socket, when a living participant has its addresses already.
+    pub(super) fn left(&mut self, participant: Prefix) {
+        self.remember(&[participant]);
+    }
+
+    /// Forgets a participant that may come back.
+    pub(super) fn forget(&mut self, participant: Prefix) {
+        self.participants.remove(&participant);
+        self.order.remove(&participant);
     }
 }
 
@@ -246,6 +255,26 @@ mod tests {
         departures.discovered(OLD);
         assert_eq!(note(&mut departures, OLD, address), [OLD]);
         assert_eq!(departures.gone(true, Instant::now()), [[0; 12]; 0]);
+    }
+
+    #[test]
+    fn a_participant_that_has_left_and_is_reported_later_ends_no_living_one() {
+        let mut departures = Departures::default();
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = socket.local_addr().unwrap();
+        departures.discovered(OLD);
+        assert_eq!(note(&mut departures, OLD, address), [[0; 12]; 0]);
+        departures.left(OLD);
+        departures.discovered(NEW);
+        assert_eq!(note(&mut departures, NEW, address), [[0; 12]; 0]);
+        departures.discovered(OLD);
+        assert_eq!(note(&mut departures, OLD, address), [OLD]);
+        assert_eq!(note(&mut departures, NEW, address), [[0; 12]; 0]);
+        assert_eq!(departures.present().collect::<Vec<_>>(), [NEW]);
+        // One whose lease has ended may come back.
+        departures.forget(NEW);
+        departures.discovered(NEW);
+        assert_eq!(note(&mut departures, NEW, address), [[0; 12]; 0]);
     }
 
     #[test]

@@ -7,12 +7,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ros2_client::Context;
 use rustdds::policy::Durability;
 use rustdds::{
-    DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, RTPSEntity, StatusEvented,
+    DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, LostReason, RTPSEntity,
+    StatusEvented,
 };
 
 use super::departures::Departures;
@@ -22,6 +23,9 @@ use super::wire::{self, Prefix, prefix};
 
 /// The prefix of the topics of requests.
 const REQUEST_PREFIX: &str = "rq/";
+
+/// The interval of the life signs of a participant. RustDDS looks for leases that have ended every two seconds.
+const LIFE_SIGN_INTERVAL: Duration = Duration::from_secs(1);
 
 /// The matches of one participant, shared by its threads.
 #[derive(Clone)]
@@ -47,6 +51,9 @@ struct Ends {
     /// Datagrams for new endpoints.
     repeated: Vec<Repeated>,
     departures: Departures,
+    /// The participants whose life sign is still due, and the time from which it is.
+    due: Vec<Prefix>,
+    due_since: Instant,
     /// Farewells that have been said.
     farewells: u16,
     /// Acknowledgements that have been sent.
@@ -68,6 +75,8 @@ impl Matches {
             neighbours: BTreeMap::new(),
             repeated: Vec::new(),
             departures: Departures::default(),
+            due: Vec::new(),
+            due_since: Instant::now(),
             farewells: 0,
             acknowledged: 0,
         };
@@ -204,8 +213,13 @@ impl Ends {
                     detected.insert(writer.guid);
                 }
                 Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => self.retain(|of| of != guid),
-                Event::ParticipantLost { id, .. } => {
-                    Prefix::try_from(id.as_ref()).iter().for_each(|left| self.departures.forget(&[*left]));
+                Event::ParticipantLost { id, reason } => {
+                    if let Ok(lost) = Prefix::try_from(id.as_ref()) {
+                        match reason {
+                            LostReason::Disposed => self.departures.left(lost),
+                            LostReason::Timeout { .. } => self.departures.forget(lost),
+                        }
+                    }
                     self.retain(|of| of.prefix != id);
                 }
                 _ => {}
@@ -221,7 +235,25 @@ impl Ends {
             self.farewells = self.farewells.wrapping_add(1);
             wire::send_to_own(&self.participant, &wire::farewell(participant, self.farewells));
         }
+        self.give_life_signs();
         self.serve_repeated();
+    }
+
+    /// Gives RustDDS a life sign of each participant that is not known to have left, so that no lease ends.
+    ///
+    /// RustDDS never serves a participant again whose lease has ended: it drops its announcements, which have the number
+    /// of the first one (`TopicCache::add_change`, `structure/dds_cache.rs:303`). So a cable that was out for longer than
+    /// the lease, or a process that stood still, would end all topics there. Held by the tests
+    /// `a_subscriber_that_was_silent`, `a_subscriber_behind_a_cable` and `a_client_that_was_silent`.
+    fn give_life_signs(&mut self) {
+        if self.due.is_empty() && self.due_since.elapsed() >= LIFE_SIGN_INTERVAL {
+            self.due_since = Instant::now();
+            self.due.extend(self.departures.present());
+        }
+        // One at a time: RustDDS queues eight life signs (`dds/participant.rs:291`).
+        if let Some(participant) = self.due.pop() {
+            wire::send_to_own(&self.participant, &wire::life_sign(participant));
+        }
     }
 
     /// Keeps the remote endpoints that `stays` admits.

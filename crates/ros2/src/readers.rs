@@ -6,7 +6,7 @@
 //! |---|---|---|---|
 //! | new, of a transient-local writer | no message but the latest, or those of the lifespan; a volatile one none | offers all that it keeps, whatever the reader's durability and depth (`Writer::matched_reader_update`, `rtps/writer.rs:2074`) | `a_late_subscriber_gets_the_current_alert`, `a_late_volatile_subscriber`, `a_late_subscriber_of_rosout` |
 //! | best-effort | an acknowledgement of every message, in its name | waits for it without end (`Writer::remove_all_acked_changes_but_keep_depth`, `rtps/writer.rs:1660`) | `subscribers_that_come_and_go` |
-//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones (`WriterSendBuffer::admit_blocking`, `rtps/writer_send_buffer.rs:199`) | `a_stopped_subscriber_stops_no_other` |
+//! | slow, or dead and not known to be | an acknowledgement of old messages, in its name | keeps them for it, and refuses further ones (`WriterSendBuffer::admit_blocking`, `rtps/writer_send_buffer.rs:199`) | `a_stopped_subscriber_stops_no_other`, `a_stopped_client_stops_no_other` |
 //!
 //! A dead reader leaves with its participant ([`departures`](super::departures)), held by
 //! `the_ports_of_a_killed_subscriber`. The tests are those of `tests/ros2/fast_dds`.
@@ -66,6 +66,17 @@ pub(super) struct Owed {
     pub(super) acknowledgements: Vec<(GUID, u64)>,
     /// New readers that must not get the first messages of these numbers.
     pub(super) withheld: Vec<(GUID, u64)>,
+}
+
+impl Owed {
+    /// Returns what acknowledges all but the latest `kept` of `written` messages in the names of these readers.
+    pub(super) fn all_but(kept: u64, written: u64, readers: impl Iterator<Item = GUID>) -> Self {
+        let last = written.saturating_sub(kept);
+        Self {
+            acknowledgements: readers.filter(|_| last > 0).map(|reader| (reader, last)).collect(),
+            ..Self::default()
+        }
+    }
 }
 
 impl Readers {
@@ -182,6 +193,13 @@ mod tests {
         assert_eq!(at(&mut readers, 2000), [(guid(2), 121), (guid(1), 100)]);
         // The last ten may be requested however old they are.
         assert_eq!(at(&mut readers, 2500), [(guid(2), 121), (guid(1), 111)]);
+    }
+
+    #[test]
+    fn of_few_messages_none_is_old() {
+        let acknowledged = |written| Owed::all_but(3, written, [guid(1), guid(2)].into_iter()).acknowledgements;
+        assert_eq!(acknowledged(3), []);
+        assert_eq!(acknowledged(10), [(guid(1), 7), (guid(2), 7)]);
     }
 
     #[test]

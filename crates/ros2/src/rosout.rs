@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Ros2Error;
 use super::matching::Matches;
-use super::readers::{Kind, Readers};
+use super::readers::{Kind, Owed, Readers};
 use super::topic_writer::policies;
 use bench_dragon_messages::state::Severity;
 use bench_dragon_ros2_messages::settings::{Durability, Qos, Reliability};
@@ -83,6 +83,8 @@ pub fn take_queued() -> VecDeque<LogLine> {
 pub(super) struct Rosout {
     publisher: Publisher<Log>,
     readers: Readers,
+    /// True if RustDDS has refused a line.
+    refused: bool,
     /// The logger's name, as rcl derives it from the node's.
     name: String,
 }
@@ -103,13 +105,24 @@ impl Rosout {
             .create_topic(TOPIC_NAME.to_owned(), TYPE_NAME.to_owned(), &policies, TopicKind::NoKey)
             .map_err(|error| failed(&error))?;
         let publisher = node.create_publisher(&dds, None).map_err(|error| failed(&error))?;
-        Ok(Self { publisher, readers: Readers::new(Kind::Lifespan(LIFESPAN)), name: name.replace('/', ".") })
+        Ok(Self {
+            publisher,
+            readers: Readers::new(Kind::Lifespan(LIFESPAN)),
+            refused: false,
+            name: name.replace('/', "."),
+        })
     }
 
     /// Sends the lines of the log, and withholds old ones from new subscribers. Must be called often.
     pub(super) fn service(&mut self, matches: &Matches) {
         let writer = self.publisher.guid();
-        matches.settle(writer, self.readers.update(&matches.subscribers(writer), Instant::now()));
+        let subscribers = matches.subscribers(writer);
+        matches.settle(writer, self.readers.update(&subscribers, Instant::now()));
+        if std::mem::take(&mut self.refused) {
+            // One of them acknowledges nothing.
+            let kept = DEPTH.into();
+            matches.settle(writer, Owed::all_but(kept, self.readers.written(), subscribers.into_keys()));
+        }
         take_queued().into_iter().for_each(|line| self.send(line));
     }
 
@@ -126,8 +139,9 @@ impl Rosout {
     fn send(&mut self, LogLine { stamp, level, text, file, line }: LogLine) {
         let message = Log { stamp, level, name: self.name.clone(), msg: text, file, function: String::new(), line };
         // A full queue cannot be reported here: the report would be one more line.
-        if self.publisher.publish(message).is_ok() {
-            self.readers.count(Instant::now());
+        match self.publisher.publish(message) {
+            Ok(()) => self.readers.count(Instant::now()),
+            Err(_) => self.refused = true,
         }
     }
 }

@@ -151,6 +151,14 @@ pub(super) fn farewell(participant: Prefix, round: u16) -> Vec<u8> {
     bytes
 }
 
+/// Returns a message of a participant from which RustDDS concludes that it lives: its announcement without contents, which
+/// RustDDS drops (`Reader::data_to_dds_data`, `rtps/reader.rs:805`).
+pub(super) fn life_sign(participant: Prefix) -> Vec<u8> {
+    // No flags beyond the header's, the distance to the payload, and the message's number.
+    let body = [[0, 0, 16, 0], PARTICIPANT_READER, PARTICIPANT_WRITER, [0; 4], [1, 0, 0, 0]].concat();
+    [header(participant), vec![DATA, LITTLE_ENDIAN, body.len() as u8, 0], body].concat()
+}
+
 /// Returns a message from one endpoint to another: the header, the participant of the latter, and what `body` makes of
 /// the numbers of both.
 fn between(from: GUID, to: GUID, body: impl FnOnce([u8; 4], [u8; 4]) -> Vec<u8>) -> Vec<u8> {
@@ -274,6 +282,13 @@ mod tests {
         let payload = [&[0, 1, 0, 0][..], &body].concat();
         assert_eq!(of(0..2), [head(1, 2, 32 + 512), payload[..512].to_vec()].concat());
         assert_eq!(of(2..9), [head(3, 1, 32 + 92), payload[512..].to_vec()].concat());
+    }
+
+    #[test]
+    fn a_life_sign_is_an_announcement_without_contents() {
+        let expected = [0x15, 1, 20, 0, 0, 0, 16, 0, 0, 1, 0, 0xc7, 0, 1, 0, 0xc2, 0, 0, 0, 0, 1, 0, 0, 0];
+        let expected = [b"RTPS", &[2, 4, 1, 18][..], &READER[..12], &expected].concat();
+        assert_eq!(life_sign(prefix(GUID::from_bytes(READER))), expected);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Clients that have just started, and clients of both RMW implementations at once.
 
 use std::io::Write as _;
+use std::process::ChildStdin;
+use std::time::Duration;
 
 use super::*;
 
@@ -118,6 +120,68 @@ fn clients_of_both_implementations_conduct_one_show_in_turn() {
     cyclone.signal(nix::sys::signal::Signal::SIGKILL);
     let (_, printed) = ended(publisher);
     assert!(!printed.contains("is none of"), "{printed}");
+}
+
+/// A client of services, whose calls are asked for by lines.
+struct Caller {
+    process: Process,
+    input: ChildStdin,
+    answers: Lines,
+}
+
+impl Caller {
+    /// Starts a client with this configuration of Cyclone DDS, which waits for an answer for some seconds.
+    fn start(name: &str, configuration: &str, seconds: &str) -> Self {
+        let mut client = peer(name, &["--calls-of-input", "--seconds", seconds]);
+        let (mut process, input) = Process::start_with_input(client.env("CYCLONEDDS_URI", configuration));
+        let answers = process.lines();
+        Self { process, input, answers }
+    }
+
+    /// Returns the answer to a call, null if none came.
+    fn call(&mut self, service: &str) -> Value {
+        writeln!(self.input, "{service}").unwrap();
+        let line: Value = serde_json::from_str(&self.answers.until(service)).unwrap();
+        line["response"].clone()
+    }
+}
+
+/// RustDDS never serves a participant again whose lease has ended.
+#[test]
+fn a_client_that_was_silent_for_longer_than_its_lease_is_answered_again() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "silent_client";
+    let publisher = publisher(name, &["--ros2-control", "--duration", "6000"]);
+    let lease = "<CycloneDDS><Domain><Discovery><LeaseDuration>4s</LeaseDuration></Discovery></Domain></CycloneDDS>";
+    let mut client = Caller::start(name, lease, "5");
+    let rate = json!({"rate": 1.0});
+    assert_eq!(client.call("get_rate"), rate);
+    client.process.stop();
+    std::thread::sleep(Duration::from_secs(10));
+    client.process.signal(nix::sys::signal::Signal::SIGCONT);
+    wait_until("an answer after the silence", || client.call("get_rate") == rate);
+    ended(publisher);
+}
+
+/// A stopped client acknowledges no answer. RustDDS would refuse more than 4,096 answers that it has not acknowledged.
+#[test]
+fn a_stopped_client_stops_no_other() {
+    if !all() || !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "stopped_client";
+    let publisher = publisher(name, &["--ros2-control", "--duration", "6000"]);
+    let [mut stopped, mut other] = [(); 2].map(|()| Caller::start(name, "", "300"));
+    let answer = stopped.call("list_parameters");
+    assert!(answer["result"].is_object(), "{answer}");
+    stopped.process.stop();
+    for number in 0..5000 {
+        assert_eq!(other.call("list_parameters"), answer, "call {number}");
+    }
+    let (_, printed) = ended(publisher);
+    assert!(!printed.contains("discarded"), "{printed}");
 }
 
 /// A request that is none of its service is refused; the next is answered.

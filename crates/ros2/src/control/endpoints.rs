@@ -177,8 +177,7 @@ impl ServiceEndpoint {
     pub(super) fn report_discarded(&mut self) {
         if !std::mem::replace(&mut self.reported.discarded, true) {
             log::warn!(
-                "ROS 2 service {}: a client is so slow, or dead, that answers are discarded until it is back or its lease \
-                 ends (reported once)",
+                "ROS 2 service {}: a client is so slow, or dead, that answers are discarded (reported once)",
                 self.service.name
             );
         }
