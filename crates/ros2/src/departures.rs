@@ -40,7 +40,7 @@ pub(super) struct Departures {
     /// The participants by the order of their discovery, from 1.
     order: BTreeMap<Prefix, u64>,
     discovered: u64,
-    /// Those that have died or left.
+    /// The participants that have died or left.
     died: VecDeque<Prefix>,
     checked: Option<Instant>,
 }

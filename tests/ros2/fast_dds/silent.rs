@@ -60,7 +60,7 @@ fn a_subscriber_that_was_silent_for_longer_than_its_lease_is_served_again() {
         process.signal(Signal::SIGCONT);
         until_a_message_after(resumed, lines);
     }
-    // Nobody else gets a message twice.
+    // The other subscriber gets no message twice.
     received.extend(others.all_until_one(is_after(resumed), "a message"));
     let stamps =
         received.iter().filter(|line| line.contains(SAMPLE)).map(|line| stamp(&serde_json::from_str(line).unwrap()));
