@@ -19,19 +19,14 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
+use super::ports::{Sockets, read_sockets};
 use super::wire::{Prefix, are_of_one_process};
 
 /// The interval at which sockets are read. Reading takes a fraction of a millisecond, and a new process needs longer to
 /// join the network.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// The UDP sockets of this network namespace. A system without this file only has the rule of the newer participant.
-const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
-
 /// The most participants that are remembered as dead or as having left. Their datagrams can come for some seconds.
 const REMEMBERED: usize = 1000;
-
-/// The sockets of each port, by their inodes. No two sockets that exist at one time share an inode.
-type Sockets = BTreeMap<u16, BTreeSet<u64>>;
 
 /// The remote participants of a network.
 #[derive(Default)]
@@ -172,27 +167,6 @@ fn is_local(address: SocketAddr) -> bool {
     UdpSocket::bind((address.ip(), 0)).is_ok()
 }
 
-/// Returns the sockets of this network namespace. `None` if the system does not list them: this process has some.
-fn read_sockets() -> Option<Sockets> {
-    let tables = TABLES.map(|table| std::fs::read_to_string(table).unwrap_or_default());
-    Some(sockets(&tables.concat())).filter(|sockets| !sockets.is_empty())
-}
-
-/// Reads a table of sockets: a line for each, with the local address as `ADDRESS:PORT`, in hexadecimal digits, in the
-/// second column and the inode in the tenth.
-fn sockets(table: &str) -> Sockets {
-    let mut sockets = Sockets::new();
-    for line in table.lines() {
-        let columns: Vec<&str> = line.split_whitespace().collect();
-        let [_, local, _, _, _, _, _, _, _, inode, ..] = columns[..] else { continue };
-        let port = local.rsplit_once(':').and_then(|(_, port)| u16::from_str_radix(port, 16).ok());
-        if let (Some(port), Ok(inode)) = (port, inode.parse()) {
-            sockets.entry(port).or_default().insert(inode);
-        }
-    }
-    sockets
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -320,18 +294,5 @@ mod tests {
         assert_eq!(departures.gone_from(&BTreeMap::from([(1, BTreeSet::from([1]))])), [[0; 12]; 0]);
         drop(socket);
         assert_eq!(departures.gone_from(&BTreeMap::from([(1, BTreeSet::from([1]))])), [OLD]);
-    }
-
-    /// Lines of Linux 6.1.
-    #[test]
-    fn a_table_has_ports_and_inodes() {
-        let table = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode ref pointer drops\n\
-             \x20 123: 00000000:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4026 2 0000000000000000 0\n\
-             \x20 124: 0100007F:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4027 2 0000000000000000 9\n\
-             \x20 200: 00000000000000000000000000000000:1CE8 00000000000000000000000000000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 77 2 0000000000000000 0\n";
-        assert_eq!(
-            sockets(table),
-            BTreeMap::from([(7411, BTreeSet::from([4026, 4027])), (7400, BTreeSet::from([77]))])
-        );
     }
 }

@@ -13,6 +13,7 @@ pub mod environment;
 mod interfaces;
 mod matching;
 mod node;
+mod ports;
 mod rate;
 mod readers;
 mod relief;
@@ -24,7 +25,7 @@ mod wire;
 use std::net::{IpAddr, Ipv4Addr};
 
 use ros2_client::Context;
-use rustdds::DomainParticipantBuilder;
+use rustdds::{DomainParticipant, DomainParticipantBuilder};
 
 use bench_dragon_messages::StageMessage;
 use bench_dragon_ros2_messages::settings::Ros2Settings;
@@ -34,6 +35,9 @@ use environment::{Network, Range, check_name};
 
 /// The most messages that a writer keeps for its subscribers, RustDDS's own limit.
 const UNACKNOWLEDGED_MESSAGES: u32 = 8192;
+
+/// The most participants that are created: another program may take a port in between.
+const MOST_ATTEMPTS: u32 = 5;
 
 /// The reason why there are no ROS 2 topics.
 #[derive(Debug, thiserror::Error)]
@@ -107,13 +111,29 @@ fn topic_names(name: &str, settings: &Ros2Settings, alerts: bool, cues: usize) -
     settings.offered(alerts, cues > 0).map(|topic| topic.path(name)).collect()
 }
 
-/// Creates a participant of the network.
+/// Joins the network.
 fn context(network: Network) -> Result<Context, Ros2Error> {
-    let failed = |error: &dyn std::fmt::Display| Ros2Error::Failed(error.to_string());
-    let mut builder = DomainParticipantBuilder::new(network.domain);
-    if network.range == Range::Localhost {
-        builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
+    Context::from_domain_participant(participant(network)?).map_err(|error| Ros2Error::Failed(error.to_string()))
+}
+
+/// Creates a participant that listens where it is announced ([`ports`]).
+fn participant(Network { domain, range }: Network) -> Result<DomainParticipant, Ros2Error> {
+    let mut attempts = 0;
+    loop {
+        let mut builder = DomainParticipantBuilder::new(domain);
+        if range == Range::Localhost {
+            builder = builder.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
+        }
+        let occupied = ports::occupy(domain);
+        let participant = builder.build().map_err(|error| Ros2Error::Failed(error.to_string()))?;
+        drop(occupied);
+        attempts += 1;
+        if ports::is_own(domain, participant.participant_id()) {
+            return Ok(participant);
+        }
+        if attempts == MOST_ATTEMPTS {
+            log::warn!("ROS 2: other programs have the ports of this one: reliable subscribers may get no messages");
+            return Ok(participant);
+        }
     }
-    let participant = builder.build().map_err(|error| failed(&error))?;
-    Context::from_domain_participant(participant).map_err(|error| failed(&error))
 }

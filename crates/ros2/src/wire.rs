@@ -9,6 +9,8 @@ use std::ops::{Range, RangeInclusive};
 
 use rustdds::{DomainParticipant, GUID};
 
+use super::ports;
+
 /// The name of a participant: the first bytes of the GUIDs of its endpoints.
 pub(super) type Prefix = [u8; 12];
 
@@ -194,10 +196,7 @@ pub(super) fn send(datagram: &[u8], addresses: impl IntoIterator<Item = SocketAd
 
 /// Sends a datagram to the participant itself.
 pub(super) fn send_to_own(participant: &DomainParticipant, datagram: &[u8]) {
-    // The port for unicast user traffic (RTPS 2.5, section 9.6.2.3). If another program has it, RustDDS keeps messages
-    // up to its limit.
-    let port = 7411 + 250 * u32::from(participant.domain_id()) + 2 * u32::from(participant.participant_id());
-    if let Ok(port) = u16::try_from(port) {
+    if let Some(port) = ports::user_port(participant.domain_id(), participant.participant_id()) {
         send(datagram, [SocketAddr::from((Ipv4Addr::LOCALHOST, port))]);
     }
 }

@@ -64,6 +64,31 @@ fn the_ports_of_a_killed_subscriber_are_silent_within_seconds() {
     stopped(publisher);
 }
 
+/// RustDDS takes a number whose port for discovery is free, also where the second port of that number is taken. Its readers
+/// would send their acknowledgements to the taken port.
+#[test]
+fn a_publisher_is_heard_where_its_usual_port_is_taken() {
+    if !can_run(peer_program().map(drop)) {
+        return;
+    }
+    let name = "taken_port";
+    // A domain of its own, with the ports that RTPS 2.5 gives it (section 9.6.2.3).
+    let domain = 10 + (std::process::id() % 10) as u16;
+    let _taken = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 7411 + 250 * domain)).unwrap();
+    let domain = domain.to_string();
+    let mut run = program(name);
+    run.env("ROS_DOMAIN_ID", &domain).args(["run", "--json", "--ros2", "--start", "50", "--duration", "6000"]);
+    let publisher = answering(Process::start(&mut run), || program(name));
+    // The second one requests a message of before.
+    let _subscribers = [(); 2].map(|()| {
+        let mut late = subscriber(name, "stage", &["--transient-local", "--seconds", "3000"]);
+        let mut process = Process::start(late.args(["--domain", &domain]));
+        process.lines().until(SAMPLE);
+        process
+    });
+    stopped(publisher);
+}
+
 /// A message of 223 benches, 9 or 12 kB, comes as DATA and never as DATA_FRAG: Fast DDS 2.14 hangs when a GAP names a
 /// message of which it has a part.
 #[test]

@@ -1,0 +1,118 @@
+//! The UDP ports of this process's participant.
+//!
+//! RustDDS 0.15.1 takes the first number of a participant whose port for discovery is free. If the port for user traffic
+//! of that number is taken, RustDDS listens at another one (`dds/participant.rs:1304`), and still announces the taken one
+//! (`DiscoveredWriterData::new`, `discovery/sedp_messages.rs:795`). Then no acknowledgement arrives: a reliable subscriber
+//! that misses one message gets no more, and a late one never gets the latest message. Fast DDS takes the two ports one
+//! by one, so where its processes come and go there often is such a number. So this file occupies the ports for discovery
+//! of such numbers while RustDDS chooses one. Held by `a_publisher_is_heard_where_its_usual_port_is_taken`.
+//!
+//! In: a domain, and the table of UDP sockets of the kernel. Out: sockets to hold, and whether a participant listens where
+//! it is announced.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::{Ipv4Addr, UdpSocket};
+use std::path::Path;
+
+/// The UDP sockets of this network namespace.
+const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
+
+/// The participants of a domain on one machine, as many as RustDDS tries (`dds/participant.rs:1267`).
+const PARTICIPANTS: u16 = 120;
+
+/// The sockets of each port, by their inodes. No two sockets that exist at one time share an inode.
+pub(super) type Sockets = BTreeMap<u16, BTreeSet<u64>>;
+
+/// Returns the port for discovery of a participant, `None` beyond the ports that exist (RTPS 2.5, section 9.6.2.3).
+fn discovery_port(domain: u16, participant: u16) -> Option<u16> {
+    u16::try_from(7410 + 250 * u32::from(domain) + 2 * u32::from(participant)).ok()
+}
+
+/// Returns the port for user traffic of a participant, `None` beyond the ports that exist.
+pub(super) fn user_port(domain: u16, participant: u16) -> Option<u16> {
+    discovery_port(domain, participant)?.checked_add(1)
+}
+
+/// Occupies the ports for discovery before those of the first participant whose two ports are free.
+pub(super) fn occupy(domain: u16) -> Vec<UdpSocket> {
+    let bind = |port: Option<u16>| UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port?)).ok();
+    let mut occupied = Vec::new();
+    for participant in 0..PARTICIPANTS {
+        let Some(discovery) = bind(discovery_port(domain, participant)) else { continue };
+        if bind(user_port(domain, participant)).is_some() {
+            return occupied;
+        }
+        occupied.push(discovery);
+    }
+    // There is none. RustDDS has to choose one of these.
+    Vec::new()
+}
+
+/// Returns true if this process has the port for user traffic of a participant, or if the system does not tell.
+pub(super) fn is_own(domain: u16, participant: u16) -> bool {
+    let (Some(port), Some(sockets)) = (user_port(domain, participant), read_sockets()) else { return true };
+    let Ok(files) = std::fs::read_dir("/proc/self/fd") else { return true };
+    let own: BTreeSet<_> = files.flatten().filter_map(|file| std::fs::read_link(file.path()).ok()).collect();
+    let mut inodes = sockets.get(&port).into_iter().flatten();
+    inodes.any(|inode| own.contains(Path::new(&format!("socket:[{inode}]"))))
+}
+
+/// Returns the sockets of this network namespace. `None` if the system does not list them: this process has some.
+pub(super) fn read_sockets() -> Option<Sockets> {
+    let tables = TABLES.map(|table| std::fs::read_to_string(table).unwrap_or_default());
+    Some(sockets(&tables.concat())).filter(|sockets| !sockets.is_empty())
+}
+
+/// Reads a table of sockets: a line for each, with the local address as `ADDRESS:PORT`, in hexadecimal digits, in the
+/// second column and the inode in the tenth.
+fn sockets(table: &str) -> Sockets {
+    let mut sockets = Sockets::new();
+    for line in table.lines() {
+        let columns: Vec<&str> = line.split_whitespace().collect();
+        let [_, local, _, _, _, _, _, _, _, inode, ..] = columns[..] else { continue };
+        let port = local.rsplit_once(':').and_then(|(_, port)| u16::from_str_radix(port, 16).ok());
+        if let (Some(port), Ok(inode)) = (port, inode.parse()) {
+            sockets.entry(port).or_default().insert(inode);
+        }
+    }
+    sockets
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A domain that no other test uses.
+    const DOMAIN: u16 = 101;
+
+    fn bound(port: Option<u16>) -> std::io::Result<UdpSocket> {
+        UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port.unwrap()))
+    }
+
+    #[test]
+    fn a_number_whose_second_port_is_taken_is_occupied() {
+        assert_eq!((discovery_port(0, 0), user_port(0, 3)), (Some(7410), Some(7417)));
+        assert_eq!(user_port(232, 119), None);
+        let taken = bound(user_port(DOMAIN, 0)).unwrap();
+        let occupied = occupy(DOMAIN);
+        let ports: Vec<_> = occupied.iter().map(|socket| socket.local_addr().unwrap().port()).collect();
+        assert_eq!(ports, [discovery_port(DOMAIN, 0).unwrap()]);
+        assert!(bound(discovery_port(DOMAIN, 1)).is_ok() && bound(user_port(DOMAIN, 1)).is_ok());
+        assert!(is_own(DOMAIN, 0) && !is_own(DOMAIN, 1));
+        drop((taken, occupied));
+        assert!(occupy(DOMAIN).is_empty());
+    }
+
+    /// Lines of Linux 6.1.
+    #[test]
+    fn a_table_has_ports_and_inodes() {
+        let table = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode ref pointer drops\n\
+             \x20 123: 00000000:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4026 2 0000000000000000 0\n\
+             \x20 124: 0100007F:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4027 2 0000000000000000 9\n\
+             \x20 200: 00000000000000000000000000000000:1CE8 00000000000000000000000000000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 77 2 0000000000000000 0\n";
+        assert_eq!(
+            sockets(table),
+            BTreeMap::from([(7411, BTreeSet::from([4026, 4027])), (7400, BTreeSet::from([77]))])
+        );
+    }
+}
