@@ -15,9 +15,9 @@ const SILENCE: Duration = Duration::from_secs(10);
 const TOPICS: [&str; 2] = ["handles", "alerts"];
 
 /// Returns a scene whose countdown raises an alert each second, and the arguments of its show.
-fn show(name: &str) -> (PathBuf, [&'static str; 5]) {
+fn show(name: &str) -> (PathBuf, [&'static str; 6]) {
     let scene = scene_file(name, &[("approach_time = 10.0", "approach_time = 1000.0")]);
-    (scene, ["run", "--ros2", "--json", "--duration", "6000"])
+    (scene, ["run", "--ros2", "--json", "--loop", "--duration", "6000"])
 }
 
 fn nanoseconds() -> u64 {
