@@ -81,6 +81,7 @@ def bar_conducts():
         until(lambda: bar_is_shown(page), "the bar")
         buttons(page)
         time_line(page)
+        keys_before_the_time_line(browser, ready["url"])
         keyboard(page)
         held(page)
         page = at_the_end(page, browser, ready["url"])
@@ -136,7 +137,7 @@ def time_line(page):
     assert 1 < len(seeks) <= 10 * took + 3, f"{len(seeks)} seeks in {took} s"
     until(lambda: abs(float(page.input_value("#conduct-seek")) - state()["sim_time"]) < 0.1, "the thumb is where the show is")
     # A screen reader reads the value.
-    assert re.fullmatch(r"\d+(\.\d)?", page.input_value("#conduct-seek")), page.input_value("#conduct-seek")
+    until(lambda: re.fullmatch(r"\d+(\.\d)?", page.input_value("#conduct-seek")), "a value with tenths")
     # A connection that breaks before the answer to a seek: the bar reports it, and the server's return makes no late
     # jump.
     before, sent = state(), lambda: sum('"seek"' in text and "120" in text for text in page.evaluate("sent"))
@@ -149,6 +150,29 @@ def time_line(page):
     until(lambda: abs(float(page.input_value("#conduct-seek")) - before["sim_time"]) < 0.1, "the thumb is where the show is, again")
     assert state()["sim_time"] == before["sim_time"] and before["playback"] == "paused", (before, state())
     assert sent() == 1, "the seek is sent again"
+
+
+def keys_before_the_time_line(browser, url):
+    """An arrow key moves the show from where it is, or not at all: at first the time line has no length."""
+    page = browser.new_context().new_page()
+    be_patient(page)
+    page.add_init_script("""{
+        const { setInterval } = window;
+        window.setInterval = (act, interval) => setInterval(() => window.begins && act(), interval);
+    }""")
+    page.goto(url)
+    until(lambda: bar_is_shown(page) and page.evaluate("picture.drawn > 0"), "the bar of a page without a time line")
+    before = state()["sim_time"]
+    page.click("#help")
+    page.check("#keys-on")
+    page.keyboard.press("Escape")
+    page.evaluate("document.activeElement.blur()")
+    for key in ("ArrowRight", "ArrowLeft", "."):
+        page.keyboard.press(key)
+    until(lambda: abs(state()["sim_time"] - before - 0.08) < 1e-6, "a step, and no seek")
+    page.evaluate("window.begins = true")
+    until(lambda: page.is_enabled("#conduct-seek"), "the time line")
+    page.close()
 
 
 def keyboard(page):
@@ -203,7 +227,7 @@ def keys_are_off(page, before):
     page.check("#keys-on")
     page.keyboard.press("Escape")
     page.reload()
-    until(lambda: page.evaluate("picture.drawn > 0") and bar_is_shown(page), "the page again")
+    until(lambda: bar_is_shown(page) and page.is_enabled("#conduct-seek"), "the page again")
     assert page.is_checked("#keys-on"), "the choice is forgotten"
     page.evaluate("document.activeElement.blur()")
 

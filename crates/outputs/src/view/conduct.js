@@ -26,7 +26,7 @@ const BAR = `
   <label><span data-word="rateInForce"></span> <select id="conduct-rate"></select></label>
   <span id="conduct-time"></span>
   <div id="conduct-line">
-    <input id="conduct-seek" type="range" min="0" max="1" step="any" value="0"
+    <input id="conduct-seek" type="range" min="0" max="1" step="any" value="0" disabled
       data-label="timeLine" aria-describedby="conduct-events" title="← →">
     <div id="conduct-marks" aria-hidden="true"></div>
     <p id="conduct-events" class="unseen"></p>
@@ -168,6 +168,10 @@ export function conduct(publishers, keysConduct, keySwitch) {
   function seek(time) {
     wanted = Math.min(Math.max(0, time), Number(line.max));
     sendSeek();
+  }
+  /** Seeks from the present time, once a show has given the time line its length. */
+  function seekBy(time) {
+    if (shownStages.length) seek(now() + time);
   }
   function sendSeek() {
     const passed = performance.now() - soughtAt;
@@ -336,7 +340,7 @@ export function conduct(publishers, keysConduct, keySwitch) {
   const keys = {
     " ": toggle, ".": () => command("step", 1), h: hold,
     "[": () => changeRate(1 / 2), "]": () => changeRate(2),
-    ArrowLeft: () => seek(now() - SEEK), ArrowRight: () => seek(now() + SEEK),
+    ArrowLeft: () => seekBy(-SEEK), ArrowRight: () => seekBy(SEEK),
   };
   /**
    * Keys that the focused element uses itself: the picture moves by arrows, buttons are pressed by space, lists have
