@@ -28,8 +28,8 @@ use crate::commands::{Answer, ShowCommands};
 use bench_dragon_client::control::command_client::MOST_WAITING;
 use bench_dragon_messages::control::{Code, Command};
 use calls::{Next, ServiceAdapter, refusal, sentence};
-use endpoints::Client;
 pub(super) use endpoints::Endpoints;
+use endpoints::{Client, KEPT_ANSWERS};
 use mapping::split;
 use services::{Call, Response};
 
@@ -43,9 +43,6 @@ const MOST_PENDING: usize = 512;
 /// an answer that RustDDS refuses.
 const MATCHING_PATIENCE: Duration = Duration::from_secs(30);
 const PATIENCE_AFTER_LEAVING: Duration = Duration::from_secs(2);
-/// The answers of a service that its clients may request again while RustDDS refuses one. Earlier ones are acknowledged
-/// in their names: a client that is slow or dead holds up no other.
-const KEPT_ANSWERS: u64 = 2048;
 /// The intervals at which requests are polled, and answers while some are pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 const ANSWER_INTERVAL: Duration = Duration::from_micros(500);

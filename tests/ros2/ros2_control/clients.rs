@@ -73,55 +73,6 @@ fn all_clients_of_one_process_are_answered() {
     ended(publisher);
 }
 
-/// Both kinds of client conduct one show by the same services, in turn. Cyclone DDS's stays all the time, so each
-/// answer to the other passes by its readers.
-#[test]
-fn clients_of_both_implementations_conduct_one_show_in_turn() {
-    if !can_run(python_modules(&["cyclonedds"])) {
-        return;
-    }
-    let name = "both";
-    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "6000"]);
-    let here = || control(name, &["state"]).1;
-    let (mut cyclone, mut input) = Process::start_with_input(&mut peer(name, &["--calls-of-input"]));
-    let answers = cyclone.lines();
-    let mut of_cyclone = |call: &str| -> Value {
-        writeln!(input, "{call}").unwrap();
-        let line: Value = serde_json::from_str(&answers.until(call)).unwrap();
-        line["response"].clone()
-    };
-    let set = |service: &str, kind: &'static str, value: f64| -> bool {
-        enhanced(name, service, ("rosbag2_interfaces", kind), value)
-    };
-    let rate = || -> f64 { enhanced(name, "get_rate", ("rosbag2_interfaces", "GetRate"), Empty(0)) };
-    for turn in 1..=5 {
-        let (of_fast, by_cyclone) = (f64::from(turn) + 0.25, f64::from(turn) + 0.5);
-        assert!(set("set_rate", "SetRate", of_fast));
-        assert_eq!(of_cyclone("get_rate"), json!({ "rate": of_fast }));
-        assert_eq!(of_cyclone(&format!("set_rate={by_cyclone}")), json!({"success": true}));
-        assert_eq!(rate(), by_cyclone);
-        let time = Time { sec: 100 + turn, nanosec: 0 };
-        assert!(enhanced::<_, bool>(name, "seek", ("rosbag2_interfaces", "Seek"), time));
-        assert_eq!(here()["sim_time"], 100.0 + f64::from(turn));
-        assert_eq!(of_cyclone(&format!("seek={}", 200 + turn)), json!({"success": true}));
-        assert_eq!(here()["sim_time"], 200.0 + f64::from(turn));
-        let stepped: Outcome = enhanced(name, "step_simulation", ("simulation_interfaces", "StepSimulation"), 1_u64);
-        assert_eq!(stepped, Outcome { result: 1, error_message: String::new() });
-        assert_eq!(result(&of_cyclone("step_simulation=1")), (1, false));
-        assert_eq!(of_cyclone("list_parameters"), json!({"result": {"names": [], "prefixes": []}}));
-        let listed: (Vec<String>, Vec<String>) =
-            enhanced(name, "list_parameters", ("rcl_interfaces", "ListParameters"), (Vec::<String>::new(), 0_u64));
-        assert_eq!(listed, (vec![], vec![]));
-    }
-    // A hold of one kind is released by the other.
-    assert_eq!(of_cyclone("hold")["success"], true);
-    assert!(enhanced::<_, Trigger>(name, "release", ("std_srvs", "Trigger"), Empty(0)).success);
-    assert_eq!(of_cyclone("release")["success"], false);
-    cyclone.signal(nix::sys::signal::Signal::SIGKILL);
-    let (_, printed) = ended(publisher);
-    assert!(!printed.contains("is none of"), "{printed}");
-}
-
 /// A client of services, whose calls are asked for by lines.
 struct Caller {
     process: Process,
@@ -144,6 +95,49 @@ impl Caller {
         let line: Value = serde_json::from_str(&self.answers.until(service)).unwrap();
         line["response"].clone()
     }
+}
+
+/// Both kinds of client conduct one show by the same services, in turn. Cyclone DDS's stays all the time, so each
+/// answer to the other passes by its readers.
+#[test]
+fn clients_of_both_implementations_conduct_one_show_in_turn() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "both";
+    let publisher = publisher(name, &["--ros2-control", "--paused", "--start", "50", "--duration", "6000"]);
+    let here = || control(name, &["state"]).1;
+    let mut cyclone = Caller::start(name, "", "300");
+    let set = |service: &str, kind: &'static str, value: f64| -> bool {
+        enhanced(name, service, ("rosbag2_interfaces", kind), value)
+    };
+    let rate = || -> f64 { enhanced(name, "get_rate", ("rosbag2_interfaces", "GetRate"), Empty(0)) };
+    for turn in 1..=5 {
+        let (of_fast, by_cyclone) = (f64::from(turn) + 0.25, f64::from(turn) + 0.5);
+        assert!(set("set_rate", "SetRate", of_fast));
+        assert_eq!(cyclone.call("get_rate"), json!({ "rate": of_fast }));
+        assert_eq!(cyclone.call(&format!("set_rate={by_cyclone}")), json!({"success": true}));
+        assert_eq!(rate(), by_cyclone);
+        let time = Time { sec: 100 + turn, nanosec: 0 };
+        assert!(enhanced::<_, bool>(name, "seek", ("rosbag2_interfaces", "Seek"), time));
+        assert_eq!(here()["sim_time"], 100.0 + f64::from(turn));
+        assert_eq!(cyclone.call(&format!("seek={}", 200 + turn)), json!({"success": true}));
+        assert_eq!(here()["sim_time"], 200.0 + f64::from(turn));
+        let stepped: Outcome = enhanced(name, "step_simulation", ("simulation_interfaces", "StepSimulation"), 1_u64);
+        assert_eq!(stepped, Outcome { result: 1, error_message: String::new() });
+        assert_eq!(result(&cyclone.call("step_simulation=1")), (1, false));
+        assert_eq!(cyclone.call("list_parameters"), json!({"result": {"names": [], "prefixes": []}}));
+        let listed: (Vec<String>, Vec<String>) =
+            enhanced(name, "list_parameters", ("rcl_interfaces", "ListParameters"), (Vec::<String>::new(), 0_u64));
+        assert_eq!(listed, (vec![], vec![]));
+    }
+    // A hold of one kind is released by the other.
+    assert_eq!(cyclone.call("hold")["success"], true);
+    assert!(enhanced::<_, Trigger>(name, "release", ("std_srvs", "Trigger"), Empty(0)).success);
+    assert_eq!(cyclone.call("release")["success"], false);
+    cyclone.process.signal(nix::sys::signal::Signal::SIGKILL);
+    let (_, printed) = ended(publisher);
+    assert!(!printed.contains("is none of"), "{printed}");
 }
 
 /// RustDDS never serves a participant again whose lease has ended.

@@ -23,6 +23,9 @@ use crate::Ros2Error;
 const REQUEST_DEPTH: i32 = 256;
 /// Answers of one service kept for clients that are slow or dead.
 const MOST_ANSWERS: i32 = 4096;
+/// The answers that clients may request again while RustDDS refuses one. Earlier ones are acknowledged in their names: a
+/// client that is slow or dead holds up no other.
+pub(super) const KEPT_ANSWERS: u64 = MOST_ANSWERS as u64 / 2;
 /// The most bytes of a request that are read. Only requests for parameters have no fixed length.
 const MOST_REQUEST_BYTES: usize = 4096;
 
