@@ -317,6 +317,7 @@ fn bar_conducts() {
 }
 
 #[test]
+#[ignore = "tests/run --all"]
 fn token_and_own_pages() {
     in_a_browser("token_and_own_pages");
 }

@@ -134,7 +134,8 @@ fn every_accuracy_is_kept_on_every_scene_and_a_coarser_one_costs_no_more() {
 #[test]
 fn every_instruction_set_keeps_every_accuracy_against_the_reference() {
     let mut run = BTreeSet::new();
-    for name in ["paper", "turnaround", "procession"] {
+    // The first has tables of every format.
+    for name in &["procession", "paper", "turnaround"][..harness::cases(1, 3, 3)] {
         let scene = scene(name);
         let motion = scene.ensemble.only().unwrap();
         let mut reference = Reference::new(*motion.team(), motion.description(), motion.head_speed()).unwrap();
@@ -239,6 +240,7 @@ fn events_do_not_depend_on_the_accuracy() {
 
 /// The live clearance of a coarse chain is the clearance of all its pairs, to the last bit.
 #[test]
+#[ignore = "tests/run --all"]
 fn the_live_clearance_is_that_of_the_frame() {
     for name in ["paper", "turnaround", "procession", "school"] {
         let scene = scene(name);
@@ -309,7 +311,7 @@ fn motions() -> impl Strategy<Value = Motion> {
 
 #[test]
 fn random_paths_keep_every_accuracy() {
-    let cases = harness::cases(15, 60, 60);
+    let cases = harness::cases(6, 60, 60);
     let config = Config { cases, failure_persistence: None, ..Config::default() };
     let tables = std::cell::Cell::new(0);
     TestRunner::new(config)

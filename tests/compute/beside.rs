@@ -2,7 +2,7 @@
 //! `tests/compute/oracle`, with distances by parry2d, and with the ordinary search. The checker accepts the
 //! certificates, and refuses changed certificates.
 //!
-//! `BENCH_DRAGON_ALL=1` makes 120 scenes in place of 30, `BENCH_DRAGON_LONG=1` 3,000.
+//! `BENCH_DRAGON_ALL=1` makes 120 scenes in place of 8, `BENCH_DRAGON_LONG=1` 3,000.
 
 use bench_dragon::certify::{
     CertificateLine, ClearanceEnclosures, ClearanceHints, ObstacleEnclosure, certify_clearances,
@@ -161,7 +161,7 @@ fn the_least_clearances_of_the_square_are_enclosed_to_a_nanometre() {
 
 #[test]
 fn the_least_clearances_of_random_scenes_are_enclosed() {
-    let count = harness::cases(30, 120, 3000);
+    let count = harness::cases(8, 120, 3000);
     let (mut obstacles, mut whole) = (0, 0);
     for index in 0..count {
         let (of_scene, enclosed) = compared(&random_scene(&mut Rng::with_seed(0xbe51de + index)), 60);

@@ -186,7 +186,7 @@ fn the_program_agrees_with_brute_force() {
     }
     let seed = number_from("BENCH_DRAGON_ORACLE_SEED").unwrap_or(1);
     let given = number_from("BENCH_DRAGON_ORACLE_SCENES").map(|scenes| scenes as usize);
-    let scenes = given.unwrap_or_else(|| harness::cases(50, 200, 10_000));
+    let scenes = given.unwrap_or_else(|| harness::cases(10, 200, 10_000));
     let text_of = |family, index| random_scene(family, &mut Random(seed << 32 | index));
     let tally = compared(scenes + scenes / 4, seed, text_of, |index| {
         if index < scenes { index % (FAMILIES.len() - 1) } else { FAMILIES.len() - 1 }

@@ -4,6 +4,8 @@
 //!
 //! In: the numbers of a scene. Only `model` distinguishes the kinds of curves.
 
+#[cfg(test)]
+mod cases;
 pub mod clearance;
 pub mod contact;
 pub mod ensemble;

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use proptest::prelude::*;
 
 use super::*;
+use crate::cases::cases;
 use crate::event::unreported;
 use crate::model::curve::Side;
 use crate::model::team::Ends;
@@ -240,7 +241,7 @@ fn any_route() -> impl Strategy<Value = Path> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(CASES) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(cases(24)) })]
 
     #[test]
     fn sampling_a_spiral_shows_nothing_better(team in any_team(), pitch in 0.3..4.0f64, turns in 2.0..9.0f64) {
@@ -279,5 +280,4 @@ proptest! {
     }
 }
 
-const CASES: u32 = 24;
 const SAMPLES: usize = 300;

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::cases::cases;
 use crate::event::unreported;
 use crate::model::curve::Side;
 use crate::model::path::Route;
@@ -383,7 +384,7 @@ fn check_chain(path: &Path, team: &Team) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(cases(24)))]
 
     #[test]
     fn chains_on_routes(path in routes(), head in 0.3f64..2.0, body in 0.3f64..2.0) {

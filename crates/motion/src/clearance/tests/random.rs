@@ -3,6 +3,7 @@
 use std::cell::Cell;
 
 use super::*;
+use crate::cases::cases;
 use crate::model::path::tests::any_path;
 use crate::model::team::tests::{Factors, any_ends};
 use proptest::test_runner::TestRunner;
@@ -38,21 +39,10 @@ fn frames(path: &Path, places: &[f64]) -> Vec<f64> {
     places.iter().flat_map(|place| [0.0, 5e-5, 1e-3, 1.0 / 60.0].map(|by| place * path.length() + by)).collect()
 }
 
-/// Returns a quarter of the random cases, all of them with `BENCH_DRAGON_ALL=1`, and ten times as many if the tests that
-/// take minutes are requested.
-fn count(cases: usize) -> usize {
-    let is_set = |variable| std::env::var_os(variable).is_some_and(|value| value == "1");
-    match () {
-        () if is_set("BENCH_DRAGON_LONG") => 10 * cases,
-        () if is_set("BENCH_DRAGON_ALL") => cases,
-        () => cases / 4,
-    }
-}
-
 /// Runs a check on random cases and returns the sum of its counts.
-fn sum_over_cases<S: Strategy>(cases: usize, strategy: S, check: impl Fn(S::Value) -> usize) -> usize {
+fn sum_over_cases<S: Strategy>(count: usize, strategy: S, check: impl Fn(S::Value) -> usize) -> usize {
     let checked = Cell::new(0);
-    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(cases as u32) };
+    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count as u32) };
     let result = TestRunner::new(config).run(&strategy, |case| {
         checked.set(checked.get() + check(case));
         Ok(())
@@ -63,8 +53,9 @@ fn sum_over_cases<S: Strategy>(cases: usize, strategy: S, check: impl Fn(S::Valu
 
 #[test]
 fn the_same_as_all_pairs_on_random_spirals() {
-    let (count, cases) = (count(60), (any_team(), 0.05..3.0f64, 2.0..25.0f64, prop::collection::vec(0.0..1.0f64, 6)));
-    let compared = sum_over_cases(count, cases, |(team, pitch, turns, places)| {
+    let strategy = (any_team(), 0.05..3.0f64, 2.0..25.0f64, prop::collection::vec(0.0..1.0f64, 6));
+    let count = cases(60) as usize;
+    let compared = sum_over_cases(count, strategy, |(team, pitch, turns, places)| {
         let path = Path::spiral(pitch, turns);
         agree(team, &path, &frames(&path, &places)).0
     });
@@ -73,17 +64,19 @@ fn the_same_as_all_pairs_on_random_spirals() {
 
 #[test]
 fn the_same_as_all_pairs_on_random_paths() {
-    let (count, cases) = (count(100), (any_team(), any_lanes(), prop::collection::vec(0.0..1.0f64, 6)));
-    let compared = sum_over_cases(count, cases, |(team, path, places)| agree(team, &path, &frames(&path, &places)).0);
+    let strategy = (any_team(), any_lanes(), prop::collection::vec(0.0..1.0f64, 6));
+    let count = cases(100) as usize;
+    let compared =
+        sum_over_cases(count, strategy, |(team, path, places)| agree(team, &path, &frames(&path, &places)).0);
     assert!(compared > count * 24 / 2, "{compared} frames on random paths");
 }
 
 #[test]
 fn no_boards_are_nearer_than_the_bounds() {
-    let cases = (any_team(), any_lanes(), prop::collection::vec(0.0..1.0f64, 3));
+    let strategy = (any_team(), any_lanes(), prop::collection::vec(0.0..1.0f64, 3));
     let close = Cell::new(0);
-    let count = count(100);
-    let checked = sum_over_cases(count, cases, |(team, path, places)| {
+    let count = cases(100) as usize;
+    let checked = sum_over_cases(count, strategy, |(team, path, places)| {
         let moments = places.iter().map(|place| check_bounds(&path, &team, place * path.length()));
         let moments = moments.fold((0, 0), |sum, (checked, close)| (sum.0 + checked, sum.1 + close));
         close.set(close.get() + moments.1);

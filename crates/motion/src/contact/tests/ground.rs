@@ -86,7 +86,7 @@ fn any_ground() -> impl Strategy<Value = Ground> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(cases(40)) })]
 
     #[test]
     fn sampling_a_route_meets_no_obstacle_earlier(team in any_team(), path in any_route(), ground in any_ground()) {

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
+use crate::cases::cases;
 use parry2d_f64::math::Pose;
 use parry2d_f64::query;
 use parry2d_f64::shape::Cuboid;
@@ -75,8 +76,7 @@ fn compare(a: &Board, b: &Board, size: f64) -> bool {
 #[test]
 fn parry_agrees_on_random_pairs() {
     // A million take seconds optimised.
-    let all = std::env::var_os("BENCH_DRAGON_ALL").is_some_and(|value| value == "1");
-    let pairs = if all { 1_000_000 } else { 50_000 };
+    let pairs = cases(1_000_000) as usize;
     let mut random = TestRunner::default().new_rng();
     let mut unit = || random.next_u64() as f64 / u64::MAX as f64;
     let (mut overlapping, mut apart) = (0, 0);
