@@ -38,7 +38,9 @@ fn a_subscriber_with_the_printed_manifest_needs_the_crates_of_that_library() {
     let dependencies = dependencies.replace("../bench-dragon", root);
     let folder = tempfile::tempdir().unwrap();
     let package = "[package]\nname = \"subscriber\"\nedition = \"2024\"\n[workspace]\n";
-    fs::write(folder.path().join("Cargo.toml"), format!("{package}{dependencies}")).unwrap();
+    // A user's build has the crate of the registry, which this workspace replaces and may not have got.
+    let bindgen = format!("[patch.crates-io]\nbindgen = {{ path = \"{root}/crates/bindgen\" }}\n");
+    fs::write(folder.path().join("Cargo.toml"), format!("{package}{dependencies}{bindgen}")).unwrap();
     fs::create_dir(folder.path().join("src")).unwrap();
     fs::copy(format!("{root}/examples/subscriber.rs"), folder.path().join("src/main.rs")).unwrap();
     fs::copy(format!("{root}/Cargo.lock"), folder.path().join("Cargo.lock")).unwrap();
