@@ -120,7 +120,7 @@ fn curve_stays_in_its_place() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "judges the looks of a picture in a browser: tests/run --all"]
 fn a_board_meets_an_obstacle() {
     on_ground("a_board_meets_an_obstacle");
 }
