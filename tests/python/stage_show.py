@@ -57,7 +57,9 @@ ADDED = """() => {
 
 
 def shot(page, **how):
-    width, height, data = page.evaluate(DECODE, base64.b64encode(page.screenshot(**how)).decode())
+    # Beside ten busy programs a picture of the window took Chromium more than two minutes.
+    picture = page.screenshot(timeout=600_000, **how)
+    width, height, data = page.evaluate(DECODE, base64.b64encode(picture).decode())
     return numpy.frombuffer(base64.b64decode(data), numpy.uint8).reshape(height, width, 4)
 
 

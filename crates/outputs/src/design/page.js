@@ -129,10 +129,9 @@ function replace(whole, time) {
   send(whole);
 }
 
-function typed(whole, isOther) {
-  const now = performance.now();
-  if (isOther || now - typedAt > TYPING_PAUSE) typing++;
-  typedAt = isOther ? -Infinity : now;
+function typed(whole, when, isOther) {
+  if (isOther || when - typedAt > TYPING_PAUSE) typing++;
+  typedAt = isOther ? -Infinity : when;
   history.take(whole, line.time, `typing ${typing}`);
   send(whole);
   note();

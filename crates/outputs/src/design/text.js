@@ -4,7 +4,7 @@
 const element = (id) => document.getElementById(id);
 
 export class SceneText {
-  /** `typed` is called with the text, and with whether the typing begins another gesture. */
+  /** `typed` is called with the text, the time of the key (ms), and whether the typing begins another gesture. */
   constructor(typed) {
     this.area = element("scene-text");
     this.pane = this.area.parentElement;
@@ -13,7 +13,7 @@ export class SceneText {
     this.line = this.errorLine = null;
     this.area.oninput = (event) => {
       this.number();
-      typed(this.value, /^insertFromPaste|^insertFromDrop|^deleteByCut/.test(event.inputType ?? ""));
+      typed(this.value, event.timeStamp, /^insertFromPaste|^insertFromDrop|^deleteByCut/.test(event.inputType ?? ""));
     };
     this.area.onscroll = () => this.place();
     new ResizeObserver(() => this.place()).observe(this.area);
