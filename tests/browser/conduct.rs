@@ -317,7 +317,7 @@ fn bar_conducts() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn token_and_own_pages() {
     in_a_browser("token_and_own_pages");
 }

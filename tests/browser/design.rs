@@ -18,37 +18,37 @@ fn village_by_pointer() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn village_by_keyboard() {
     in_a_browser("village_by_keyboard");
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn every_handle() {
     in_a_browser("every_handle");
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn server_restarted() {
     in_a_browser("server_restarted");
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn two_sessions() {
     in_a_browser("two_sessions");
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn texts_of_all_kinds() {
     in_a_browser("texts_of_all_kinds");
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn gestures() {
     in_a_browser("gestures");
 }
@@ -64,7 +64,7 @@ fn numbers_that_fit() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn token() {
     played("design_files.py", "token");
 }
@@ -75,7 +75,7 @@ fn hand_outs() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn small_screens() {
     in_a_browser("small_screens");
 }

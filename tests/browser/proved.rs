@@ -161,13 +161,13 @@ fn checked_while_it_is_seen() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn nothing_of_another_scene() {
     in_a_browser("nothing_of_another_scene");
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn gone_with_its_scene() {
     in_a_browser("gone_with_its_scene");
 }

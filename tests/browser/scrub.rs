@@ -9,13 +9,13 @@ fn thumb_shows_another_time() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn address_and_keys() {
     run_scenario("scrub_page.py", "address_and_keys", &["config/paper.toml"]);
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "one more way through the page, after those of the short run: tests/run --all"]
 fn several_dragons() {
     run_scenario("scrub_page.py", "several_dragons", &["config/coil.toml"]);
 }

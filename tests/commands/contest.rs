@@ -14,7 +14,7 @@ fn number_after(printed: &str, words: &str) -> f64 {
 /// The numbers are of others: 50 digits for the contact; the published pitch, length and speed that an independent
 /// computation confirmed; the least turn by its formula.
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn the_example_answers_the_contest() {
     if !can_run(python_modules(&["openpyxl", "numpy"])) {
         return;

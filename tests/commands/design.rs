@@ -179,7 +179,7 @@ fn beyond_loopback_every_request_needs_the_token() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn the_least_turn_of_a_route_is_that_of_the_command() {
     let village = include_str!("../../config/village.toml");
     let design = Design::start("design-turn", village, &[]);

@@ -29,7 +29,7 @@ fn judge(arguments: &[&str]) {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn obstacles_are_met_where_a_brute_force_meets_them() {
     if !can_run(python_modules(&["numpy", "shapely"])) {
         return;
@@ -181,7 +181,7 @@ fn the_first_touch_of_an_obstacle_is_proved_and_verified() {
 
 /// An obstacle that no board comes near does not change a plan.
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn plans_are_those_without_obstacles_that_are_far() {
     let staged = scene("[[stage.obstacles]]\nname = \"lamp\"\ncircle = { center = [20.0, 2.0], radius = 0.5 }");
     let mut plain = Command::new(env!("CARGO_BIN_EXE_bench-dragon"));

@@ -110,7 +110,7 @@ fn check(certificate: &[u8]) -> Result<Proved, Refused> {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn a_certificate_with_another_clearance_is_refused() {
     let (scene, file) = (coil(""), tempfile::NamedTempFile::new().unwrap());
     let name = file.path().to_str().unwrap();
@@ -196,7 +196,7 @@ fn sampled(pitch: f64, [x, y]: [f64; 2]) -> f64 {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn a_plan_stays_outside_the_keep_outs_of_the_stage() {
     // Just inside the last turn, where the head's board passes with the least pitch for boards alone.
     let place = [4.0705, 1.3226];

@@ -4,7 +4,7 @@ use crate::harness::{can_run, cases, program, python, python_modules, text};
 use serde_json::Value;
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn the_ground_is_that_of_sampled_boards() {
     if !can_run(python_modules(&["numpy", "shapely"])) {
         return;

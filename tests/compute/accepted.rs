@@ -100,7 +100,7 @@ fn clearance_of(text: &str) -> Option<(ProvedClearance, Option<ClearanceEnclosur
 /// Boards that come nearest at the very lock that ends the show. Over the last nanometre before a lock they move by
 /// the root of that, so a certificate has an upper bound only where its steps come nearer to the lock.
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn a_clearance_that_is_least_at_a_lock_claims_no_more_than_its_steps() {
     let (mut at_lock, mut index) = (0, 0);
     while at_lock < 8 {
@@ -302,7 +302,7 @@ fn certificates_of_pieces_with_a_length_are_accepted() {
 /// A certificate of the least clearance, the greatest speed or the least pitch is refused without any one of its lines.
 /// It is also refused with a result that claims a little more.
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn changed_certificates_of_other_questions_are_refused() {
     let team = "[team]\nbenches = 5\nhead_length = 2.2\nbody_length = 1.6\nwidth = 0.3\nhole_inset = 0.2\n\
                 [motion]\nhead_speed = 1.0\n";

@@ -240,7 +240,7 @@ fn events_do_not_depend_on_the_accuracy() {
 
 /// The live clearance of a coarse chain is the clearance of all its pairs, to the last bit.
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn the_live_clearance_is_that_of_the_frame() {
     for name in ["paper", "turnaround", "procession", "school"] {
         let scene = scene(name);

@@ -115,7 +115,7 @@ fn spiral((benches, [head, body, width, inset, pitch, turns, speed]): (u32, [f64
 /// Boards that meet slowly, long paths, heavy heads, a U-turn hardly narrower than a link: every enclosure is at most a
 /// nanosecond wide.
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn enclosures_are_a_nanosecond_wide() {
     let changes = [
         ("head_length", "2.2"),
@@ -230,7 +230,7 @@ fn random_scenes_agree() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn boards_that_pass_within_micrometres_are_told_from_boards_that_touch() {
     // The least pitch with which the head reaches a radius. A little below it, two boards touch outside. A little above
     // it, they pass, and touch further in.

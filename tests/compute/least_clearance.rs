@@ -77,7 +77,7 @@ fn config(name: &str) -> String {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn a_show_that_stops_at_a_touch_has_the_least_clearance_0() {
     for name in ["paper", "school", "tight"] {
         let enclosure = compared(&config(name), 40, 10_000).unwrap();
@@ -92,7 +92,7 @@ fn the_least_clearance_of_the_procession_is_enclosed_to_a_nanometre() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn shows_that_end_with_a_lock_are_enclosed_up_to_it() {
     // Boards that overlap without ending the show; a lock in a spiral; locks at which a nearer place takes the handle.
     for file in ["scenes/noalerts", "../config/wide", "scenes/tailoff", "scenes/stall_missed", "scenes/pieces_59"] {

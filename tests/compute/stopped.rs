@@ -150,7 +150,7 @@ fn a_certificate_holds_and_says_what_is_not_decided() {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn plans_enclose_no_more_than_they_have_proved() {
     let scene = SceneText::paper().parse().unwrap();
     let team = *scene.ensemble.only().unwrap().team();

@@ -288,7 +288,7 @@ fn lines_of(file: &Path) -> Vec<Value> {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn a_second_judge_agrees_and_refuses_what_was_changed() {
     if !can_run(python_modules(&["flint"])) {
         return;

@@ -96,7 +96,7 @@ fn changes_of_two(files: &[PathBuf]) -> Vec<Changed> {
 }
 
 #[test]
-#[ignore = "tests/run --all"]
+#[ignore = "computes for long: tests/run --all"]
 fn a_second_judge_agrees_about_several_dragons() {
     if !can_run(python_modules(&["flint"])) {
         return;
