@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
-use super::ports::{Sockets, read_sockets};
+use super::ports::{Sockets, read_all_sockets, read_sockets};
 use super::wire::{Prefix, are_of_one_process};
 
 /// The interval at which sockets are read. Reading takes a fraction of a millisecond, and a new process needs longer to
@@ -72,7 +72,7 @@ impl Departures {
             if participant.addresses.len() == known {
                 continue;
             }
-            let table = table.get_or_insert_with(read_sockets).as_ref();
+            let table = table.get_or_insert_with(read_all_sockets).as_ref();
             let is_here = participant.addresses.iter().all(|address| is_local(*address));
             let sockets = table.filter(|_| is_here).map(|table| participant.sockets_in(table));
             if sockets.as_ref().is_some_and(BTreeSet::is_empty) && participant.has_no_socket() {
@@ -155,8 +155,7 @@ impl Participant {
         self.addresses.iter().filter_map(|address| table.get(&address.port())).flatten().copied().collect()
     }
 
-    /// Returns true if its addresses are free. The kernel's table can miss a socket: it is read in parts, and a socket
-    /// that is closed meanwhile moves the following ones.
+    /// Returns true if its addresses are free: a reading of the table can miss a socket.
     fn has_no_socket(&self) -> bool {
         self.addresses.iter().all(|address| UdpSocket::bind(address).is_ok())
     }
