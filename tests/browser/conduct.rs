@@ -9,7 +9,7 @@ use crate::{harness, run_scenario};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use harness::{Process, answering, json_lines, program, scene_file, text};
 use nix::sys::signal::Signal;
@@ -58,7 +58,7 @@ fn connect(address: &str, origin: Option<&str>) -> Result<Socket, u16> {
     match tungstenite::connect(request) {
         Ok((socket, _)) => {
             let MaybeTlsStream::Plain(stream) = socket.get_ref() else { panic!("no TLS here") };
-            stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+            stream.set_read_timeout(Some(harness::patience())).unwrap();
             Ok(socket)
         }
         Err(tungstenite::Error::Http(response)) => Err(response.status().as_u16()),
@@ -69,9 +69,9 @@ fn connect(address: &str, origin: Option<&str>) -> Result<Socket, u16> {
 /// Returns the next message of a type.
 fn message(socket: &mut Socket, of: &str) -> Value {
     // Frames keep coming even if the message does not.
-    let deadline = Instant::now() + Duration::from_secs(60);
+    let deadline = Instant::now() + harness::patience();
     loop {
-        assert!(Instant::now() < deadline, "no message {of} within 60 s");
+        assert!(Instant::now() < deadline, "no message {of}");
         if let Message::Text(json) = socket.read().unwrap() {
             let message: Value = serde_json::from_str(&json).unwrap();
             if message["type"] == of {
@@ -255,7 +255,7 @@ fn a_page_from_elsewhere_is_let_in_by_its_name_only() {
 /// Returns status line, headers and body of the answer to a request whose path is sent unchanged.
 fn get(address: &str, path: &str, host: &str) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    stream.set_read_timeout(Some(harness::patience())).unwrap();
     write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
     let mut bytes = Vec::new();
     stream.read_to_end(&mut bytes).unwrap();

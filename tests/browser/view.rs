@@ -6,7 +6,6 @@
 use crate::{harness, run_scenario};
 
 use std::net::TcpStream;
-use std::time::Duration;
 
 use bench_dragon::client::clock::monotonic_ns;
 use harness::{Process, can_run, program, python, python_modules, text, unique, wait};
@@ -36,7 +35,7 @@ fn request(address: &str, headers: &[(&str, &str)]) -> Result<Socket, tungstenit
     let request = headers.iter().fold(start, |request, (name, value)| request.with_header(*name, *value));
     let (socket, _) = tungstenite::connect(request)?;
     if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
-        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream.set_read_timeout(Some(harness::patience())).unwrap();
     }
     Ok(socket)
 }

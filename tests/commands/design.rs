@@ -2,14 +2,13 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
 
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
-use crate::harness::{Place, Process, http_get, json_lines, text};
+use crate::harness::{Place, Process, http_get, json_lines, patience, text};
 
 type Socket = WebSocket<MaybeTlsStream<TcpStream>>;
 
@@ -42,7 +41,7 @@ impl Design {
         }
         let (socket, _) = tungstenite::connect(request)?;
         if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
-            stream.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
+            stream.set_read_timeout(Some(patience())).unwrap();
         }
         Ok(socket)
     }

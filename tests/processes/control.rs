@@ -4,15 +4,15 @@
 use crate::harness;
 
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use bench_dragon::client::control::Controller;
 use bench_dragon::messages::ControlResponse;
 use bench_dragon::messages::control::{Code, Command as Conduct};
 use bench_dragon::messages::state::PlaybackState;
 use harness::{
-    LONG_QUEUE, Place, Process, answering, can_run, example, json_lines, program, python, python_modules, root,
-    scene_file, stopped, summary, text, unique, wait,
+    LONG_QUEUE, Place, Process, answering, can_run, example, json_lines, patience, program, python, python_modules,
+    root, scene_file, stopped, summary, text, unique, wait,
 };
 use serde_json::Value;
 
@@ -141,7 +141,7 @@ fn a_show_waits_for_go_at_its_start_and_at_its_cues() {
     let state = done(name, &["state"]);
     assert_eq!((&state["playback"], &state["sim_time"], &state["cue"]), (&"paused".into(), &0.0.into(), &0.into()));
     done(name, &["go"]);
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + patience();
     let mut state = done(name, &["state"]);
     while state["cue"] != 2 && Instant::now() < deadline {
         wait(0.1);
@@ -200,20 +200,18 @@ struct TwoClients {
     step: Option<std::thread::JoinHandle<ControlResponse>>,
 }
 
-const PATIENCE: Duration = Duration::from_secs(60);
-
 impl TwoClients {
     fn new(name: &str) -> Self {
         Self { controller: Controller::new(&unique(name)).unwrap(), second: unique(name), step: None }
     }
 
     fn send(&mut self, command: Conduct) -> (Code, PlaybackState) {
-        let answer = self.controller.send(command, PATIENCE).unwrap();
+        let answer = self.controller.send(command, patience()).unwrap();
         (answer.result().unwrap(), answer.playback_state().unwrap())
     }
 
     fn until(&mut self, wanted: PlaybackState) {
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + patience();
         while self.send(Conduct::State).1 != wanted {
             assert!(Instant::now() < deadline, "the show is never {}", wanted.name());
         }
@@ -233,7 +231,7 @@ impl TwoClients {
             Stand::Stepping => {
                 let name = self.second.clone();
                 self.step = Some(std::thread::spawn(move || {
-                    Controller::new(&name).unwrap().send(Conduct::Step(1_000_000), PATIENCE).unwrap()
+                    Controller::new(&name).unwrap().send(Conduct::Step(1_000_000), patience()).unwrap()
                 }));
                 self.until(PlaybackState::Playing);
             }
@@ -346,7 +344,7 @@ fn another_user_cannot_conduct() {
     let place = Place::new("clients");
     let publisher = Process::start(place.program().args(["run", "--json", "--rate", "100"]));
     let state = || json_lines(&place.program().args(["--json", "control", "state"]).output().unwrap()).pop();
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + patience();
     while state().is_none() {
         assert!(Instant::now() < deadline, "no publisher");
         wait(0.1);

@@ -387,7 +387,7 @@ fn catches(process: &Process, signal: Signal) -> bool {
 fn a_page_that_cannot_be_had_is_a_sentence() {
     let place = Place::new("page");
     let monitor = Process::start(place.program().arg("watch").arg("--json"));
-    let deadline = Instant::now() + Duration::from_secs(60);
+    let deadline = Instant::now() + harness::patience();
     // The process catches SIGTERM after it has installed its handler for page errors; Rust itself catches SIGBUS from
     // the beginning.
     while !catches(&monitor, SIGTERM) {

@@ -44,7 +44,7 @@ fn poll(feed: &mut Feed, seen: &mut Vec<Seen>) {
 }
 
 fn poll_until(feed: &mut Feed, seen: &mut Vec<Seen>, condition: impl Fn(&[Seen]) -> bool) {
-    let deadline = Instant::now() + Duration::from_secs(300);
+    let deadline = Instant::now() + harness::patience();
     while !condition(seen) {
         assert!(Instant::now() < deadline, "{seen:?}");
         poll(feed, seen);
@@ -162,7 +162,7 @@ fn a_publisher_that_is_started_again_at_any_moment_is_followed_at_once() {
 fn a_feed_that_waits_for_a_show_gets_the_first_frame() {
     let mut feed = Feed::new(&unique("first"), FeedOptions { wake: Wake::Never, frames: Delivery::All }).unwrap();
     let mut seen = Vec::new();
-    let deadline = Instant::now() + Duration::from_secs(300);
+    let deadline = Instant::now() + harness::patience();
     let (mut complete, mut incomplete) = (0, 0);
     while complete < 8 {
         assert!(
@@ -202,7 +202,7 @@ fn a_feed_is_ready_when_the_stage_and_the_scene_can_be_received() {
         feed.poll(Duration::from_millis(20), &mut |event| panic!("{event:?}")).unwrap();
         (feed.shares_clock().is_some(), feed.is_ready())
     };
-    let deadline = Instant::now() + Duration::from_secs(300);
+    let deadline = Instant::now() + harness::patience();
     let service = |suffix: &str| node.service_builder(&service_name(&name, suffix).unwrap());
     let poses = service("poses").publish_subscribe::<[HandlePose]>().user_header::<FrameHeader>().create().unwrap();
     let _port = poses.publisher_builder().create().unwrap();
@@ -292,7 +292,7 @@ fn what_is_handed_over_belongs_to_the_frames_from_the_beginning() {
         poll(&mut runs);
     }
     assert_eq!(runs, []);
-    let deadline = Instant::now() + Duration::from_secs(300);
+    let deadline = Instant::now() + harness::patience();
     let mut sequence = 0;
     while runs.len() < 10 {
         assert!(Instant::now() < deadline, "{runs:?}");
@@ -326,7 +326,7 @@ fn an_alert_follows_the_stage_of_its_run() {
         });
         polled.unwrap();
     };
-    let deadline = Instant::now() + Duration::from_secs(300);
+    let deadline = Instant::now() + harness::patience();
     let mut sequence = 0;
     // An alert with each frame, as many as it takes until the feed has connected.
     while !seen.contains(&"frame") {

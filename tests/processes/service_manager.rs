@@ -20,7 +20,7 @@ fn message(manager: &UnixDatagram) -> String {
 fn manager(folder: &tempfile::TempDir) -> (UnixDatagram, PathBuf) {
     let socket = folder.path().join("notify");
     let manager = UnixDatagram::bind(&socket).unwrap();
-    manager.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
+    manager.set_read_timeout(Some(harness::patience())).unwrap();
     (manager, socket)
 }
 
@@ -60,7 +60,7 @@ fn a_publisher_is_ready_alive_and_stopping() {
     // Messages that were sent before the stop.
     while manager.recv(&mut bytes).is_ok() {}
     publisher.signal(SIGCONT);
-    manager.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
+    manager.set_read_timeout(Some(harness::patience())).unwrap();
     assert_eq!(message(&manager), "WATCHDOG=1\n");
 
     publisher.signal(SIGINT);

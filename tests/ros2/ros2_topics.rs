@@ -57,16 +57,28 @@ fn cues_path_clock_and_transforms_are_those_of_the_show() {
     // A transform is sent when its stamp changes, so that there is none yet.
     let paused = [topics[0], topics[1], topics[3]];
     until(&mut lines, &|lines| paused.iter().all(|topic| !messages(lines, topic).is_empty()));
-    let go = program("shown").args(["control", "go"]).output().unwrap();
-    assert!(go.status.success(), "{}", text(&go.stderr));
+    let control = |command: &[&str]| {
+        let output = program("shown").arg("control").args(command).output().unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    };
+    control(&["go"]);
     let latest = |lines: &[Value]| messages(lines, topics[4]).last().is_some_and(|cue| cue["number"] == 3);
     until(&mut lines, &latest);
     let so_far = ["clock", "tf"].map(|topic| (topic, messages(&lines, topic).len()));
     until(&mut lines, &|lines| so_far.iter().all(|(topic, count)| messages(lines, topic).len() > count + 3));
-    // A late subscriber gets the latest cue and the path, once.
-    let late = Process::start(peer("shown", "300", &topics[3..]).args(["--domain", "9", "--until-each"])).output();
-    let late = json_lines(&late);
-    assert!(latest(&late) && topics[3..].iter().all(|topic| messages(&late, topic).len() == 1), "{late:?}");
+    // A late subscriber gets the latest cue and the path, once. Just after the cues it gets none of the earlier ones,
+    // unless a busy machine is too late: a fault would show every time.
+    let is_withheld = (0..5).any(|attempt| {
+        if attempt > 0 {
+            control(&["seek", "50.25"]);
+            until(&mut Vec::new(), &latest);
+        }
+        let late = Process::start(peer("shown", "300", &topics[3..]).args(["--domain", "9", "--until-each"])).output();
+        let late = json_lines(&late);
+        assert!(latest(&late) && messages(&late, topics[3]).len() == 1, "{late:?}");
+        messages(&late, topics[4]).len() == 1
+    });
+    assert!(is_withheld);
     publisher.signal(nix::sys::signal::Signal::SIGINT);
     let summary = summary(&publisher.output());
     assert!(summary["ros2"]["frames"].as_u64().unwrap() * 10 < summary["frames"].as_u64().unwrap(), "{summary}");

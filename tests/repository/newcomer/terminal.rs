@@ -9,8 +9,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
-/// Time after which a hanging command fails, on a machine however busy.
-const DEADLINE: Duration = Duration::from_secs(300);
+use super::harness::patience;
 
 /// A command in a shell, whose output goes to a file.
 pub struct Terminal {
@@ -92,8 +91,8 @@ impl Drop for Terminal {
 pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) -> Result<(), String> {
     let began = Instant::now();
     while !is_so() {
-        if began.elapsed() > DEADLINE {
-            return Err(format!("no {what} within {} s", DEADLINE.as_secs()));
+        if began.elapsed() > patience() {
+            return Err(format!("no {what} within {:?}", patience()));
         }
         std::thread::sleep(Duration::from_millis(20));
     }
