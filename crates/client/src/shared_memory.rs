@@ -58,3 +58,10 @@ pub fn node() -> Result<Node<ipc::Service>, OpenError> {
         }
     })
 }
+
+/// Returns what a test holds while it looks at the open files of this process: they are those of all its tests.
+#[cfg(test)]
+fn only_test_with_open_files() -> std::sync::MutexGuard<'static, ()> {
+    static OPEN_FILES: std::sync::Mutex<()> = std::sync::Mutex::new(());
+    OPEN_FILES.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}

@@ -111,6 +111,7 @@ mod tests {
 
     #[test]
     fn every_file_of_a_node_and_its_services_is_touched_each_hour_and_missed_when_it_is_gone() {
+        let _only = crate::shared_memory::only_test_with_open_files();
         let node = crate::shared_memory::node().unwrap();
         let name = format!("own_files_{}/test", std::process::id()).as_str().try_into().unwrap();
         let service = node.service_builder(&name).publish_subscribe::<u64>().open_or_create().unwrap();

@@ -153,6 +153,7 @@ mod tests {
 
     #[test]
     fn a_node_that_is_not_listed_yet_stays_while_a_process_makes_it() {
+        let _only = super::super::only_test_with_open_files();
         // This makes the folder of all nodes, as iceoryx2 has it.
         let _node = super::super::node().unwrap();
         let nodes = Config::global_config().global.node_dir().to_string();
@@ -170,6 +171,7 @@ mod tests {
 
     #[test]
     fn only_what_stays_unfinished_is_removed() {
+        let _only = super::super::only_test_with_open_files();
         let prefix = Config::global_config().global.prefix.to_string();
         let file = |name: &str, mode| {
             let file = Path::new(SHARED_MEMORY).join(format!("{prefix}test_{}_{name}", std::process::id()));
