@@ -17,6 +17,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{SocketAddr, UdpSocket};
+use std::ops::Bound;
 use std::time::{Duration, Instant};
 
 use super::ports::{Sockets, read_all_sockets, read_sockets};
@@ -25,6 +26,10 @@ use super::wire::{Prefix, are_of_one_process};
 /// The interval at which sockets are read. Reading takes a fraction of a millisecond, and a new process needs longer to
 /// join the network.
 const INTERVAL: Duration = Duration::from_millis(20);
+/// The interval of the life signs of a participant. RustDDS looks for leases that have ended every two seconds.
+const LIFE_SIGN_INTERVAL: Duration = Duration::from_secs(1);
+/// The most life signs at one time. RustDDS queues eight (`dds/participant.rs:291`) and drops the others.
+const MOST_LIFE_SIGNS: usize = 4;
 /// The most participants that are remembered as dead or as having left. Their datagrams can come for some seconds.
 const REMEMBERED: usize = 1000;
 
@@ -38,6 +43,8 @@ pub(super) struct Departures {
     /// The participants that have died or left.
     died: VecDeque<Prefix>,
     checked: Option<Instant>,
+    /// The participant that was last given a life sign, and the time of it.
+    life_sign: Option<(Prefix, Instant)>,
 }
 
 #[derive(Default)]
@@ -131,9 +138,21 @@ impl Departures {
         self.participants.get(&participant).is_some_and(|participant| participant.sockets.is_some())
     }
 
-    /// Returns the participants that are not known to have left.
-    pub(super) fn present(&self) -> impl Iterator<Item = Prefix> {
-        self.participants.keys().copied()
+    /// Returns the participants whose life sign is due, of those that are not known to have left. They take turns, so
+    /// that few are due at one time, however often this is called.
+    pub(super) fn due(&mut self, now: Instant) -> Vec<Prefix> {
+        let (last, given) = *self.life_sign.get_or_insert(([0; 12], now));
+        let step = LIFE_SIGN_INTERVAL / self.participants.len().max(1) as u32;
+        let number = (now.duration_since(given).as_nanos() / step.as_nanos()).min(MOST_LIFE_SIGNS as u128) as usize;
+        let later = self.participants.range((Bound::Excluded(last), Bound::Unbounded));
+        let in_turn = later.chain(self.participants.range(..=last));
+        let due: Vec<Prefix> = in_turn.take(number).map(|(prefix, _)| *prefix).collect();
+        if let Some(last) = due.last() {
+            // After a pause the others do not catch up.
+            let given = if number < MOST_LIFE_SIGNS { given + step * number as u32 } else { now };
+            self.life_sign = Some((*last, given));
+        }
+        due
     }
 
     /// Notes that a participant has said farewell: it never comes back. Its announcements can come after its farewell,
@@ -243,7 +262,7 @@ mod tests {
         departures.discovered(OLD);
         assert_eq!(note(&mut departures, OLD, address), [OLD]);
         assert_eq!(note(&mut departures, NEW, address), [[0; 12]; 0]);
-        assert_eq!(departures.present().collect::<Vec<_>>(), [NEW]);
+        assert_eq!(departures.participants.keys().collect::<Vec<_>>(), [&NEW]);
         // One whose lease has ended may come back.
         departures.forget(NEW);
         departures.discovered(NEW);
@@ -282,6 +301,30 @@ mod tests {
             assert_eq!(note(&mut departures, later, address), [one, beside]);
             drop(socket);
         }
+    }
+
+    /// As many as are due at once are lost beyond RustDDS's queue, and always those of the same participants.
+    #[test]
+    fn life_signs_take_turns_and_few_are_due_at_once_however_often_one_asks() {
+        let (mut departures, start) = (Departures::default(), Instant::now());
+        let prefixes: Vec<Prefix> = (1..=40).map(|number| [number; 12]).collect();
+        // Documentation addresses (RFC 5737).
+        let address = |prefix: Prefix| SocketAddr::from(([198, 51, 100, prefix[0]], 7411));
+        prefixes.iter().for_each(|prefix| assert_eq!(note(&mut departures, *prefix, address(*prefix)), [[0; 12]; 0]));
+        let mut asked_at = |milliseconds: u64| -> Vec<Prefix> {
+            let now = start + Duration::from_millis(milliseconds);
+            (0..20).flat_map(|_| departures.due(now)).collect()
+        };
+        asked_at(0);
+        let mut signs = BTreeMap::<Prefix, usize>::new();
+        for frame in 1..=180 {
+            let due = asked_at(frame * 1000 / 60);
+            assert!(due.len() <= MOST_LIFE_SIGNS, "{}", due.len());
+            due.into_iter().for_each(|prefix| *signs.entry(prefix).or_default() += 1);
+        }
+        assert_eq!(signs, prefixes.into_iter().map(|prefix| (prefix, 3)).collect());
+        assert_eq!(asked_at(60_000).len(), MOST_LIFE_SIGNS, "after a pause");
+        assert_eq!(asked_at(60_000 + 25).len(), 1);
     }
 
     /// As when the kernel's table misses a line.

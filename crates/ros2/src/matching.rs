@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use ros2_client::Context;
 use rustdds::policy::Durability;
@@ -23,9 +23,6 @@ use super::wire::{self, Prefix, prefix};
 
 /// The prefix of the topics of requests.
 const REQUEST_PREFIX: &str = "rq/";
-
-/// The interval of the life signs of a participant. RustDDS looks for leases that have ended every two seconds.
-const LIFE_SIGN_INTERVAL: Duration = Duration::from_secs(1);
 
 /// The matches of one participant, shared by its threads.
 #[derive(Clone)]
@@ -51,9 +48,6 @@ struct Ends {
     /// Datagrams for new endpoints.
     repeated: Vec<Repeated>,
     departures: Departures,
-    /// The participants whose life sign is still due, and the time from which it is.
-    due: Vec<Prefix>,
-    due_since: Instant,
     /// Farewells that have been said.
     farewells: u16,
     /// Acknowledgements that have been sent.
@@ -75,8 +69,6 @@ impl Matches {
             neighbours: BTreeMap::new(),
             repeated: Vec::new(),
             departures: Departures::default(),
-            due: Vec::new(),
-            due_since: Instant::now(),
             farewells: 0,
             acknowledged: 0,
         };
@@ -246,12 +238,7 @@ impl Ends {
     /// the lease, or a process that stood still, would end all topics there. Held by the tests
     /// `a_subscriber_that_was_silent`, `a_subscriber_behind_a_cable` and `a_client_that_was_silent`.
     fn give_life_signs(&mut self) {
-        if self.due.is_empty() && self.due_since.elapsed() >= LIFE_SIGN_INTERVAL {
-            self.due_since = Instant::now();
-            self.due.extend(self.departures.present());
-        }
-        // One at a time: RustDDS queues eight life signs (`dds/participant.rs:291`).
-        if let Some(participant) = self.due.pop() {
+        for participant in self.departures.due(Instant::now()) {
             wire::send_to_own(&self.participant, &wire::life_sign(participant));
         }
     }
