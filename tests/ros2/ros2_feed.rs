@@ -16,7 +16,7 @@ use harness::{
     Lines, Process, answering, can_run, json_lines, program, python, python_modules, scene_file, stopped, text, unique,
     wait_until,
 };
-use nix::sys::signal::Signal::{SIGINT, SIGKILL, SIGTERM};
+use nix::sys::signal::Signal::{SIGCONT, SIGINT, SIGKILL, SIGSTOP, SIGTERM};
 use nix::sys::signal::kill;
 use nix::unistd::Pid;
 use serde_json::Value;
@@ -186,6 +186,35 @@ fn a_killed_process_of_ros_2_is_restarted_and_the_show_loses_no_frame() {
     let sent = summary["ros2"]["frames"].as_u64().unwrap();
     assert!(sent + 2 * 61 >= heard, "{sent} sent, at least {heard} received: {summary}");
     assert_eq!(text(&output.stderr).matches("restarted").count(), 3, "{}", text(&output.stderr));
+}
+
+/// RustDDS ends its threads when a system call of theirs is interrupted.
+#[test]
+fn a_process_of_ros_2_that_stood_still_is_replaced() {
+    if !can_run(python_modules(&["cyclonedds"])) {
+        return;
+    }
+    let name = "stood_still";
+    let publisher = Process::start(program(name).args(["run", "--ros2", "--json", "--start", "300"]));
+    let (subscriber, lines) = peer(name, &["handles"]);
+    next(&lines, "handles");
+    let child = ros2_of(&publisher);
+    wait_until("the process has ended", || {
+        // Again and again, since a thread that computes meanwhile is not interrupted.
+        for signal in [SIGSTOP, SIGCONT] {
+            let _ = kill(Pid::from_raw(child as i32), signal);
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        !exists(child)
+    });
+    let tick = control(name, &["state"]).1["tick"].as_u64().unwrap();
+    while next(&lines, "handles")["tick"].as_u64().unwrap() <= tick {}
+    assert_ne!(ros2_of(&publisher), child);
+    subscriber.signal(SIGKILL);
+    publisher.signal(SIGINT);
+    let output = publisher.output();
+    let log = text(&output.stderr);
+    assert!(log.contains("RustDDS has ended") && log.contains("restarted"), "{log}");
 }
 
 #[test]

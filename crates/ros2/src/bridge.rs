@@ -209,8 +209,22 @@ impl Handler for Bridge<'_> {
             self.counted = now;
             let counters = self.counters();
             (self.notify)(0, Notice::Counted(counters));
+            if !is_rustdds_running() {
+                self.failure = Some(Ros2Error::Ended);
+                self.stop.store(true, Ordering::Relaxed);
+            }
         }
     }
+}
+
+/// Returns false if RustDDS has ended its threads. It does so when a system call of theirs is interrupted
+/// (`rtps/dp_event_loop.rs:308`, `discovery/discovery.rs:736`), as by a stop of the process or the sleep of the machine.
+fn is_rustdds_running() -> bool {
+    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return true };
+    let names = threads.flatten().filter_map(|thread| std::fs::read_to_string(thread.path().join("comm")).ok());
+    let names: Vec<String> = names.collect();
+    // The system keeps the first 15 bytes of a name.
+    ["RustDDS Partici", "RustDDS discove"].iter().all(|of| names.iter().any(|name| name.trim_end() == *of))
 }
 
 impl ShowBridge {

@@ -54,6 +54,12 @@ pub enum Ros2Error {
     /// RustDDS or ros2-client failed.
     #[error("ROS 2 could not be started: {0}")]
     Failed(String),
+    /// RustDDS has ended its threads.
+    #[error(
+        "RustDDS has ended, as it does when its process stood still, in a debugger or while the machine slept: start \
+         it again"
+    )]
+    Ended,
 }
 
 /// The settings of the topics.

@@ -82,7 +82,7 @@ fn of_transport(counters: BridgeCounters) -> TransportCounters {
 impl From<Ros2Error> for CommandError {
     fn from(error: Ros2Error) -> Self {
         match error {
-            Ros2Error::Failed(_) => Self::Failed(error.to_string()),
+            Ros2Error::Failed(_) | Ros2Error::Ended => Self::Failed(error.to_string()),
             Ros2Error::Name(_) => Self::BadInput(format!("--name: {error}")),
             Ros2Error::Environment(_) => Self::BadInput(error.to_string()),
         }
