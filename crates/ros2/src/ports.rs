@@ -20,8 +20,8 @@ const TABLES: [&str; 2] = ["/proc/net/udp", "/proc/net/udp6"];
 /// The participants of a domain on one machine, as many as RustDDS tries (`dds/participant.rs:1267`).
 const PARTICIPANTS: u16 = 120;
 
-/// The readings of the tables that miss no socket together. One of three misses it where two processors do nothing but
-/// open and close sockets.
+/// The readings of the tables that together miss no socket. One reading of three misses a given socket where two
+/// processors do nothing but open and close others.
 const READINGS: usize = 24;
 
 /// The sockets of each port, by their inodes. No two sockets that exist at one time share an inode.
