@@ -7,8 +7,9 @@
 //! 2.14 hang ([`gap`](super::wire::gap)). The readers of the dead participant also hold up the others. So this file finds
 //! out who has died, and the matches say farewell in its name.
 //!
-//! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants that have
-//! died: on this machine those whose sockets are gone, elsewhere those whose addresses belong to a newer participant.
+//! In: the addresses of remote endpoints, and the table of UDP sockets of the kernel. Out: the participants whose life
+//! sign is due, and those that have died: on this machine those whose sockets are gone, elsewhere those whose addresses
+//! belong to a newer participant.
 //! A participant lists all addresses of its machine. It is on this machine if all of them are, and it is succeeded by
 //! one that lists the same. Machines share single addresses, such as those of the loopback interface or of containers'
 //! bridges, but not all. The participants of one process of Cyclone DDS share all, and live side by side.
@@ -303,7 +304,7 @@ mod tests {
         }
     }
 
-    /// As many as are due at once are lost beyond RustDDS's queue, and always those of the same participants.
+    /// What comes at once and does not fit into RustDDS's queue is lost.
     #[test]
     fn life_signs_take_turns_and_few_are_due_at_once_however_often_one_asks() {
         let (mut departures, start) = (Departures::default(), Instant::now());

@@ -56,8 +56,8 @@ pub enum Ros2Error {
     Failed(String),
     /// RustDDS has ended its threads.
     #[error(
-        "RustDDS has ended, as it does when its process stood still, in a debugger or while the machine slept: start \
-         it again"
+        "RustDDS has ended, as it does when its process stood still, in a debugger or while the machine slept: the \
+         process has to be started again"
     )]
     Ended,
 }
