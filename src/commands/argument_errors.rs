@@ -1,4 +1,4 @@
-//! Sentences for arguments that clap refuses in words which name no remedy. Called by `main` only.
+//! Sentences for arguments that clap refuses in words which name no remedy.
 
 use std::ffi::OsString;
 use std::num::{ParseFloatError, ParseIntError};

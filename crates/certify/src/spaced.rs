@@ -1,6 +1,6 @@
 //! A team, and the distance that its boards must keep.
 //!
-//! In: a team alone, or with a clearance. Called by the plans.
+//! In: a team alone, or with a clearance.
 
 use bench_dragon_motion::model::team::Team;
 

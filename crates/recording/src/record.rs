@@ -4,7 +4,6 @@
 //! end waits with the next frame. Frames then stay in the shared memory until the oldest are overwritten, which is a
 //! gap in the recording. The publisher and this process's memory are not affected. Event-driven messages are small and
 //! never wait. The thread holds the first frames of a run until the scene has come, which has the clock of their stamps.
-//! Called by the command `record`.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};

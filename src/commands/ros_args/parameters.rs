@@ -1,7 +1,7 @@
 //! The parameters of `-p` and `--params-file`, as rcl 9 reads them: sections that name nodes, and values with the types
 //! of rcl_yaml_param_parser.
 //!
-//! In: rules and files, in the order of the command line. Out: the parameters of one node. Called by `ros_args`.
+//! In: rules and files, in the order of the command line. Out: the parameters of one node.
 
 use std::fs::File;
 use std::io::Read;
