@@ -304,7 +304,7 @@ mod tests {
         }
     }
 
-    /// What comes at once and does not fit into RustDDS's queue is lost.
+    /// RustDDS loses the life signs that do not fit into its queue.
     #[test]
     fn life_signs_take_turns_and_few_are_due_at_once_however_often_one_asks() {
         let (mut departures, start) = (Departures::default(), Instant::now());
